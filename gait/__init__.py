@@ -2,5 +2,6 @@
 
 from .body import GRAVITY, Body
 from .errors import SpringfootError
+from .human import HumanGait, human_gait
 
-__all__ = ["GRAVITY", "Body", "SpringfootError"]
+__all__ = ["GRAVITY", "Body", "HumanGait", "SpringfootError", "human_gait"]

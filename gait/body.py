@@ -6,9 +6,9 @@ and Figure 4.1 (segment lengths). All ratios of masses are of body mass, all rat
 """
 
 from dataclasses import dataclass
-from math import hypot, isfinite, sqrt
+from math import hypot, sqrt
 
-from .errors import SpringfootError
+from .errors import require_within
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
@@ -40,9 +40,9 @@ class Body:
     """Body mass [kg]."""
 
     def __post_init__(self) -> None:
-        _check("height", self.height, HEIGHT_RANGE, "m")
-        _check("mass", self.mass, MASS_RANGE, "kg")
-        _check("body-mass index mass/height^2", self.mass / self.height**2, BMI_RANGE, "kg/m^2")
+        require_within("height", self.height, HEIGHT_RANGE, "m")
+        require_within("mass", self.mass, MASS_RANGE, "kg")
+        require_within("body-mass index mass/height^2", self.mass / self.height**2, BMI_RANGE, "kg/m^2")
 
     # Scales against the reference body --------------------------------------------------------------------
 
@@ -198,11 +198,3 @@ class Body:
     def froude_speed(self, speed: float) -> float:
         """Dimensionless speed v / sqrt(g * leg_length) of `speed` [m/s]."""
         return speed / sqrt(GRAVITY * self.leg_length)
-
-
-def _check(name: str, value: float, allowed: tuple[float, float], unit: str) -> None:
-    low, high = allowed
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise SpringfootError(f"{name} must be a finite number in [{low:g}, {high:g}] {unit}, got {value!r}")
-    if not low <= value <= high:
-        raise SpringfootError(f"{name} must be in [{low:g}, {high:g}] {unit}, got {value:.4g}")

