@@ -1,0 +1,178 @@
+"""Everything that can be set about the walking task: plain JSON values, validated in one place."""
+
+import json
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, fields
+from difflib import get_close_matches
+from math import inf, isfinite
+from numbers import Real
+from typing import Any, Literal, get_args
+
+from ..gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from ..gait.errors import SpringfootError
+
+Cadence = Literal["people", "thesis"]
+Equilibrium = Literal["planned", "angle", "neutral", "phase"]
+ActionMode = Literal["absolute", "residual"]
+
+STEP_SECONDS = 0.02
+"""Time between two actions [s]: stiffness is decided at 50 Hz (design study; a 40 ms lag on K falls)."""
+MAX_FROUDE = 1.0
+"""Largest speed / sqrt(g leg_length): an inverted pendulum that is faster leaves the ground."""
+
+DEFAULT_WEIGHTS = {
+    "alive": 0.15,
+    "speed": 0.25,
+    "com_x": 0.15,
+    "com_z": 0.10,
+    "pose": 0.35,
+    "stiffness_rate": -0.05,
+    "stiffness": -0.10,
+    "grf": -0.30,
+}
+"""Weight of each reward term (`springfoot.envs.task`); a positive one rewards, a negative one is a cost."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BipedSettings:
+    """The walking task of the biped with segmented feet; `SpringfootError` for a value that is not allowed."""
+
+    height: float = REFERENCE_HEIGHT
+    """Standing height of the body [m]."""
+    mass: float = REFERENCE_MASS
+    """Body mass [kg]."""
+    speed: float = 1.2
+    """Commanded walking speed [m/s]."""
+    cadence: Cadence = "people"
+    """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
+    equilibrium: Equilibrium = "planned"
+    """Equilibrium angle of ankle and toe: the planned angle with the planned moment fed forward (planned), the
+    planned angle alone (angle), constant (neutral), or constant in each phase of `schedule` (phase)."""
+    action_mode: ActionMode = "absolute"
+    """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
+    ankle_stiffness_range: tuple[float, float] = (20.0, 800.0)
+    """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
+    toe_stiffness_range: tuple[float, float] = (5.0, 200.0)
+    """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
+    schedule: dict[str, Any] | None = None
+    """Stiffness over the stride, JSON form of `springfoot.gait.stiffness.StiffnessSchedule`; equilibrium `phase`
+    needs one, action mode `residual` without one takes the fixed schedule of the leg tuning."""
+    episode_seconds: float = 20.0
+    """Time after which an episode is truncated [s]."""
+    start: Literal["random"] | float = "random"
+    """Stride phase of the left leg at the start [0..1), or random within single support."""
+    start_noise: float = 0.0
+    """Relative spread of the joint angles and velocities at the start [0..1]."""
+    push_newton: float = 0.0
+    """Size of each push on the trunk, forward or backward at random [N]; 0 for none."""
+    push_seconds: float = 0.1
+    """Duration of each push [s]."""
+    push_interval: float = 4.0
+    """One push at a random time in each interval of this length [s]."""
+    reward_weights: dict[str, float] = field(default_factory=dict)
+    """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
+
+    def __post_init__(self) -> None:
+        body = Body(self.height, self.mass)
+        fastest = (
+            MAX_FROUDE * self.speed / body.froude_speed(self.speed)
+            if _is_number(self.speed) and self.speed
+            else inf
+        )
+        _check_number("speed", self.speed, 0.0, fastest, "m/s", above=True)
+        for name, choices in (
+            ("cadence", Cadence),
+            ("equilibrium", Equilibrium),
+            ("action_mode", ActionMode),
+        ):
+            _check_choice(name, getattr(self, name), get_args(choices))
+        _check_range("ankle_stiffness_range", self.ankle_stiffness_range)
+        _check_range("toe_stiffness_range", self.toe_stiffness_range)
+        self._check_schedule()
+        _check_number("episode_seconds", self.episode_seconds, STEP_SECONDS, inf, "s")
+        if self.start != "random" and not (_is_number(self.start) and 0 <= self.start < 1):
+            raise SpringfootError(f"start must be 'random' or a stride phase in [0, 1), got {self.start!r}")
+        _check_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
+        _check_number("push_newton", self.push_newton, 0.0, inf, "N")
+        _check_number("push_interval", self.push_interval, 0.0, inf, "s", above=True)
+        _check_number(
+            "push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True
+        )
+        _check_weights(self.reward_weights)
+
+    def _check_schedule(self) -> None:
+        if self.schedule is None:
+            if self.equilibrium == "phase":
+                raise SpringfootError(
+                    "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
+                )
+        elif not isinstance(self.schedule, dict):
+            raise SpringfootError(
+                f"schedule must be a stiffness schedule in JSON form or None, got {self.schedule!r}"
+            )
+        else:
+            try:
+                json.dumps(self.schedule, allow_nan=False)
+            except (TypeError, ValueError) as error:
+                raise SpringfootError(f"schedule must hold plain JSON values: {error}") from None
+
+
+def settings_from(**values: Any) -> BipedSettings:
+    """Settings from keyword arguments or JSON: lists become tuples, numbers float; unknown names are refused."""
+    names = [setting.name for setting in fields(BipedSettings)]
+    for name in values:
+        if name not in names:
+            likely = get_close_matches(name, names, n=3, cutoff=0.5) or names
+            raise SpringfootError(f"unknown setting {name!r}; valid: {', '.join(likely)}")
+    return BipedSettings(**{name: _plain(value) for name, value in values.items()})
+
+
+def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
+    """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
+    return json.loads(json.dumps(asdict(settings)))
+
+
+def _plain(value: Any) -> Any:
+    """Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value)
+    if isinstance(value, (list, tuple)):
+        return tuple(_plain(item) for item in value)
+    return deepcopy(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
+
+
+def _check_number(name: str, value: Any, low: float, high: float, unit: str, above: bool = False) -> None:
+    """Refuses what is not a finite number in [low, high], or in (low, high] with `above`."""
+    if _is_number(value) and low <= value <= high and not (above and value == low):
+        return
+    bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == inf else f" and <= {high:.4g}")
+    raise SpringfootError(f"{name} must be a finite number {bounds} {unit}, got {value!r}")
+
+
+def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+
+
+def _check_range(name: str, value: Any) -> None:
+    numbers = isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
+    if not numbers or not 0 < value[0] < value[1]:
+        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high N m/rad, got {value!r}")
+
+
+def _check_weights(weights: Any) -> None:
+    if not isinstance(weights, dict):
+        raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {weights!r}")
+    for name, weight in weights.items():
+        if name not in DEFAULT_WEIGHTS:
+            raise SpringfootError(f"reward_weights has no term {name!r}; valid: {', '.join(DEFAULT_WEIGHTS)}")
+        cost = DEFAULT_WEIGHTS[name] < 0
+        if not _is_number(weight) or (weight > 0 if cost else weight < 0):
+            allowed = "<= 0 (a cost)" if cost else ">= 0 (a reward)"
+            raise SpringfootError(
+                f"reward_weights[{name!r}] must be a finite number {allowed}, got {weight!r}"
+            )

@@ -1,0 +1,94 @@
+"""Settings: defaults, JSON round trip, and one clear line for everything that is not allowed."""
+
+import inspect
+import json
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from, settings_to_json
+from springfoot.gait.errors import SpringfootError
+
+
+def test_json_round_trip_keeps_every_value():
+    settings = settings_from(
+        height=1.5,
+        mass=45,
+        speed=np.float32(0.9),
+        equilibrium="phase",
+        schedule={"phases": [0.0, 0.5], "ankle": [1.0, 2.0]},
+        ankle_stiffness_range=[10, 900],
+        start=0.25,
+        reward_weights={"stiffness": -0.2},
+    )
+    text = json.dumps(settings_to_json(settings), allow_nan=False)
+    assert settings_from(**json.loads(text)) == settings
+    assert json.dumps(settings_to_json(settings_from(**json.loads(text)))) == text
+
+
+def test_settings_hold_their_own_copy_of_what_was_given():
+    weights = {"alive": 0.5}
+    settings = settings_from(reward_weights=weights)
+    weights["alive"] = 9.0
+    assert settings.reward_weights == {"alive": 0.5}
+
+
+def test_defaults_are_the_body_and_speed_of_the_thesis():
+    settings = BipedSettings()
+    assert (settings.height, settings.mass, settings.speed) == (1.70, 63.0, 1.2)
+    assert settings == settings_from()
+
+
+def test_every_setting_is_documented():
+    source = inspect.getsource(BipedSettings)
+    for setting in fields(BipedSettings):
+        after = source.split(f"\n    {setting.name}: ")[1].split("\n", 1)[1]
+        assert after.startswith('    """'), setting.name
+
+
+BAD = [
+    ({"height": -1.7}, ["height", "-1.7"]),
+    ({"mass": -63.0}, ["mass", "-63"]),
+    ({"mass": float("nan")}, ["mass", "nan"]),
+    ({"speed": 0.0}, ["speed", "0.0", "m/s"]),
+    ({"speed": -1.0}, ["speed", "-1.0"]),
+    ({"speed": 5.0}, ["speed", "5.0", "2.973"]),
+    ({"speed": "fast"}, ["speed", "'fast'"]),
+    ({"speed": True}, ["speed", "True"]),
+    ({"cadence": "mine"}, ["cadence", "'people'", "'thesis'"]),
+    ({"equilibrium": "x"}, ["equilibrium", "'planned'", "'phase'"]),
+    ({"equilibrium": ["planned"]}, ["equilibrium", "'planned'"]),
+    ({"equilibrium": "phase"}, ["phase", "schedule"]),
+    ({"action_mode": "relative"}, ["action_mode", "'absolute'", "'residual'"]),
+    ({"ankle_stiffness_range": (800.0, 20.0)}, ["ankle_stiffness_range", "0 < low < high", "(800.0, 20.0)"]),
+    ({"toe_stiffness_range": (0.0, 20.0)}, ["toe_stiffness_range", "(0.0, 20.0)"]),
+    ({"toe_stiffness_range": 40.0}, ["toe_stiffness_range", "40.0"]),
+    ({"toe_stiffness_range": (5.0, float("inf"))}, ["toe_stiffness_range", "inf"]),
+    ({"schedule": [1, 2]}, ["schedule"]),
+    ({"schedule": {"k": float("nan")}}, ["schedule", "JSON"]),
+    ({"schedule": {"k": object()}}, ["schedule", "JSON"]),
+    ({"episode_seconds": 0.0}, ["episode_seconds", "0.02"]),
+    ({"start": "standing"}, ["start", "'random'", "[0, 1)"]),
+    ({"start": 1.0}, ["start", "1.0"]),
+    ({"start_noise": 2.0}, ["start_noise", "2.0"]),
+    ({"push_newton": -150.0}, ["push_newton", "-150.0"]),
+    ({"push_seconds": 5.0}, ["push_seconds", "4", "5.0"]),
+    ({"push_interval": 0.0}, ["push_interval"]),
+    ({"reward_weights": {"allive": 1.0}}, ["allive", *DEFAULT_WEIGHTS]),
+    ({"reward_weights": {"stiffness": 0.1}}, ["stiffness", "cost", "0.1"]),
+    ({"reward_weights": {"alive": -0.1}}, ["alive", "-0.1"]),
+    ({"reward_weights": [0.1]}, ["reward_weights"]),
+    ({"heigth": 1.8}, ["heigth", "height"]),
+    ({"zzz": 1}, ["zzz", "height", "push_newton"]),
+]
+
+
+@pytest.mark.parametrize(("values", "words"), BAD, ids=[str(next(iter(values.items()))) for values, _ in BAD])
+def test_what_is_not_allowed_is_refused_in_one_clear_line(values, words):
+    with pytest.raises(SpringfootError) as caught:
+        settings_from(**values)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
