@@ -35,7 +35,7 @@ DEFAULT_WEIGHTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class BipedSettings:
-    """The walking task of the biped with segmented feet; `SpringfootError` for a value that is not allowed."""
+    """The walking task of the biped with segmented feet; raises `SpringfootError` for a bad value."""
 
     height: float = REFERENCE_HEIGHT
     """Standing height of the body [m]."""
@@ -46,8 +46,8 @@ class BipedSettings:
     cadence: Cadence = "people"
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
     equilibrium: Equilibrium = "planned"
-    """Equilibrium angle of ankle and toe: the planned angle with the planned moment fed forward (planned), the
-    planned angle alone (angle), constant (neutral), or constant in each phase of `schedule` (phase)."""
+    """Equilibrium angle of ankle and toe: the planned angle with the planned moment fed forward, the planned
+    angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     action_mode: ActionMode = "absolute"
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
     ankle_stiffness_range: tuple[float, float] = (20.0, 800.0)
@@ -55,8 +55,8 @@ class BipedSettings:
     toe_stiffness_range: tuple[float, float] = (5.0, 200.0)
     """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     schedule: dict[str, Any] | None = None
-    """Stiffness over the stride, JSON form of `springfoot.gait.stiffness.StiffnessSchedule`; equilibrium `phase`
-    needs one, action mode `residual` without one takes the fixed schedule of the leg tuning."""
+    """Stiffness over the stride, JSON form of `springfoot.gait.stiffness.StiffnessSchedule`; needed by
+    equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
     episode_seconds: float = 20.0
     """Time after which an episode is truncated [s]."""
     start: Literal["random"] | float = "random"
@@ -118,7 +118,7 @@ class BipedSettings:
 
 
 def settings_from(**values: Any) -> BipedSettings:
-    """Settings from keyword arguments or JSON: lists become tuples, numbers float; unknown names are refused."""
+    """Settings from keyword arguments or JSON: lists become tuples, numbers float; bad names are refused."""
     names = [setting.name for setting in fields(BipedSettings)]
     for name in values:
         if name not in names:
