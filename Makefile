@@ -1,0 +1,59 @@
+# Every target makes what it needs; with Python 3.11, pip and make, `make walk` and `make test` are all you type.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+SHELL := bash
+
+# The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: help install walk test check format bench clean
+
+help:
+	@echo "make walk    train with the defaults, then evaluate what was trained (results in runs/)"
+	@echo "make test    run the tests"
+	@echo "make check   format, lint, types, import floors, tests: what has to pass before a change lands"
+	@echo "make format  apply the format and the lint fixes"
+	@echo "make bench   cost of a batched step against MuJoCo's own"
+	@echo "make install only $(VENV), from constraints.txt; the others do it by themselves"
+	@echo "make clean   remove $(VENV), builds and caches, never runs/"
+
+install: $(VENV)/installed
+
+$(VENV)/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --disable-pip-version-check --constraint constraints.txt --editable ".[train,dev]"
+	@touch $@
+
+# runs/walk is the first, runs/walk-2 the next: train.py refuses a folder that already holds a run.
+walk: install
+	@out=runs/walk; n=2; while [ -e "$$out" ]; do out=runs/walk-$$n; n=$$((n + 1)); done; set -e; \
+	$(BIN)/python train.py --out "$$out"; \
+	$(BIN)/python evaluate.py "$$out" --out "$$out/evaluation"; \
+	printf '\n%s\n' "Policy:   $$out/best.safetensors" "Numbers:  $$out/evaluation/metrics.json" \
+	  "Pictures: $$out/evaluation/gait.png, $$out/evaluation/walk.gif"
+
+test: install
+	$(BIN)/python -m pytest
+
+check: install build/typing/springfoot
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest
+
+format: install
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: install
+	$(BIN)/python benchmarks/bench.py
+
+build/typing/springfoot:
+	mkdir -p $@
+	ln -s ../../../gait ../../../envs ../../../agents $@/
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""The walking model in MuJoCo, as Gymnasium environments."""
