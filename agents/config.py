@@ -1,0 +1,197 @@
+"""What a training is told: its configuration, the presets, and the command-line flags made from them."""
+
+import ast
+import dataclasses
+import inspect
+import json
+import textwrap
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import tyro
+
+from ..envs.settings import BipedSettings, settings_from, settings_to_json
+from ..gait.errors import SpringfootError
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingConfig:
+    """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
+
+    timesteps: int = 400_000
+    """Environment steps of 20 ms to learn from, rounded up to whole rollouts of num_envs x rollout_steps."""
+    seed: int = 0
+    """Seed of weights, action noise and environments."""
+    num_envs: int = 64
+    """Environments stepped together in one batch."""
+    threads: int = 0
+    """Threads of the physics, 0 for one per available processor; results are the same with any number."""
+    rollout_steps: int = 128
+    """Steps of each environment between two updates of the policy."""
+    batch_size: int = 2048
+    """Samples in each gradient step."""
+    epochs: int = 8
+    """Passes over the collected samples in each update."""
+    learning_rate: float = 3e-4
+    """Step size of Adam at the start [-]."""
+    learning_rate_end: float = 0.1
+    """Step size at the end as a share of the start, linear in between [0..1]."""
+    gamma: float = 0.98
+    """Discount of reward per step (0..1)."""
+    gae_lambda: float = 0.95
+    """Lambda of the generalised advantage estimate [0..1]."""
+    clip_range: float = 0.2
+    """Largest relative change of an action's probability that one update rewards."""
+    log_std: float = -0.7
+    """Logarithm of the standard deviation of the actions at the start."""
+    hidden: tuple[int, ...] = (64, 64)
+    """Widths of the hidden tanh layers, the same for actor and critic."""
+    eval_interval: int = 65_536
+    """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
+    eval_episodes: int = 16
+    """Episodes of each periodic evaluation, on the same fixed seeds every time."""
+    environment: BipedSettings = field(
+        default_factory=lambda: BipedSettings(episode_seconds=10.0, push_newton=120.0)
+    )
+    """Settings of the walking task that is trained on."""
+
+    def __post_init__(self) -> None:
+        for name in ("timesteps", "num_envs", "rollout_steps", "epochs", "eval_interval", "eval_episodes"):
+            self._check(name, int, 1)
+        self._check("seed", int, 0, 2**31 - 1)
+        self._check("threads", int, 0)
+        self._check("batch_size", int, 2, self.num_envs * self.rollout_steps)
+        for name in ("learning_rate", "clip_range"):
+            self._check(name, float, 0, above=True)
+        self._check("gamma", float, 0, 1, above=True)
+        for name in ("gae_lambda", "learning_rate_end"):
+            self._check(name, float, 0, 1)
+        self._check("log_std", float, -5, 2)
+        if not self.hidden or any(type(width) is not int or width < 1 for width in self.hidden):
+            raise SpringfootError(f"hidden must be one or more positive whole numbers, got {self.hidden!r}")
+
+    def _check(
+        self, name: str, kind: type, low: float, high: float = float("inf"), above: bool = False
+    ) -> None:
+        value = getattr(self, name)
+        right_kind = type(value) is int or (kind is float and isinstance(value, float) and isfinite(value))
+        if not right_kind or not low <= value <= high or (above and value == low):
+            what = "a whole number" if kind is int else "a finite number"
+            bounds = f"{'>' if above else '>='} {low:g}" + (
+                "" if high == float("inf") else f" and <= {high:g}"
+            )
+            raise SpringfootError(f"{name} must be {what} {bounds}, got {value!r}")
+
+
+PRESETS: dict[str, TrainingConfig] = {"walk": TrainingConfig()}
+"""Trainings that are known to work, by name."""
+
+
+def config_to_json(config: TrainingConfig) -> dict[str, Any]:
+    """A configuration as a dictionary of plain JSON values; `config_from_json` is its inverse."""
+    values = {item.name: getattr(config, item.name) for item in dataclasses.fields(config)}
+    return values | {"hidden": list(config.hidden), "environment": settings_to_json(config.environment)}
+
+
+def config_from_json(values: dict[str, Any]) -> TrainingConfig:
+    """The configuration that `config_to_json` wrote; raises `SpringfootError` for anything else."""
+    names = [item.name for item in dataclasses.fields(TrainingConfig)]
+    if unknown := sorted(set(values) - set(names)):
+        raise SpringfootError(f"unknown training setting {unknown[0]!r}; valid: {', '.join(names)}")
+    plain = dict(values)
+    if "hidden" in plain:
+        plain["hidden"] = tuple(plain["hidden"])
+    if "environment" in plain:
+        plain["environment"] = settings_from(**plain["environment"])
+    return TrainingConfig(**plain)
+
+
+def _field_help(settings: type) -> dict[str, str]:
+    """The docstring below each field of a dataclass, on one line."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
+    return {
+        item.target.id: " ".join(doc.value.value.split())
+        for item, doc in zip(body, body[1:], strict=False)
+        if isinstance(item, ast.AnnAssign)
+        and isinstance(item.target, ast.Name)
+        and isinstance(doc, ast.Expr)
+        and isinstance(doc.value, ast.Constant)
+    }
+
+
+def _read_json(words: list[str]) -> dict[str, Any]:
+    """A dictionary from JSON text, or from the JSON file of that name."""
+    text = words[0]
+    if not text.lstrip().startswith("{"):
+        path = Path(text)
+        if not path.is_file():
+            raise ValueError(f"{text!r} is neither JSON text in braces nor the name of a JSON file")
+        text = path.read_text(encoding="utf-8")
+    value = json.loads(text)
+    if not isinstance(value, dict):
+        raise ValueError("the JSON must be an object in braces")
+    return value
+
+
+_JSON_FLAG = tyro.constructors.PrimitiveConstructorSpec(
+    nargs=1,
+    metavar="JSON|FILE",
+    instance_from_str=_read_json,
+    is_instance=lambda value: value is None or isinstance(value, dict),
+    str_from_instance=lambda value: [json.dumps(value)],
+)
+
+
+def _metavar(kind: Any) -> str:
+    """How a value of this type is written on the command line."""
+    parts = get_args(kind)
+    if get_origin(kind) is Literal:
+        return "|".join(map(str, parts))
+    if get_origin(kind) is tuple:
+        return f"{_metavar(parts[0])} ..." if parts[1:] == (...,) else " ".join(map(_metavar, parts))
+    return "|".join(map(_metavar, parts)) if parts else kind.__name__.upper()
+
+
+def optional_flags(name: str, settings: type, defaults: Any) -> type:
+    """A dataclass with every field of `settings` as an optional flag: None, its default, means "not given".
+
+    The help of each flag is the field's own docstring, with the value in `defaults` (an instance) as the hint.
+    """
+    help_of, flags = _field_help(settings), []
+    for item_name, kind in get_type_hints(settings).items():
+        default = getattr(defaults, item_name)
+        shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
+        hint = f"(default: {shown})"
+        is_json = dict in (get_origin(kind), *map(get_origin, get_args(kind)))
+        if is_json:
+            annotation = Annotated[
+                dict | None, _JSON_FLAG, tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint)
+            ]
+        else:
+            annotation = Annotated[
+                kind | None,
+                tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint, metavar=_metavar(kind)),
+            ]
+        flags.append((item_name, annotation, None))
+    return dataclasses.make_dataclass(
+        name,
+        flags,
+        frozen=True,
+        kw_only=True,
+        namespace={"__doc__": settings.__doc__, "__module__": __name__},
+    )
+
+
+def given(flags: Any) -> dict[str, Any]:
+    """The flags that were given, by name."""
+    return {
+        item.name: value
+        for item in dataclasses.fields(flags)
+        if (value := getattr(flags, item.name)) is not None
+    }
+
+
+SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings())
+"""Every environment setting as an optional flag (dataclass for `tyro`)."""
