@@ -16,7 +16,7 @@ help:
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a batched step against MuJoCo's own"
 	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
-	@echo "make clean    remove $(VENV), builds and caches, never runs/"
+	@echo "make clean    remove .venv, builds and caches, never runs/"
 
 install: $(VENV)/installed
 
@@ -59,5 +59,5 @@ build/typing/made: Makefile
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +
