@@ -30,7 +30,7 @@ walk: install
 	@out=runs/walk; n=2; while [ -e "$$out" ]; do out=runs/walk-$$n; n=$$((n + 1)); done; set -e; \
 	$(BIN)/python train.py --out "$$out"; \
 	$(BIN)/python evaluate.py "$$out" --out "$$out/evaluation"; \
-	printf '\n%s\n' "Policy:   $$out/best.safetensors" "Numbers:  $$out/evaluation/metrics.json" \
+	printf '%s\n' "" "Policy:   $$out/best.safetensors" "Numbers:  $$out/evaluation/metrics.json" \
 	  "Pictures: $$out/evaluation/gait.png, $$out/evaluation/walk.gif"
 
 test: install
