@@ -8,8 +8,8 @@ from math import inf, isfinite
 from numbers import Real
 from typing import Any, Literal, get_args
 
-from ..gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
-from ..gait.errors import SpringfootError
+from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from springfoot.gait.errors import SpringfootError
 
 Cadence = Literal["people", "thesis"]
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
