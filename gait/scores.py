@@ -1,0 +1,136 @@
+"""What a gait is worth in numbers: one statistic, one function.
+
+Curves are arrays (101,) over percent 0..100 of the stride (`cycle.PERCENT`) unless said otherwise. What cannot be
+computed (no data, no spread) is None, never NaN. Windows are those in which people's two force peaks and the valley
+between them lie at every walking speed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .body import GRAVITY
+
+FIRST_PEAK_PERCENT = (3, 25)
+"""Window of the vertical force's first peak (weight acceptance) [percent of stride]."""
+VALLEY_PERCENT = (15, 45)
+"""Window of its valley (mid-stance)."""
+SECOND_PEAK_PERCENT = (35, 60)
+"""Window of its second peak (push-off)."""
+LOADING_END_PERCENT = 10
+"""Loading response: 0 to 10 % of the stride."""
+PUSH_OFF_BEGIN_PERCENT = 45
+"""Push-off: 45 % to toe-off; mid-stance lies between loading and push-off."""
+
+
+def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
+    """Root mean square difference of two curves, in their unit; no offset removed."""
+    difference = np.asarray(curve, float) - np.asarray(reference, float)
+    return _number(np.sqrt(np.mean(difference**2))) if difference.size else None
+
+
+def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
+    """Pearson's r of two curves; None if either is constant."""
+    a, b = (np.asarray(values, float) - np.mean(values) for values in (curve, reference))
+    scale = np.sqrt(np.sum(a * a) * np.sum(b * b))
+    # A constant curve keeps rounding errors of 1e-16 of its mean, which must not pass for a shape.
+    floor = 1e-12 * np.sqrt(np.sum(np.square(curve)) * np.sum(np.square(reference)))
+    return _number(np.sum(a * b) / scale) if scale > floor else None
+
+
+def share_within_sd(curve: ArrayLike, mean: ArrayLike, sd: ArrayLike) -> float | None:
+    """Percent of the curve's samples inside mean ± sd."""
+    inside = np.abs(np.asarray(curve, float) - np.asarray(mean)) <= np.asarray(sd)
+    return _number(100 * np.mean(inside)) if np.all(np.isfinite(curve)) else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceFeatures:
+    """Landmarks of one foot's ground reaction force (GRF) over the stride, in the curves' unit (body weights)."""
+
+    vertical_peak1: float | None
+    """Largest vertical force in 3 to 25 %."""
+    vertical_valley: float | None
+    """Smallest in 15 to 45 %."""
+    vertical_peak2: float | None
+    """Largest in 35 to 60 %."""
+    braking_peak: float | None
+    """Smallest fore-aft force, negative: backward on the body."""
+    forward_peak: float | None
+    """Largest fore-aft force."""
+
+
+def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
+    """Peaks and valley of one foot's mean vertical and fore-aft force curves."""
+    return ForceFeatures(
+        vertical_peak1=_number(np.max(_window(vertical, FIRST_PEAK_PERCENT))),
+        vertical_valley=_number(np.min(_window(vertical, VALLEY_PERCENT))),
+        vertical_peak2=_number(np.max(_window(vertical, SECOND_PEAK_PERCENT))),
+        braking_peak=_number(np.min(forward)),
+        forward_peak=_number(np.max(forward)),
+    )
+
+
+def largest(curve: NDArray) -> tuple[float | None, int | None]:
+    """Largest value of a curve and the percent at which it stands."""
+    if not np.all(np.isfinite(curve)):
+        return None, None
+    percent = int(np.argmax(curve))
+    return float(curve[percent]), percent
+
+
+def positive_work(power: NDArray, tick: float) -> NDArray:
+    """Work done at positive power: integral of max(0, power) over the first axis (T, ...), sampled every `tick` [s]."""
+    return np.maximum(power, 0.0).sum(axis=0) * tick
+
+
+def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]:
+    """Positive and negative work of each stride (S,), negative given as a positive number.
+
+    `power` (S, 101) over percent of strides lasting `stride_time` (S,) [s]; trapezoidal rule.
+    """
+    positive, negative = np.maximum(power, 0.0), np.maximum(-power, 0.0)
+    spacing = np.asarray(stride_time) / 100
+    return np.trapezoid(positive, axis=-1) * spacing, np.trapezoid(negative, axis=-1) * spacing
+
+
+def cost_of_transport(work: float, mass: float, distance: float) -> float | None:
+    """Positive joint work [J] of both legs per body weight and distance, dimensionless; None without progress."""
+    return _number(work / (mass * GRAVITY * distance)) if distance > 0 else None
+
+
+def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | None]:
+    """Mean of a curve in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
+
+    A percent belongs to the phase it begins; percent 100 is percent 0 of the next stride and left out.
+    """
+    percent = np.arange(100)
+    bounds = (0, LOADING_END_PERCENT, PUSH_OFF_BEGIN_PERCENT, toe_off_percent, 100)
+    names = ("loading", "mid_stance", "push_off", "swing")
+    means: dict[str, float | None] = {}
+    for name, low, high in zip(names, bounds[:-1], bounds[1:], strict=True):
+        values = curve[:100][(percent >= low) & (percent < high)]
+        means[name] = _number(np.mean(values)) if values.size else None
+    return means
+
+
+def travel(position: NDArray, loaded: NDArray) -> float:
+    """Path [m] of contact points (T, C) along the ground, summed over points and samples loaded at both ends."""
+    moved = np.abs(np.diff(position, axis=0))
+    return float(np.sum(moved[loaded[1:] & loaded[:-1]]))
+
+
+def mean_sd(values: ArrayLike) -> dict[str, float | None]:
+    """{"mean", "sd"} of a sample; sd with n - 1, None for fewer than two."""
+    values = np.asarray(values, float)
+    mean = _number(np.mean(values)) if values.size else None
+    return {"mean": mean, "sd": _number(np.std(values, ddof=1)) if values.size > 1 else None}
+
+
+def _window(curve: NDArray, percent: tuple[int, int]) -> NDArray:
+    return curve[percent[0] : percent[1] + 1]
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
