@@ -15,6 +15,7 @@ from springfoot.gait.human import HumanGait
 from springfoot.gait.plan import WalkPlan
 
 from .model import ACTIONS, ANKLE, CONTACTS, HIP, JOINTS, KNEE, LEFT, RIGHT, SIDES, TOE
+from .phase import GRID, PhaseTable
 from .settings import DEFAULT_WEIGHTS, STEP_SECONDS, BipedSettings
 
 if TYPE_CHECKING:
@@ -41,9 +42,6 @@ TOE_SHARE = 0.25
 MAX_FORCE = 1.2
 """Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.14."""
 
-TABLE_SIZE = 1000
-"""Samples of a reference curve over its period; linear between them (error < 1e-4 rad)."""
-
 
 class Entry(NamedTuple):
     """One entry of the observation: name, unit it is divided by, bounds it is clipped to, and its meaning."""
@@ -61,10 +59,7 @@ def _entries() -> tuple[Entry, ...]:
     return (
         Entry("hip_height", "leg length", 0.0, 2.0, "height of the hip"),
         Entry("pitch", "rad", -3.2, 3.2, "pitch of the trunk, forward positive"),
-        *(
-            Entry(f"{joint}_{side}", "rad", -3.2, 3.2, f"angle, {sign[joint]} positive")
-            for side, joint in legs
-        ),
+        *(Entry(f"{joint}_{side}", "rad", -3.2, 3.2, f"angle, {sign[joint]} positive") for side, joint in legs),
         Entry("hip_velocity_x", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, forward positive"),
         Entry("hip_velocity_z", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, up positive"),
         Entry("pitch_rate", "sqrt(g/l)", -15.0, 15.0, "rate of the pitch, forward positive"),
@@ -103,22 +98,6 @@ OBSERVATION = _entries()
 """Every entry of the observation, in order; l is the leg length (hip to floor when standing)."""
 
 
-class PeriodicTable:
-    """Curves of period 1, sampled once and interpolated linearly: same bits for any number of phases."""
-
-    def __init__(self, *curves: NDArray) -> None:
-        """Each curve has `TABLE_SIZE` samples at phases 0, 1/TABLE_SIZE, ..."""
-        samples = np.stack(curves, -1)
-        self._values = np.concatenate((samples, samples[:1]))  # one more row: a phase may round up to 1
-        self._slopes = np.diff(np.concatenate((self._values, samples[1:2])), axis=0)
-
-    def __call__(self, phase: NDArray) -> NDArray:
-        """Values at phases [0, 1) of any shape, the curves along a new last axis."""
-        position = phase * TABLE_SIZE
-        index = position.astype(np.intp)
-        return self._values[index] + (position - index)[..., None] * self._slopes[index]
-
-
 class Task:
     """What is seen, what is rewarded and what counts as a fall, for one body and plan; holds no state."""
 
@@ -147,15 +126,14 @@ class Task:
         self._stiffness_unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.mass_scale * length
         self._stiffness_share = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
         self._pose_share = np.array([POSE_WEIGHTS[joint] for joint in range(len(JOINTS))])
-        self._half_step = 0.5 * STEP_SECONDS / plan.stride_time
+        self._half_step = 0.5 * STEP_SECONDS / (2 * plan.step_time)
 
-        phase = np.arange(TABLE_SIZE) / TABLE_SIZE
         self._step_length = plan.step_length
-        self._plan = PeriodicTable(*_com_curves(plan, phase))
-        self._pose = PeriodicTable(*(human.mean(name, phase) for name in ("thigh", "knee", "ankle", "toe")))
+        self._plan = PhaseTable(_com_curves(plan))
+        self._pose = PhaseTable(np.stack([human.mean(name, GRID) for name in ("thigh", "knee", "ankle", "toe")], -1))
         force = ("grf_forward", "grf_vertical")
-        mean, sd = [human.mean(name, phase) for name in force], [human.sd(name, phase) for name in force]
-        self._force = PeriodicTable(*mean, *sd)
+        mean, sd = [human.mean(name, GRID) for name in force], [human.sd(name, GRID) for name in force]
+        self._force = PhaseTable(np.stack(mean + sd, -1))
 
     def observe(
         self,
@@ -194,18 +172,25 @@ class Task:
         seen /= self._units
         return np.fmax(np.fmin(seen, self.high), self.low).astype(np.float32)
 
-    def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
-        """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3).
+    def planned_com(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
+        """The plan's CoM (x in the world, z) [m], shape (N, 2)."""
+        return self._reference(m, leg_phase)[:, :2]
 
-        x is counted from the ankle of the leg whose stance began last, the one with a phase in [0, 0.5).
+    def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
+        """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3)."""
+        return np.concatenate((m.com, m.com_velocity[:, :1]), axis=1) - self._reference(m, leg_phase)
+
+    def _reference(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
+        """The plan's CoM x (in the world) [m], z [m] and forward speed [m/s], shape (N, 3).
+
+        The plan counts x from the ankle of the leg whose stance began last, the one with a phase in [0, 0.5).
         """
         left_leads = leg_phase[:, LEFT] < 0.5
         step_phase = 2 * np.where(left_leads, leg_phase[:, LEFT], leg_phase[:, RIGHT] % 0.5)
-        ankle = np.where(left_leads, m.ankle[:, LEFT, 0], m.ankle[:, RIGHT, 0])
-        actual = np.stack((m.com[:, 0] - ankle, m.com[:, 1], m.com_velocity[:, 0]), -1)
-        planned = self._plan(step_phase)
+        planned = self._plan.at(step_phase)
         planned[:, 0] += self._step_length * step_phase
-        return actual - planned
+        planned[:, 0] += np.where(left_leads, m.ankle[:, LEFT, 0], m.ankle[:, RIGHT, 0])
+        return planned
 
     def terms(
         self,
@@ -258,7 +243,7 @@ class Task:
         return high & (np.abs(m.root[:, 2]) <= MAX_PITCH) & (m.diverged == "")
 
     def _pose_error(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
-        error = m.angle - self._pose(leg_phase)
+        error = m.angle - self._pose.at(leg_phase)
         error[:, :, HIP] -= m.root[:, 2:]  # thigh to the vertical = hip - pitch
         share = (self._pose_share * np.square(error)).sum(-1)
         return 0.5 * (share[:, LEFT] + share[:, RIGHT])
@@ -271,16 +256,16 @@ class Task:
         foot = force_windows.sum(3) / self._weight  # (W, N, side, forward/up) in body weights
         excess = np.maximum(foot[..., 1] - MAX_FORCE, 0.0).sum(0) / len(foot)
         # the mean over the step belongs to its middle
-        people = self._force((leg_phase - self._half_step) % 1.0)
+        people = self._force.at((leg_phase - self._half_step) % 1.0)
         distance = np.abs(foot.sum(0) / len(foot) - people[..., :2]) - people[..., 2:]
         cost = excess + np.maximum(distance, 0.0).sum(-1)
         return cost[:, LEFT] + cost[:, RIGHT]
 
 
-def _com_curves(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """The plan's CoM over one step: x [m] less its mean advance, z [m], forward speed [m/s]; periodic."""
-    x, z = plan.com(step_phase)
-    sway = x - plan.step_length * step_phase
+def _com_curves(plan: WalkPlan) -> NDArray:
+    """The plan's CoM over one step: x [m] less its mean advance, z [m], forward speed [m/s]; all periodic."""
+    x, z = plan.com(GRID)
+    sway = x - plan.step_length * GRID
     series = np.fft.rfft(sway)
     rate = np.fft.irfft(2j * np.pi * np.arange(len(series)) * series, len(sway))
-    return sway, z, (plan.step_length + rate) / plan.step_time
+    return np.stack((sway, z, (plan.step_length + rate) / plan.step_time), -1)
