@@ -1,0 +1,224 @@
+"""Finds the leg constants of `envs/legs.json`: CMA-ES on simulated walks, all candidates in one batch.
+
+    python -m springfoot.agents.tuning --equilibrium planned --cadence people
+
+Every candidate walks from random starts with the fixed schedule, with and without pushes of 150 N, and with two
+constant stiffnesses. It pays for falls, and on its unpushed scheduled walks for the distance from people in speed,
+joint angles, ground reaction force and ankle and knee moment. The result is a fit to people's curves, not a prediction.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import cma
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from springfoot.envs.actuation import action_of
+from springfoot.envs.biped import Biped, Tick
+from springfoot.envs.legs import LegConstants, constants_from, constants_name
+from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
+from springfoot.envs.settings import BipedSettings, Cadence, Equilibrium
+from springfoot.gait.body import GRAVITY
+from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+
+SECONDS = 7.0
+"""Length of each walk [s]."""
+SETTLED = 2.5
+"""Strides that begin later [s] are measured."""
+PUSH_NEWTON = 150.0
+SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 3
+"""Walks of each candidate: with the schedule; with constant ankle and toe stiffness [N m/rad]; pushed."""
+TOLERANCE = {
+    "speed": 0.03,  # m/s
+    "period": 0.03,  # share of the plan's stride time
+    "thigh": np.deg2rad(2.5),
+    "knee": np.deg2rad(3.5),
+    "ankle": np.deg2rad(2.5),
+    "toe": np.deg2rad(12.0),
+    "grf_vertical": 0.06,  # body weights
+    "grf_forward": 0.03,
+    "force_peak": 0.08,  # largest 10 ms value of a stride beyond 1.25 body weights
+    "ankle_moment": 0.15,  # N m/kg
+    "knee_moment": 0.15,
+    "unsteady": 0.06,  # SD of the vertical force over strides [body weights]
+    "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
+}
+"""Error that costs one unit (squared)."""
+FALL_COST = 30.0
+"""Cost of falling at once; a fall later costs proportionally less, down to a third."""
+KNOT_STEP, GAIN_STEP = 2.0, 0.15
+"""One unit of the search: degrees of a knot, relative change of a gain."""
+ADDITIVE_STEP = {"trunk_pitch_deg": 1.0, "swing_speed_gain": 0.05, "speed_torque": 15.0, "period_speed_gain": 0.03}
+"""One unit of the search for constants that may change sign or vanish, in their own units."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuningFlags:
+    """Find leg constants by CMA-ES and write them into a file of constants."""
+
+    equilibrium: Equilibrium = "planned"
+    """Which equilibrium the constants are for: planned or neutral."""
+    cadence: Cadence = "people"
+    """Which cadence they are for."""
+    start: str = ""
+    """Name of the constants to start from; empty: those to be replaced."""
+    generations: int = 150
+    """Generations of the search."""
+    population: int = 20
+    """Candidates in each."""
+    sigma: float = 0.5
+    """First spread, in units of the search."""
+    seed: int = 0
+    """Seed of the search and of the walks."""
+    threads: int = 2
+    """Threads of the physics."""
+    out: Path = Path("envs/legs.json")
+    """File of constants to read and to write."""
+
+
+class Search:
+    """Constants as a vector of unit steps from where the search began."""
+
+    def __init__(self, start: LegConstants):
+        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in asdict(start).items()}
+        self.size = sum(value.size for value in self._start.values())
+
+    def constants(self, vector: NDArray) -> LegConstants:
+        """The constants at a vector (size,)."""
+        values, place = {}, 0
+        for name, start in self._start.items():
+            step = vector[place : place + start.size]
+            place += start.size
+            if name.endswith("knots_deg") or name == "neutral_deg":
+                value = start + KNOT_STEP * step
+            elif name in ADDITIVE_STEP:
+                value = start + ADDITIVE_STEP[name] * step
+            else:
+                value = start * np.exp(GAIN_STEP * step)
+            values[name] = [float(round(x, 5)) for x in value] if start.size > 1 else float(round(value[0], 5))
+        return constants_from(values)
+
+
+def cost(settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int) -> NDArray:
+    """(C,) what each candidate pays."""
+    walks = SCHEDULED + len(CONSTANT)
+    total = np.zeros(len(candidates))
+    fallen, records, biped = _walk(settings, candidates, walks, seed, threads)
+    scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
+    speed = _speed(records)
+    for index in range(walks * len(candidates)):
+        share = (FALL_COST if scheduled[index] else FALL_COST / 3) / walks
+        candidate = index // walks
+        if fallen[index] < SECONDS:
+            total[candidate] += share * _lateness(fallen[index])
+        elif scheduled[index]:
+            total[candidate] += _distance(records, index, biped, speed[index]) / SCHEDULED
+        else:
+            total[candidate] += min(((speed[index] - settings.speed) / TOLERANCE["constant_speed"]) ** 2, 3.0)
+    pushed, _, _ = _walk(
+        replace(settings, push_newton=PUSH_NEWTON, push_interval=2.5), candidates, PUSHED, seed, threads
+    )
+    falls = np.where(pushed < SECONDS, FALL_COST / 2 * _lateness(pushed), 0.0)
+    return total + falls.reshape(len(candidates), PUSHED).mean(1)
+
+
+def _lateness(time: NDArray) -> NDArray:
+    return 1.0 - 2.0 / 3.0 * time / SECONDS
+
+
+def _walk(settings, candidates, walks, seed, threads) -> tuple[NDArray, dict[str, NDArray], Biped]:
+    """Walk every candidate `walks` times; returns the times of the falls (C * walks,), the 100 Hz record, the core."""
+    num = len(candidates) * walks
+    variant = np.repeat(np.arange(len(candidates)), walks)
+    biped = Biped(settings, num, threads, legs=candidates, variant=variant)
+    biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
+    fixed = action_of(np.array(CONSTANT), settings, biped.body)
+    role = np.tile(np.arange(walks), len(candidates)) - SCHEDULED
+    ticks: list[Tick] = []
+    biped.on_tick = ticks.append
+    active, fallen = np.ones(num, bool), np.full(num, SECONDS)
+    for _ in range(round(SECONDS / biped.dt)):
+        action = action_of(biped.scheduled_stiffness(), settings, biped.body)
+        for index in range(len(CONSTANT) if walks > PUSHED else 0):
+            action[role == index] = fixed[index]
+        outcome = biped.step(action.reshape(num, -1), active)
+        ended = active & outcome.terminated
+        fallen[ended] = outcome.info["time"][ended]
+        active &= ~outcome.terminated
+        if not active.any():
+            break
+    measured = [tick.measurement for tick in ticks]
+    record = {
+        "com_x": np.stack([m.com[:, 0] for m in measured]),
+        "pitch": np.stack([m.root[:, 2] for m in measured]),
+        "angle": np.stack([m.angle for m in measured]),
+        "moment": np.stack([m.torque + tick.passive_torque for m, tick in zip(measured, ticks, strict=True)]),
+        "force": np.stack([m.force.sum(2) for m in measured]),
+    }
+    return fallen, record, biped
+
+
+def _speed(record: dict[str, NDArray]) -> NDArray:
+    first = round(SETTLED / Biped.tick_dt)
+    last = len(record["com_x"]) - 1
+    return (record["com_x"][last] - record["com_x"][min(first, last)]) / max(
+        (last - first) * Biped.tick_dt, Biped.tick_dt
+    )
+
+
+def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float) -> float:
+    """Squared distance of one walk from people, in tolerances."""
+    human, weight, tick = biped.human, biped.body.mass * GRAVITY, Biped.tick_dt
+    phase = PERCENT / 100
+    curves, periods = [], []
+    for side in range(len(SIDES)):
+        angle, moment, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
+        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(SETTLED)
+        if len(strides) < 2:
+            return FALL_COST / 2
+        thigh = angle[:, HIP] - record["pitch"][:, index]
+        series = np.column_stack(
+            [thigh, angle[:, KNEE], angle[:, ANKLE], angle[:, TOE], force[:, 1] / weight, force[:, 0] / weight]
+            + [-moment[:, KNEE] / biped.body.mass, -moment[:, ANKLE] / biped.body.mass]
+        )
+        curves.append(on_percent(series, strides[:, 0], strides[:, 2], tick))
+        periods.append(strides[:, 2] - strides[:, 0])
+    stride = np.concatenate(curves)
+    mean = stride.mean(0)
+    names = ("thigh", "knee", "ankle", "toe", "grf_vertical", "grf_forward", "knee_moment", "ankle_moment")
+    errors = {name: np.sqrt(np.mean((mean[:, k] - human.mean(name, phase)) ** 2)) for k, name in enumerate(names)}
+    errors["speed"] = speed - biped.settings.speed
+    errors["period"] = np.mean(np.concatenate(periods)) / (2 * biped.plan.step_time) - 1
+    errors["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
+    errors["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - 1.25, 0.0))
+    return float(sum((error / TOLERANCE[name]) ** 2 for name, error in errors.items()))
+
+
+def tune(flags: TuningFlags) -> None:
+    """Run the search and write the best mean of the search into the file of constants."""
+    table = json.loads(flags.out.read_text(encoding="utf-8"))
+    name = constants_name(flags.equilibrium, flags.cadence)
+    search = Search(constants_from(table["constants"][flags.start or name]))
+    settings = BipedSettings(equilibrium=flags.equilibrium, cadence=flags.cadence, episode_seconds=SECONDS + 1)
+    options = {"popsize": flags.population, "seed": flags.seed + 1, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), flags.sigma, options)
+    for generation in range(flags.generations):
+        vectors = strategy.ask()
+        paid = cost(settings, [search.constants(v) for v in vectors], flags.seed + 1000 * generation, flags.threads)
+        strategy.tell(vectors, list(paid))
+        if generation % 10 == 9 or generation == flags.generations - 1:
+            mean = search.constants(strategy.mean)
+            print(f"generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}", flush=True)
+            table = json.loads(flags.out.read_text(encoding="utf-8"))
+            table["constants"][name] = asdict(mean)
+            table.setdefault("found_by", {})[name] = " ".join(["python -m springfoot.agents.tuning", *sys.argv[1:]])
+            flags.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    tune(tyro.cli(TuningFlags, description=__doc__))

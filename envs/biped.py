@@ -1,0 +1,327 @@
+"""The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
+
+One step is 20 ms: the action sets the stiffness, which holds for two control windows of 10 ms; in each, the springs'
+equilibrium and the hips and knees follow the phase. Row i of everything depends on environment i alone, by the same
+operations for any N, so a batch of N gives the same bits as N batches of one.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+from springfoot.gait.errors import SpringfootError
+from springfoot.gait.human import human_gait
+from springfoot.gait.plan import plan_walk
+from springfoot.gait.stiffness import StiffnessSchedule
+
+from . import equilibrium
+from .actuation import FEET, FootSprings
+from .legs import LegConstants, Legs, leg_constants
+from .model import ACTIONS, JOINTS, SIDES, passive_damping
+from .phase import GRID, PhaseTable
+from .settings import STEP_SECONDS, BipedSettings
+from .simulation import WINDOW, Measurement, Simulation
+from .task import Task
+
+WINDOWS = round(STEP_SECONDS / WINDOW)
+"""Control windows in one step."""
+START_PHASES = (0.08, 0.38)
+"""A random start lies in this part of either leg's stance: near double support a planned state falls."""
+START_DEPTH = 0.001
+"""The lowest contact point starts this far in the floor [m at 1.70 m]: about its rest under body weight."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tick:
+    """One control window as an evaluation records it; arrays over N, axes as in `Measurement`."""
+
+    measurement: Measurement
+    phase: NDArray
+    """(N, side) stride phase of each leg at the window's start."""
+    stiffness: NDArray
+    """(N, side, joint) K held in the window [N m/rad]."""
+    equilibrium: NDArray
+    """(N, side, joint) rest angle theta_eq held in the window, feed-forward torque included as torque / K [rad]."""
+    passive_torque: NDArray
+    """(N, side, joint) torque of the joint damping at the window's end [N m]."""
+    com_reference: NDArray
+    """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
+    active: NDArray
+    """(N,) which environments ran."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What one step returns; every array has N rows."""
+
+    observation: NDArray
+    """(N, D) float32."""
+    reward: NDArray
+    """(N,)."""
+    terminated: NDArray
+    """(N,) fallen or diverged."""
+    truncated: NDArray
+    """(N,) out of time."""
+    info: dict[str, NDArray]
+    """Name -> (N,): `stiffness/`, `torque/`, `equilibrium/`, `work/stiffness/`, `work/equilibrium/` + action name;
+    `reward/` + term; `phase/left`, `phase/right`, `time` [s], `speed` [m/s], `termination` ("" or the reason)."""
+
+
+class Biped:
+    """N bodies in one task.
+
+    Args:
+        settings: the task.
+        num_envs: N.
+        num_threads: of the physics; any number gives the same bits.
+        legs: leg constants in place of the committed ones, one set or several told apart by `variant`.
+        variant: (N,) which of `legs` each body has.
+    """
+
+    dt = STEP_SECONDS
+    tick_dt = WINDOW
+    action_names = ACTIONS
+
+    def __init__(
+        self,
+        settings: BipedSettings,
+        num_envs: int,
+        num_threads: int = 1,
+        legs: Sequence[LegConstants] | None = None,
+        variant: NDArray | None = None,
+    ):
+        self.settings = settings
+        self.num_envs = num_envs
+        self.body = Body(settings.height, settings.mass)
+        self.human = human_gait(settings.speed, settings.height)
+        self.plan = plan_walk(self.body, settings.speed, settings.cadence)
+        self.on_tick: Callable[[Tick], None] | None = None
+
+        constants = legs or [leg_constants(settings.equilibrium, settings.cadence)]
+        stride_time = 2 * self.plan.step_time
+        self._legs = Legs(constants, self.body, self.human, stride_time, settings.speed, num_envs, variant)
+        rest, stiffness = self._curves(constants, stride_time)
+        self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
+        self._ankle = PhaseTable(self.human.mean("ankle", GRID)[:, None])
+        self._start = self._start_curves(constants[0].period_factor * stride_time)
+        self._trunk_pitch = np.deg2rad(constants[0].trunk_pitch_deg)
+        self._passive_damping = passive_damping(self.body)
+
+        self._simulation = Simulation(self.body, num_envs, num_threads)
+        self._task = Task(settings, self.body, self.plan, self.human)
+        self.observation_names = self._task.names
+        self.observation_low, self.observation_high = self._task.low, self._task.high
+
+        self._random: list[np.random.Generator | None] = [None] * num_envs
+        self._steps = np.zeros(num_envs, int)
+        self._last_action = np.zeros((num_envs, len(ACTIONS)))
+        self._force = np.zeros((num_envs, len(SIDES), 3, 2))
+        self._pushes = _Pushes(settings, num_envs)
+        self._stiffness = np.zeros((num_envs, len(SIDES), len(JOINTS)))
+        self._drive = np.zeros_like(self._stiffness)
+        self._now = self._simulation.measure()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model, the same for all N."""
+        return self._simulation.model
+
+    def data(self, index: int) -> mujoco.MjData:
+        """A copy of environment `index`'s state, to render or to inspect."""
+        return self._simulation.data(index)
+
+    def scheduled_stiffness(self) -> NDArray:
+        """(N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
+        return self._springs.scheduled(self._legs.phase)
+
+    def reset(self, ids: NDArray, seeds: Sequence[int | None], start: float | str | None = None) -> None:
+        """Start environments `ids` anew, at people's posture in single support.
+
+        Args:
+            ids: (K,) which.
+            seeds: K seeds; None goes on with the environment's own generator.
+            start: stride phase of the left leg [0, 1) or "random", in place of the setting.
+        """
+        if len(ids) == 0:
+            return
+        start = self.settings.start if start is None else start
+        phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
+        for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
+            if seed is not None or self._random[index] is None:
+                self._random[index] = np.random.default_rng(seed)
+            random = self._random[index]
+            drawn = (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
+            phase[row] = drawn if start == "random" else start
+            if self.settings.start_noise:
+                noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
+            self._pushes.reset(index, random)
+        self._legs.left_phase[ids] = phase
+        self._springs.reset(ids)
+        self._steps[ids] = 0
+        self._last_action[ids] = 0.0
+        self._force[ids] = 0.0
+        self._place(ids, phase, noise)
+        self._now = self._simulation.measure()
+
+    def observe(self) -> NDArray:
+        """(N, D) float32 observation of the present."""
+        phase = self._legs.phase
+        return self._task.observe(self._now, phase, self._last_action, self._ankle.at(phase)[..., 0], self._force)
+
+    def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
+        """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
+        action = self._decode(actions)
+        ids = None if active is None or active.all() else np.flatnonzero(active)
+        running = np.ones(self.num_envs, bool) if active is None else active
+        springs, feet = self._springs, self._now.angle[..., FEET]
+        work_stiffness = springs.set_stiffness(action, self._legs.phase, feet)
+        work_equilibrium = np.zeros_like(work_stiffness)
+        forces = []
+        for _ in range(WINDOWS):
+            work_equilibrium += self._window(running, ids)
+            forces.append(self._now.force)
+        self._steps += running
+        self._force = sum(forces) / WINDOWS
+
+        m, phase = self._now, self._legs.phase
+        terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, np.stack(forces))
+        self._last_action = action
+        termination = np.where(m.diverged == "", self._task.fallen(m), np.char.add("diverged: ", m.diverged))
+        termination[~running] = ""
+        terminated = termination != ""
+        time = self._steps * STEP_SECONDS
+        truncated = running & ~terminated & (time >= self.settings.episode_seconds - STEP_SECONDS / 2)
+        info = {
+            **_by_action("stiffness", springs.stiffness),
+            **_by_action("torque", m.torque[..., FEET]),
+            **_by_action("equilibrium", springs.equilibrium),
+            **_by_action("work/stiffness", work_stiffness),
+            **_by_action("work/equilibrium", work_equilibrium),
+            **{f"reward/{name}": term for name, term in terms.items()},
+            "phase/left": phase[:, 0],
+            "phase/right": phase[:, 1],
+            "time": time,
+            "speed": m.com_velocity[:, 0],
+            "termination": termination,
+        }
+        reward = np.where(running, self._task.reward(terms), 0.0)
+        return Outcome(observation=self.observe(), reward=reward, terminated=terminated, truncated=truncated, info=info)
+
+    def _decode(self, actions: NDArray) -> NDArray:
+        action = np.asarray(actions, float)
+        if action.shape != (self.num_envs, len(ACTIONS)):
+            raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
+        if not np.isfinite(action).all():
+            raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
+        return np.clip(action, -1.0, 1.0)
+
+    def _window(self, running: NDArray, ids: NDArray | None) -> NDArray:
+        """One control window; returns the work of moving the foot springs' equilibrium, (N, side, 2) [J]."""
+        springs, legs, m = self._springs, self._legs, self._now
+        phase = legs.phase
+        work = springs.move_equilibrium(phase, m.angle[..., FEET])
+        hip_knee_stiffness, hip_knee_drive = legs.command(m)
+        self._stiffness[..., : FEET.start], self._drive[..., : FEET.start] = (
+            hip_knee_stiffness,
+            hip_knee_drive,
+        )
+        self._stiffness[..., FEET] = springs.stiffness
+        self._drive[..., FEET] = springs.stiffness * springs.equilibrium
+        if self.settings.push_newton:
+            self._simulation.push(self._pushes.force(self._steps, self._random, running))
+        before = legs.left_phase
+        self._now = self._simulation.advance(self._stiffness, self._drive, ids)
+        legs.advance(self._now)
+        if ids is not None:
+            legs.left_phase = np.where(running, legs.left_phase, before)
+        if self.on_tick is not None:
+            self.on_tick(self._tick(phase, running))
+        return work
+
+    def _tick(self, phase: NDArray, running: NDArray) -> Tick:
+        m = self._now
+        return Tick(
+            measurement=m,
+            phase=phase,
+            stiffness=self._stiffness.copy(),
+            equilibrium=self._drive / self._stiffness,
+            passive_torque=-self._passive_damping * m.velocity,
+            com_reference=self._task.planned_com(m, self._legs.phase),
+            active=running.copy(),
+        )
+
+    def _curves(self, constants: Sequence[LegConstants], stride_time: float) -> tuple[NDArray, NDArray]:
+        """(V, SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of the foot springs."""
+        body, human, mode = self.body, self.human, self.settings.equilibrium
+        stiffness = np.stack([equilibrium.fixed_stiffness(c, body) for c in constants])
+        if self.settings.schedule is not None:
+            brought, rest = StiffnessSchedule.from_json(self.settings.schedule).at(GRID)
+            stiffness[:] = brought
+        if mode == "planned":
+            rest = np.stack([equilibrium.planned(c, body, human, stride_time) for c in constants])
+        elif mode == "angle":
+            rest = np.stack([equilibrium.angle(human) for _ in constants])
+        elif mode == "neutral":
+            rest = np.stack([equilibrium.neutral(c) for c in constants])
+        else:
+            rest = np.stack([rest for _ in constants])
+        return rest, stiffness
+
+    def _start_curves(self, period: float) -> PhaseTable:
+        """People's joint angles, hip as thigh to the vertical [rad], and their rates [rad/s] over the stride."""
+        angles = [self.human.mean(name, GRID) for name in ("thigh", "knee", "ankle", "toe")]
+        rates = [self.human.rate(name, GRID) / period for name in ("thigh", "knee", "ankle", "toe")]
+        return PhaseTable(np.stack(angles + rates, axis=-1))
+
+    def _place(self, ids: NDArray, left_phase: NDArray, noise: NDArray) -> None:
+        """People's posture at the phase, at the commanded speed, the lowest contact point in the floor."""
+        legs = np.stack([left_phase, (left_phase + 0.5) % 1.0], axis=-1)
+        angle, velocity = np.split(self._start.at(legs), 2, axis=-1)
+        angle, velocity = angle * (1.0 + noise[:, 0]), velocity * (1.0 + noise[:, 1])
+        angle[..., 0] += self._trunk_pitch
+        root, rate = np.zeros((2, len(ids), 3))
+        root[:, 2], rate[:, 0] = self._trunk_pitch, self.settings.speed
+        self._simulation.reset(ids, root, rate, angle, velocity)
+        lowest = self._simulation.measure().contact[ids, ..., 1].min(axis=(1, 2))
+        root[:, 1] = -lowest - START_DEPTH * self.body.length_scale
+        self._simulation.reset(ids, root, rate, angle, velocity)
+
+
+class _Pushes:
+    """When each environment is pushed: once at a random time in each interval, forward or backward at random."""
+
+    def __init__(self, settings: BipedSettings, num: int):
+        self._size, self._latest = settings.push_newton, settings.push_interval - settings.push_seconds
+        self._interval, self._duration = settings.push_interval, settings.push_seconds
+        self._ends = np.zeros(num)
+        self._begin = np.zeros(num)
+        self._force = np.zeros(num)
+
+    def reset(self, index: int, random: np.random.Generator) -> None:
+        self._ends[index] = 0.0
+        self._draw(index, random)
+
+    def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
+        """(N,) push [N] at these step counts; only those running draw their next one."""
+        time = steps * STEP_SECONDS
+        for index in np.flatnonzero(running & (time >= self._ends)):
+            generator = random[index]
+            if generator is not None:
+                self._draw(index, generator)
+        since = time - self._begin
+        return np.where((since >= 0) & (since < self._duration), self._force, 0.0)
+
+    def _draw(self, index: int, random: np.random.Generator) -> None:
+        self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)
+        self._force[index] = self._size * random.choice((-1.0, 1.0))
+        self._ends[index] += self._interval
+
+
+def _by_action(name: str, values: NDArray) -> dict[str, NDArray]:
+    """(N, side, 2) -> {name/ankle_left: (N,), ...}."""
+    columns = values.reshape(len(values), len(ACTIONS))
+    return {f"{name}/{action}": columns[:, index] for index, action in enumerate(ACTIONS)}

@@ -1,0 +1,197 @@
+"""The gait phase, and the hips and knees: what walks while the policy sets ankle and toe stiffness.
+
+Each hip and knee is a spring like the ankle (variable impedance) around people's curves at the walking speed, with
+people's moments fed forward; the stance hip also holds the trunk and the speed, and touchdown resets the phase. The
+constants of `legs.json` were found by `python -m springfoot.agents.tuning` (command and seed stand in that file).
+Gains are for 1.70 m and 63 kg and scale with the body (see `envs.model`).
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.human import HumanGait
+
+from .model import HIP, KNEE, damping_times
+from .phase import GRID, PhaseTable
+from .simulation import WINDOW, Measurement
+
+KNOTS = np.arange(10) / 10
+"""Stride phases of the knots that correct people's curves (periodic cubic spline)."""
+STANCE_FALL = (0.5, 0.6)
+"""Phases over which the trunk torque of the leg that ends its stance falls to zero."""
+TOUCHDOWN_LOAD = 30.0 / (63.0 * GRAVITY)
+"""Vertical force of a foot that counts as touchdown [body weights]: 30 N at 63 kg."""
+TOUCHDOWN_PHASE = 0.80
+"""Touchdown before this phase of the leg is a scuff, not a step."""
+HOLD = 0.001
+"""A leg's phase waits this far before 1 until its foot touches down."""
+START_PHASES = (0.08, 0.38)
+"""A start is drawn from this part of either step: near double support a planned state falls."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegConstants:
+    """Tuned constants of the leg controller, for 1.70 m and 63 kg."""
+
+    hip_knots_deg: tuple[float, ...]
+    """Added to people's thigh angle at `KNOTS` [deg]."""
+    knee_knots_deg: tuple[float, ...]
+    """Added to people's knee angle at `KNOTS` [deg]."""
+    ankle_knots_deg: tuple[float, ...]
+    """Added to people's ankle angle at `KNOTS` in the planned equilibrium [deg]."""
+    hip_stiffness: tuple[float, float]
+    """Stance, swing [N m/rad]."""
+    knee_stiffness: tuple[float, float]
+    """Stance, swing [N m/rad]."""
+    feedforward: tuple[float, float, float]
+    """Share of people's hip, knee, ankle moment that is fed forward."""
+    period_factor: float
+    """Period of the phase against the plan's stride time."""
+    period_speed_gain: float
+    """Phase rate rises by this share for each m/s too fast [s/m]."""
+    trunk_pitch_deg: float
+    """Held trunk pitch [deg]."""
+    trunk_stiffness: float
+    """Stance-hip torque for trunk pitch [N m/rad]."""
+    trunk_damping: float
+    """Stance-hip torque for trunk pitch rate [N m s/rad]."""
+    speed_torque: float
+    """Stance-hip torque for each m/s too fast [N s]."""
+    trunk_rise: float
+    """Phase over which the stance hip takes the trunk."""
+    swing_speed_gain: float
+    """Swing-hip target for each m/s too fast (foot placement) [rad s/m]."""
+    neutral_deg: tuple[float, float]
+    """Constant ankle and toe angle of `equilibrium="neutral"` [deg]."""
+    ankle_schedule: tuple[float, float, float, float, float]
+    """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
+    toe_schedule: float
+    """Fixed toe stiffness [N m/rad]."""
+
+
+def constants_name(equilibrium: str, cadence: str) -> str:
+    """Name of the committed constants for a setting; "angle" and "phase" share those of "planned"."""
+    name = "neutral" if equilibrium == "neutral" else "planned"
+    return name if cadence == "people" else f"{name}, {cadence} cadence"
+
+
+def leg_constants(equilibrium: str, cadence: str) -> LegConstants:
+    """The committed constants for a setting."""
+    return constants_from(_committed()[constants_name(equilibrium, cadence)])
+
+
+def constants_from(values: dict) -> LegConstants:
+    """`LegConstants` from its JSON form (lists for tuples)."""
+    as_tuple = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+    return LegConstants(**as_tuple)
+
+
+@cache
+def _committed() -> dict[str, dict]:
+    text = resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8")
+    return json.loads(text)["constants"]
+
+
+def knot_curve(knots_deg: Sequence[float]) -> NDArray:
+    """A tuned correction [rad] on `GRID`: the periodic cubic spline through `KNOTS`."""
+    return np.deg2rad(CubicSpline(np.append(KNOTS, 1.0), [*knots_deg, knots_deg[0]], bc_type="periodic")(GRID))
+
+
+class Legs:
+    """Phase and hip-knee controller of N bodies.
+
+    Args:
+        constants: one set for all, or several to be told apart by `variant`.
+        body, human: the body, and people at its speed.
+        stride_time: the plan's [s].
+        speed: commanded [m/s].
+        num: N.
+        variant: (N,) which of `constants` each body has.
+    """
+
+    def __init__(
+        self,
+        constants: Sequence[LegConstants],
+        body: Body,
+        human: HumanGait,
+        stride_time: float,
+        speed: float,
+        num: int,
+        variant: NDArray | None = None,
+    ):
+        variant = np.zeros(num, int) if variant is None else variant
+        scale, root = body.mass_scale * body.length_scale, sqrt(body.length_scale)
+
+        def of_each(value):
+            return np.array([value(c) for c in constants], float)[variant]
+
+        self._variant = variant[:, None]
+        self._speed = speed
+        self._touchdown_force = TOUCHDOWN_LOAD * body.mass * GRAVITY
+        self._rate = of_each(lambda c: WINDOW / (c.period_factor * stride_time))
+        self._rate_gain = of_each(lambda c: c.period_speed_gain / root)
+        self._pitch = of_each(lambda c: np.deg2rad(c.trunk_pitch_deg))
+        self._trunk_stiffness = of_each(lambda c: c.trunk_stiffness * scale)
+        self._trunk_damping = of_each(lambda c: c.trunk_damping * scale * root)
+        self._speed_torque = of_each(lambda c: c.speed_torque * scale / root)
+        self._swing_gain = of_each(lambda c: c.swing_speed_gain / root)
+        self._table = PhaseTable(np.stack([_leg_curves(c, body, human, stride_time) for c in constants]))
+        self.left_phase = np.zeros(num)
+
+    @property
+    def phase(self) -> NDArray:
+        """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike."""
+        return np.stack([self.left_phase, (self.left_phase + 0.5) % 1.0], axis=-1)
+
+    def advance(self, m: Measurement) -> None:
+        """Let one window pass: the phase runs on, waits for a late foot, and starts anew with the one that lands."""
+        phase = self.left_phase
+        rate = self._rate * (1.0 + self._rate_gain * (m.com_velocity[:, 0] - self._speed))
+        waiting = np.where(phase < 0.5, 0.5, 1.0) - HOLD
+        phase = np.minimum(phase + np.maximum(rate, 0.0), np.maximum(waiting, phase))
+        landed = m.force[..., 1].sum(-1) > self._touchdown_force
+        legs = np.stack([phase, (phase + 0.5) % 1.0], axis=-1)
+        strike = landed & (legs > TOUCHDOWN_PHASE)
+        self.left_phase = np.where(strike[:, 0], 0.0, np.where(strike[:, 1], 0.5, phase))
+
+    def command(self, m: Measurement) -> tuple[NDArray, NDArray]:
+        """Hip and knee stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m], each (N, side, 2)."""
+        curves = self._table.at(self.phase, self._variant)
+        stance = curves[..., 0]
+        stiffness, drive = curves[..., 1:3], curves[..., 3:5]
+        too_fast = (m.com_velocity[:, 0] - self._speed)[:, None]
+        pitch, pitch_rate = m.root[:, 2], m.root_velocity[:, 2]
+        trunk = -self._trunk_stiffness * (pitch - self._pitch) - self._trunk_damping * pitch_rate
+        on_trunk = trunk[:, None] + self._speed_torque[:, None] * too_fast
+        placement = self._swing_gain[:, None] * too_fast  # a faster body puts its foot further ahead
+        drive[..., HIP] += stance * on_trunk + (1.0 - stance) * stiffness[..., HIP] * placement
+        return stiffness, drive
+
+
+def _leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:
+    """(SAMPLES, 5) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m]."""
+    fall_from, fall_to = STANCE_FALL
+    stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
+    beta, period = damping_times(body), constants.period_factor * stride_time
+    torque = body.mass * body.length_scale
+    columns = [stance]
+    drives = []
+    for joint, name, moment, knots, (in_stance, in_swing) in (
+        (HIP, "thigh", "hip_moment", constants.hip_knots_deg, constants.hip_stiffness),
+        (KNEE, "knee", "knee_moment", constants.knee_knots_deg, constants.knee_stiffness),
+    ):
+        stiffness = (in_swing + (in_stance - in_swing) * stance) * body.mass_scale * body.length_scale
+        target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
+        feed = -constants.feedforward[joint] * human.mean(moment, GRID) * torque  # people count extension positive
+        columns.append(stiffness)
+        drives.append(stiffness * target + feed)
+    return np.stack(columns + drives, axis=-1)

@@ -1,0 +1,293 @@
+"""The MuJoCo model of a body, and the names of its elements.
+
+The planar body of the thesis (trunk, thighs, shanks, feet, toes), compiled from `Body` with `MjSpec`. World x is
+forward and z up. Joint signs: hip and knee flexion, ankle dorsiflexion, toe-up and trunk-forward pitch positive.
+
+Scaling: a body of height ratio l and mass ratio m (against 1.70 m, 63 kg) has lengths ~ l, stiffness and torque
+~ m*l, joint damping ~ m*l*sqrt(l), armature ~ m*l^2, contact time ~ sqrt(l); its gait at equal Froude speed is then
+the same (Hof 1996, "Scaling gait data to body size").
+"""
+
+from math import sqrt
+
+import mujoco
+import numpy as np
+
+from springfoot.gait.body import GRAVITY, Body
+
+SIDES = ("left", "right")
+JOINTS = ("hip", "knee", "ankle", "toe")
+CONTACTS = ("heel", "ball", "toe")
+ROOT = ("x", "z", "pitch")
+LEFT, RIGHT = range(2)
+HIP, KNEE, ANKLE, TOE = range(4)
+ACTIONS = tuple(f"{joint}_{side}" for side in SIDES for joint in ("ankle", "toe"))
+
+TIMESTEP = 0.001
+"""Physics step [s]. Independent of the body: 2 ms is fine for soft ankles only."""
+
+DAMPING_TIME = (0.031, 0.0377, 0.02, 0.02)
+"""beta [s] of tau = K (theta_eq - theta - beta dtheta/dt), in the order of `JOINTS`; scaled with sqrt(l)."""
+TORQUE_LIMIT = (200.0, 200.0, 200.0, 60.0)
+"""Largest actuator torque [N m] at 1.70 m and 63 kg, in the order of `JOINTS`."""
+ARMATURE = (0.02, 0.01, 0.005, 0.002)
+"""Rotor-like inertia of each joint [kg m^2] at 1.70 m and 63 kg, in the order of `JOINTS`."""
+PASSIVE_DAMPING = (0.5, 0.5, 0.5, 0.1)
+"""Joint damping [N m s/rad] at 1.70 m and 63 kg, in the order of `JOINTS`."""
+JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
+"""Stops of the joints [deg], in the order of `JOINTS`; walking never reaches them."""
+
+HEEL_RADIUS = 0.04
+"""Radius [m] of the heel's contact sphere at 1.70 m: a rounded heel with a soft pad at most 8 mm deep."""
+SOLE_RADIUS = 0.02
+"""Radius [m] of the contact spheres at the ball and the toe tip at 1.70 m: the toe joint's height above the sole."""
+FRICTION = 1.0
+HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
+"""Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
+SOLE_CONTACT = {"solref": (0.025, 1.0), "solimp": (0.9, 0.95, 0.003)}
+
+_SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
+
+
+def geom_name(contact: str, side: str) -> str:
+    """Name of a foot's contact sphere."""
+    return f"{contact}_{side}"
+
+
+def damping_times(body: Body) -> np.ndarray:
+    """Beta [s] of each joint in the order of `JOINTS`, shape (4,)."""
+    return np.array(DAMPING_TIME) * sqrt(body.length_scale)
+
+
+def torque_limits(body: Body) -> np.ndarray:
+    """Largest actuator torque [N m] of each joint in the order of `JOINTS`, shape (4,)."""
+    return np.array(TORQUE_LIMIT) * body.mass_scale * body.length_scale
+
+
+def passive_damping(body: Body) -> np.ndarray:
+    """Joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
+    return np.array(PASSIVE_DAMPING) * body.mass_scale * body.length_scale * sqrt(body.length_scale)
+
+
+def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
+    """Centre (forward, up) [m] in its segment's frame, and radius [m], of each contact sphere.
+
+    Heel and ball are in the foot's frame (origin: ankle), the toe in the toe's frame (origin: toe joint).
+    """
+    heel, sole = HEEL_RADIUS * body.length_scale, SOLE_RADIUS * body.length_scale
+    return {
+        "heel": (heel - body.heel_to_ankle, heel - body.ankle_height, heel),
+        "ball": (body.ankle_to_toe_joint, sole - body.ankle_height, sole),
+        "toe": (body.toe_length - sole, sole - body.toe_joint_height, sole),
+    }
+
+
+def build_spec(body: Body) -> mujoco.MjSpec:
+    """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors."""
+    length, mass = body.length_scale, body.mass_scale
+    spec = mujoco.MjSpec()
+    spec.modelname = "springfoot"
+    spec.option.timestep = TIMESTEP
+    spec.option.gravity = (0.0, 0.0, -GRAVITY)
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    spec.compiler.degree = False
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 960, 720
+    spec.add_texture(
+        name="tiles",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=(0.86, 0.88, 0.90),
+        rgb2=(0.78, 0.81, 0.84),
+        width=256,
+        height=256,
+    )
+    tiles = spec.add_material(name="tiles", texrepeat=(1.0, 1.0), texuniform=True)
+    tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
+
+    world = spec.worldbody
+    world.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    world.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0, 0, 1),
+        material="tiles",
+        contype=0,
+        conaffinity=1,
+        friction=(FRICTION, 0.005, 0.0001),
+    )
+    trunk = _segment(world, "trunk", (0, 0, 0), body.trunk_mass, (0, body.trunk_com_above_hip), body.trunk_inertia)
+    for name, kind, axis in (
+        ("x", mujoco.mjtJoint.mjJNT_SLIDE, (1, 0, 0)),
+        ("z", mujoco.mjtJoint.mjJNT_SLIDE, (0, 0, 1)),
+        ("pitch", mujoco.mjtJoint.mjJNT_HINGE, (0, 1, 0)),
+    ):
+        trunk.add_joint(name=name, type=kind, axis=axis)
+    trunk.add_camera(
+        name="track",
+        pos=(0, -3.2 * length, 0),
+        xyaxes=(1, 0, 0, 0, 0, 1),
+        mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
+    )
+    _bone(trunk, (0, 0.0), (0, body.trunk_length), 0.07 * length, 0.0)
+    for index, side in enumerate(SIDES):
+        _leg(spec, trunk, body, side, hip_y=(0.09 if index == LEFT else -0.09) * length)
+    for side in SIDES:
+        for index, joint in enumerate(JOINTS):
+            _add_spring(spec, f"{joint}_{side}", float(damping_times(body)[index]))
+    for side in SIDES:
+        for contact in CONTACTS:
+            spec.add_sensor(
+                name=f"force_{geom_name(contact, side)}",
+                type=mujoco.mjtSensor.mjSENS_CONTACT,
+                objtype=mujoco.mjtObj.mjOBJ_GEOM,
+                objname="floor",
+                reftype=mujoco.mjtObj.mjOBJ_GEOM,
+                refname=geom_name(contact, side),
+                intprm=(
+                    1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value,
+                    3,
+                    1,
+                ),  # force only; net force; one slot
+            )
+    spec.stat.extent = 2.0 * length
+    spec.stat.meanmass = mass
+    return spec
+
+
+def build_model(body: Body) -> mujoco.MjModel:
+    """The compiled model of `body`."""
+    return build_spec(body).compile()
+
+
+def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> None:
+    """One leg below the trunk; the lateral offset is for the eye alone (the body is planar)."""
+    rgb = 0.15 if side == "left" else 0.0
+    thin = 0.035 * body.length_scale
+    thigh = _segment(
+        trunk,
+        f"thigh_{side}",
+        (0, hip_y, 0),
+        body.thigh_mass,
+        (0, -body.thigh_com),
+        body.thigh_inertia,
+        "hip",
+        body,
+    )
+    _bone(thigh, (0, 0), (0, -body.thigh_length), 1.4 * thin, rgb)
+    shank = _segment(
+        thigh,
+        f"shank_{side}",
+        (0, 0, -body.thigh_length),
+        body.shank_mass,
+        (0, -body.shank_com),
+        body.shank_inertia,
+        "knee",
+        body,
+    )
+    _bone(shank, (0, 0), (0, -body.shank_length), thin, rgb)
+    forward, below = body.foot_com
+    foot = _segment(
+        shank,
+        f"foot_{side}",
+        (0, 0, -body.shank_length),
+        body.foot_mass,
+        (forward, -below),
+        body.foot_inertia,
+        "ankle",
+        body,
+    )
+    drop = body.ankle_height - body.toe_joint_height
+    toe = _segment(
+        foot,
+        f"toe_{side}",
+        (body.ankle_to_toe_joint, 0, -drop),
+        body.toe_mass,
+        (body.toe_com, 0),
+        body.toe_inertia,
+        "toe",
+        body,
+    )
+    offsets = contact_offsets(body)
+    _sphere(foot, geom_name("heel", side), offsets["heel"], HEEL_CONTACT, body, priority=1)
+    _sphere(foot, geom_name("ball", side), offsets["ball"], SOLE_CONTACT, body, priority=0)
+    _sphere(toe, geom_name("toe", side), offsets["toe"], SOLE_CONTACT, body, priority=0)
+    _bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
+    _bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
+    _bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
+
+
+def _segment(parent, name, pos, mass, com, inertia, joint=None, body=None):
+    """A rigid segment with an explicit inertia; the hinge, if any, is named after the joint and the segment's side."""
+    segment = parent.add_body(name=name, pos=pos)
+    segment.explicitinertial = True
+    segment.mass = mass
+    segment.ipos = (com[0], 0.0, com[1])
+    segment.inertia = (inertia, inertia, inertia)  # only the sagittal one acts
+    if joint is not None:
+        index = JOINTS.index(joint)
+        length, scale = body.length_scale, body.mass_scale
+        limit = float(torque_limits(body)[index])
+        segment.add_joint(
+            name=f"{joint}_{name.rsplit('_', 1)[1]}",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=(0, _SIGN_AXIS[joint], 0),
+            armature=ARMATURE[index] * scale * length**2,
+            damping=float(passive_damping(body)[index]),
+            limited=True,
+            range=tuple(np.deg2rad(JOINT_RANGE_DEG[index])),
+            actfrclimited=True,
+            actfrcrange=(-limit, limit),
+        )
+    return segment
+
+
+def _sphere(segment, name: str, offset: tuple[float, float, float], contact: dict, body: Body, priority: int) -> None:
+    """A contact sphere; its softness scales with the body (time ~ sqrt(l), depth ~ l)."""
+    forward, up, radius = offset
+    time, ratio = contact["solref"]
+    soft, hard, depth = contact["solimp"]
+    segment.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        pos=(forward, 0, up),
+        size=(radius, 0, 0),
+        contype=1,
+        conaffinity=0,
+        priority=priority,
+        friction=(FRICTION, 0.005, 0.0001),
+        solref=(time * sqrt(body.length_scale), ratio),
+        solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),
+        rgba=(0.85, 0.55, 0.25, 1.0),
+    )
+
+
+def _bone(segment, start, end, radius: float, shade: float) -> None:
+    """A capsule to look at: no mass, no contact."""
+    segment.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=(start[0], 0, start[1], end[0], 0, end[1]),
+        size=(radius, 0, 0),
+        contype=0,
+        conaffinity=0,
+        rgba=(0.25 + shade, 0.45 + shade, 0.70 + shade, 1.0),
+    )
+
+
+def _add_spring(spec: mujoco.MjSpec, joint: str, beta: float) -> None:
+    """Two actuators on one joint that make tau = K (theta_eq - theta - beta dtheta/dt) inside every physics step.
+
+    `stiffness_<joint>`: ctrl = K, gain = -theta - beta dtheta/dt. `drive_<joint>`: ctrl = K theta_eq (+ feed-forward).
+    The torque limit stands on the joint, not on the halves, which are both large when their sum is small.
+    """
+    spring = spec.add_actuator(
+        name=f"stiffness_{joint}",
+        target=joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_AFFINE,
+        biastype=mujoco.mjtBias.mjBIAS_NONE,
+    )
+    spring.gainprm[:3] = (0.0, -1.0, -beta)
+    drive = spec.add_actuator(name=f"drive_{joint}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    drive.set_to_motor()
