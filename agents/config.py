@@ -6,6 +6,7 @@ import inspect
 import json
 import textwrap
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -21,19 +22,19 @@ class TrainingConfig:
     """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
 
     timesteps: int = 400_000
-    """Environment steps of 20 ms to learn from, rounded up to whole rollouts of num_envs x rollout_steps."""
+    """Environment steps of 20 ms to learn from, rounded up to whole updates."""
     seed: int = 0
     """Seed of weights, action noise and environments."""
     num_envs: int = 64
     """Environments stepped together in one batch."""
     threads: int = 0
     """Threads of the physics, 0 for one per available processor; results are the same with any number."""
-    rollout_steps: int = 128
-    """Steps of each environment between two updates of the policy."""
-    batch_size: int = 2048
-    """Samples in each gradient step."""
+    update_steps: int = 8192
+    """Environment steps collected for each update of the policy, all environments together."""
+    minibatches: int = 4
+    """Parts of an update's samples, each good for one gradient step."""
     epochs: int = 8
-    """Passes over the collected samples in each update."""
+    """Passes over the samples in each update."""
     learning_rate: float = 3e-4
     """Step size of Adam at the start [-]."""
     learning_rate_end: float = 0.1
@@ -52,17 +53,15 @@ class TrainingConfig:
     """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
     eval_episodes: int = 16
     """Episodes of each periodic evaluation, on the same fixed seeds every time."""
-    environment: BipedSettings = field(
-        default_factory=lambda: BipedSettings(episode_seconds=10.0, push_newton=120.0)
-    )
+    environment: BipedSettings = field(default_factory=lambda: BipedSettings(episode_seconds=10.0, push_newton=120.0))
     """Settings of the walking task that is trained on."""
 
     def __post_init__(self) -> None:
-        for name in ("timesteps", "num_envs", "rollout_steps", "epochs", "eval_interval", "eval_episodes"):
+        for name in ("timesteps", "num_envs", "minibatches", "epochs", "eval_interval", "eval_episodes"):
             self._check(name, int, 1)
         self._check("seed", int, 0, 2**31 - 1)
         self._check("threads", int, 0)
-        self._check("batch_size", int, 2, self.num_envs * self.rollout_steps)
+        self._check("update_steps", int, max(self.num_envs, 2 * self.minibatches))
         for name in ("learning_rate", "clip_range"):
             self._check(name, float, 0, above=True)
         self._check("gamma", float, 0, 1, above=True)
@@ -72,16 +71,12 @@ class TrainingConfig:
         if not self.hidden or any(type(width) is not int or width < 1 for width in self.hidden):
             raise SpringfootError(f"hidden must be one or more positive whole numbers, got {self.hidden!r}")
 
-    def _check(
-        self, name: str, kind: type, low: float, high: float = float("inf"), above: bool = False
-    ) -> None:
+    def _check(self, name: str, kind: type, low: float, high: float = float("inf"), above: bool = False) -> None:
         value = getattr(self, name)
         right_kind = type(value) is int or (kind is float and isinstance(value, float) and isfinite(value))
         if not right_kind or not low <= value <= high or (above and value == low):
             what = "a whole number" if kind is int else "a finite number"
-            bounds = f"{'>' if above else '>='} {low:g}" + (
-                "" if high == float("inf") else f" and <= {high:g}"
-            )
+            bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == float("inf") else f" and <= {high:g}")
             raise SpringfootError(f"{name} must be {what} {bounds}, got {value!r}")
 
 
@@ -113,7 +108,7 @@ def _field_help(settings: type) -> dict[str, str]:
     body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
     return {
         item.target.id: " ".join(doc.value.value.split())
-        for item, doc in zip(body, body[1:], strict=False)
+        for item, doc in pairwise(body)
         if isinstance(item, ast.AnnAssign)
         and isinstance(item.target, ast.Name)
         and isinstance(doc, ast.Expr)
@@ -154,13 +149,15 @@ def _metavar(kind: Any) -> str:
     return "|".join(map(_metavar, parts)) if parts else kind.__name__.upper()
 
 
-def optional_flags(name: str, settings: type, defaults: Any) -> type:
+def optional_flags(name: str, settings: type, defaults: Any, leave_out: tuple[str, ...] = ()) -> type:
     """A dataclass with every field of `settings` as an optional flag: None, its default, means "not given".
 
-    The help of each flag is the field's own docstring, with the value in `defaults` (an instance) as the hint.
+    The help of each flag is the field's own docstring, with its value in `defaults` (an instance).
     """
     help_of, flags = _field_help(settings), []
     for item_name, kind in get_type_hints(settings).items():
+        if item_name in leave_out:
+            continue
         default = getattr(defaults, item_name)
         shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
         hint = f"(default: {shown})"
@@ -186,11 +183,7 @@ def optional_flags(name: str, settings: type, defaults: Any) -> type:
 
 def given(flags: Any) -> dict[str, Any]:
     """The flags that were given, by name."""
-    return {
-        item.name: value
-        for item in dataclasses.fields(flags)
-        if (value := getattr(flags, item.name)) is not None
-    }
+    return {item.name: value for item in dataclasses.fields(flags) if (value := getattr(flags, item.name)) is not None}
 
 
 SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings())

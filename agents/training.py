@@ -1,0 +1,246 @@
+"""A training run: a folder that holds its policies, its state and what it came to; begun anew or gone on with.
+
+`best.safetensors` and `last.safetensors` are policies, `state.safetensors` is what `resume` needs, `run.json` what is
+needed to repeat the run, and its results; beside them TensorBoard's event files. Each is written whole or not at all.
+"""
+
+import dataclasses
+import json
+import os
+import platform
+import signal
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from safetensors.numpy import save as to_safetensors
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+
+from ..envs.biped import Biped
+from ..envs.settings import settings_to_json
+from ..gait.errors import SpringfootError
+from .bundle import BEST, LAST, fingerprint, load_policy, read_tensors, save_policy, write_atomically
+from .config import TrainingConfig, config_from_json, config_to_json
+from .learner import Learner
+from .progress import Progress
+from .sb3 import SegmentedFootBipedVecEnv
+
+RUN, STATE = "run.json", "state.safetensors"
+EVALUATION_SEED = 2**30
+"""Seed of the first episode of every periodic evaluation, the next ones following."""
+PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "torch", "stable-baselines3")
+
+
+def train(config: TrainingConfig, out: str | Path) -> dict[str, Any]:
+    """Trains a policy from scratch into the new folder `out`; returns what `run.json` holds.
+
+    Ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM. Raises
+    `SpringfootError`, with nothing written, if `out` exists and is not an empty folder.
+    """
+    out = Path(out)
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise SpringfootError(f"{out} already exists; give another --out, or go on with a run by --resume {out}")
+    run = _Run(config, out, {"sessions": [], "evaluations": []})
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpringfootError(f"cannot make the folder {out}: {error.strerror}") from None
+    return run.learn()
+
+
+def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
+    """Goes on with the run in `out` with its saved settings; returns what `run.json` holds.
+
+    An interrupted run is finished; with `timesteps`, so many more are trained after those already done, and the step
+    size falls linearly to the new end. Environments start anew and noise is drawn anew, from the run's seed and the
+    steps done. Raises `SpringfootError` for a folder without a run, or one this version cannot go on with.
+    """
+    out = Path(out)
+    for name in (RUN, STATE, LAST):
+        if not (out / name).is_file():
+            raise SpringfootError(f"{out} holds no run to go on with: no {name} in it")
+    try:
+        record = json.loads((out / RUN).read_text(encoding="utf-8"))
+        config = config_from_json(record["config"])
+        record["sessions"], record["evaluations"]
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
+    header, arrays = read_tensors(out / STATE, "springfoot-training", "training state")
+    load_policy(out / LAST)  # refuses what was trained on another version of the environment
+    done = int(header["timesteps"])
+    total = config.timesteps if timesteps is None else done + timesteps
+    if total <= done:
+        raise SpringfootError(f"{out} has done its {done:,} timesteps; give --timesteps N to train N more")
+    run = _Run(dataclasses.replace(config, timesteps=total), out, record, done)
+    run.learner.restore(arrays)
+    return run.learn()
+
+
+def evaluate_returns(
+    biped: Biped, policy: Callable[[np.ndarray], np.ndarray], seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One episode of each environment of `biped`, seeded `seed`, `seed` + 1, …: returns, seconds, whether it fell."""
+    episodes = biped.num_envs
+    returns, seconds, fell = np.zeros(episodes), np.zeros(episodes), np.zeros(episodes, bool)
+    active = np.ones(episodes, bool)
+    biped.reset(np.arange(episodes), [seed + k for k in range(episodes)])
+    observation = biped.observe()
+    while active.any():
+        outcome = biped.step(policy(observation), active=active)
+        returns += np.where(active, outcome.reward, 0.0)
+        seconds += np.where(active, biped.dt, 0.0)
+        fell |= active & outcome.terminated
+        active &= ~(outcome.terminated | outcome.truncated)
+        observation = outcome.observation
+    return returns, seconds, fell
+
+
+class _Run(BaseCallback):
+    """One sitting at a run: PPO's callback, which measures, evaluates and saves between the updates."""
+
+    def __init__(self, config: TrainingConfig, out: Path, record: dict[str, Any], done: int = 0) -> None:
+        super().__init__()
+        self._config, self._out, self._record = config, out, record
+        threads = config.threads or _processors()
+        settings = settings_to_json(config.environment)
+        self._environments = SegmentedFootBipedVecEnv(config.num_envs, num_threads=threads, **settings)
+        self._evaluation = Biped(config.environment, config.eval_episodes, threads)
+        self._fingerprint = fingerprint(self._evaluation)
+        seed = int(np.random.SeedSequence([config.seed, done]).generate_state(1)[0] >> 3)  # below EVALUATION_SEED
+        self.learner = Learner(config, self._environments, seed)
+        self._first = self._trained = done
+        self._stopping, self._began, self._seconds_before = False, monotonic(), record.get("seconds", 0.0)
+        self._sums: dict[str, np.ndarray] = {}
+        self._ended: list[dict[str, Any]] = []
+
+    def learn(self) -> dict[str, Any]:
+        """Trains until the configured timesteps are done or a signal stops it; returns the record."""
+        ppo, status = self.learner.ppo, "failed"
+        self._progress = Progress(self._config.timesteps, self._first)
+        self._record |= {"config": config_to_json(self._config), "status": "running"}
+        self._record["sessions"].append({"from_timesteps": self._first, **_source()})
+        ppo.set_logger(configure(str(self._out), ["tensorboard"]))
+        ppo.num_timesteps = self._first
+        try:
+            with self._progress, self._signals():
+                ppo.learn(self._config.timesteps - self._first, self, reset_num_timesteps=False)
+            status = "interrupted" if self._stopping else "finished"
+        finally:
+            self._record["status"] = status
+            self._save(policies=status != "failed")
+            ppo.logger.close()
+            self.learner.normalized.close()
+        return self._record
+
+    @contextmanager
+    def _signals(self) -> Iterator[None]:
+        """The first SIGINT or SIGTERM ends the training in good order, the second at once."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def stop(number: int, _frame: Any) -> None:
+            self._stopping = True
+            signal.signal(number, before[number])
+
+        before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        for number in before:
+            signal.signal(number, stop)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _on_rollout_start(self) -> None:
+        self._trained = self.learner.ppo.num_timesteps
+        self._sums, self._ended = {}, []
+        past = self._record["evaluations"]
+        due = not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval
+        if due and not self._stopping:
+            self._evaluate()
+
+    def _on_step(self) -> bool:
+        for name, values in self._environments.step_info.items():
+            if name.startswith(("reward/", "stiffness/")):
+                self._sums[name] = self._sums.get(name, 0.0) + values
+        self._ended += [self.locals["infos"][i] for i in np.flatnonzero(self.locals["dones"])]
+        self._progress.advance(self._config.num_envs)
+        return not self._stopping
+
+    def _on_rollout_end(self) -> None:
+        for name, sums in self._sums.items():
+            self.logger.record(name, float(np.mean(sums)) / self.learner.rollout_steps)
+        if self._ended:
+            episodes = [info["episode"] for info in self._ended]
+            self.logger.record("episode/return", np.mean([episode["r"] for episode in episodes]))
+            self.logger.record("episode/seconds", np.mean([episode["l"] for episode in episodes]) * Biped.dt)
+            falls = [not info["TimeLimit.truncated"] for info in self._ended]
+            self.logger.record("episode/falls_share", np.mean(falls))
+
+    def _on_training_end(self) -> None:
+        if not self._stopping:
+            self._trained = self.learner.ppo.num_timesteps
+            self._evaluate()
+
+    def _evaluate(self) -> None:
+        """Evaluates the policy on the fixed seeds, keeps it if it is the best so far, and saves."""
+        policy = self.learner.policy(self._fingerprint)
+        returns, seconds, fell = evaluate_returns(self._evaluation, policy, EVALUATION_SEED)
+        entry = {
+            "timesteps": self._trained,
+            "return_mean": float(returns.mean()),
+            "return_sd": float(returns.std()),
+            "episodes": len(returns),
+            "falls": int(fell.sum()),
+            "seconds_mean": float(seconds.mean()),
+        }
+        past = self._record["evaluations"]
+        if not past or entry["return_mean"] > max(earlier["return_mean"] for earlier in past):
+            save_policy(self._out / BEST, policy)
+        past.append(entry)
+        for name in ("return_mean", "falls", "seconds_mean"):
+            self.logger.record(f"evaluation/{name}", entry[name])
+        self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {len(returns)} fell")
+        self._save()
+
+    def _save(self, policies: bool = True) -> None:
+        """Writes the newest policy, the state and the record; without `policies` the record only."""
+        best = max(self._record["evaluations"], key=lambda entry: entry["return_mean"], default=None)
+        seconds = self._seconds_before + monotonic() - self._began
+        self._record |= {"timesteps": self._trained, "seconds": round(seconds, 1), "best": best}
+        if policies:
+            save_policy(self._out / LAST, self.learner.policy(self._fingerprint))
+            header = {"springfoot-training": json.dumps({"timesteps": self._trained})}
+            write_atomically(self._out / STATE, to_safetensors(self.learner.state(), header))
+        write_atomically(self._out / RUN, (json.dumps(self._record, indent=2) + "\n").encode())
+
+
+def _processors() -> int:
+    """Processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _source() -> dict[str, Any]:
+    """Versions of what runs, and the git commit it comes from (None outside a clone of the project)."""
+
+    def git(*words: str) -> str | None:
+        command = ["git", "-C", str(Path(__file__).parent), *words]
+        try:
+            return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+        except (OSError, subprocess.CalledProcessError):
+            return None
+
+    ours = git("ls-files", "--error-unmatch", Path(__file__).name) is not None
+    return {
+        "commit": git("rev-parse", "HEAD") if ours else None,
+        "modified": bool(git("status", "--porcelain", "--untracked-files=no")) if ours else None,
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in PACKAGES},
+    }

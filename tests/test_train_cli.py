@@ -1,0 +1,126 @@
+"""train.py as it is typed: flags, refusals that leave nothing behind, Ctrl-C, and going on."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import train
+from springfoot.agents.bundle import load_policy
+from springfoot.agents.config import PRESETS, SettingsFlags, TrainingConfig, given
+from springfoot.envs.settings import BipedSettings
+
+SCRIPT = Path(train.__file__)
+SHORT = [
+    *("--num-envs", "8", "--threads", "1", "--update-steps", "1024", "--eval-interval", "1024"),
+    *("--eval-episodes", "2", "--episode-seconds", "1"),
+]
+
+
+def main(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["train.py", *map(str, words)])
+    return train.main()
+
+
+def test_every_setting_is_a_flag_with_the_settings_own_help(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "1000")
+    with pytest.raises(SystemExit) as stopped:
+        main(monkeypatch, "--help")
+    assert stopped.value.code == 0
+    text = " ".join(capsys.readouterr().out.split())
+    for name in (*BipedSettings.__dataclass_fields__, *TrainingConfig.__dataclass_fields__):
+        assert name == "environment" or f"--{name.replace('_', '-')} " in text
+    assert "Commanded walking speed [m/s]. (default: 1.2)" in text
+    assert "None" not in text.replace("(default: None)", "")
+
+
+def test_flags_that_were_not_given_are_not_given():
+    assert given(SettingsFlags()) == {}
+    assert given(SettingsFlags(height=1.8, start="random")) == {"height": 1.8, "start": "random"}
+
+
+def test_flags_take_the_place_of_the_preset():
+    preset = PRESETS["walk"]
+    config = train.configured(preset, {"timesteps": 5}, {"height": 1.8, "ankle_stiffness_range": (30, 300)})
+    assert config.timesteps == 5 and config.learning_rate == preset.learning_rate
+    assert config.environment.height == 1.8
+    assert config.environment.ankle_stiffness_range == (30.0, 300.0)
+    assert config.environment.push_newton == preset.environment.push_newton
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "give either --out NEW_FOLDER or --resume FOLDER"),
+        (["--out", "new", "--resume", "old"], "give either"),
+        (["--out", "new", "--mass", "-1"], "mass must be"),
+        (["--out", "new", "--ankle-stiffness-range", "800", "20"], "ankle_stiffness_range must be"),
+        (["--out", "new", "--reward-weights", '{"speeed": 1}'], "'speeed'"),
+        (["--out", "new", "--timesteps", "0"], "timesteps must be"),
+        (["--out", "new", "--equilibrium", "phase"], "schedule"),
+        (["--out", "file/new"], "cannot make the folder"),
+        (["--out", "file"], "already exists"),
+        (["--resume", "old"], "holds no run"),
+        (["--resume", "old", "--height", "1.8"], "drop --height"),
+    ],
+)
+def test_bad_input_is_one_line_exit_code_2_and_nothing_on_disk(monkeypatch, capsys, tmp_path, words, message):
+    (tmp_path / "file").write_text("kept")
+    monkeypatch.chdir(tmp_path)
+    assert main(monkeypatch, *words) == 2
+    out, error = capsys.readouterr()
+    assert out == "" and error.count("\n") == 1 and message in error
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.parametrize("words", [["--hight", "1.7"], ["--height", "tall"], ["--reward-weights", "nothing.json"]])
+def test_what_is_no_flag_is_refused(monkeypatch, capsys, tmp_path, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        main(monkeypatch, "--out", "new", *words)
+    assert stopped.value.code == 2
+    assert words[0] in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, capsys, tmp_path):
+    (tmp_path / "weights.json").write_text('{"grf": -0.1}')
+    weights = tmp_path / "weights.json"
+    words = ["--out", tmp_path / "run", "--timesteps", "1024", *SHORT, "--reward-weights", weights]
+    assert main(monkeypatch, *words) == 0
+    out = capsys.readouterr().out
+    assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
+    assert f"python evaluate.py {tmp_path / 'run'}" in out
+    assert load_policy(tmp_path / "run").settings.reward_weights == {"grf": -0.1}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number):
+    folder = tmp_path / "run"
+    command = [sys.executable, SCRIPT, "--out", folder, "--timesteps", "10_000_000", *SHORT]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not (folder / "run.json").exists() or json.loads((folder / "run.json").read_text())["timesteps"] < 1024:
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(number)
+    out, error = process.communicate(timeout=60)
+    assert process.returncode == 130, error
+    assert "Traceback" not in error
+    assert f"train.py --resume {folder}" in out
+    record = json.loads((folder / "run.json").read_text())
+    assert record["status"] == "interrupted"
+    policy = load_policy(folder)
+    action = policy(policy.observation_mean)
+    assert action.shape == (4,) and (abs(action) <= 1).all()
+    if number == signal.SIGINT:
+        done = record["timesteps"]
+        again = [sys.executable, SCRIPT, "--resume", folder, "--timesteps", "1000"]
+        resumed = subprocess.run(again, capture_output=True, text=True)
+        assert resumed.returncode == 0, resumed.stderr
+        assert json.loads((folder / "run.json").read_text())["timesteps"] == done + 1024
