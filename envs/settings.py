@@ -75,9 +75,7 @@ class BipedSettings:
     def __post_init__(self) -> None:
         body = Body(self.height, self.mass)
         fastest = (
-            MAX_FROUDE * self.speed / body.froude_speed(self.speed)
-            if _is_number(self.speed) and self.speed
-            else inf
+            MAX_FROUDE * self.speed / body.froude_speed(self.speed) if _is_number(self.speed) and self.speed else inf
         )
         _check_number("speed", self.speed, 0.0, fastest, "m/s", above=True)
         for name, choices in (
@@ -90,14 +88,11 @@ class BipedSettings:
         _check_range("toe_stiffness_range", self.toe_stiffness_range)
         self._check_schedule()
         _check_number("episode_seconds", self.episode_seconds, STEP_SECONDS, inf, "s")
-        if self.start != "random" and not (_is_number(self.start) and 0 <= self.start < 1):
-            raise SpringfootError(f"start must be 'random' or a stride phase in [0, 1), got {self.start!r}")
+        check_start(self.start)
         _check_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
         _check_number("push_newton", self.push_newton, 0.0, inf, "N")
         _check_number("push_interval", self.push_interval, 0.0, inf, "s", above=True)
-        _check_number(
-            "push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True
-        )
+        _check_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         _check_weights(self.reward_weights)
 
     def _check_schedule(self) -> None:
@@ -107,9 +102,7 @@ class BipedSettings:
                     "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
                 )
         elif not isinstance(self.schedule, dict):
-            raise SpringfootError(
-                f"schedule must be a stiffness schedule in JSON form or None, got {self.schedule!r}"
-            )
+            raise SpringfootError(f"schedule must be a stiffness schedule in JSON form or None, got {self.schedule!r}")
         else:
             try:
                 json.dumps(self.schedule, allow_nan=False)
@@ -130,6 +123,12 @@ def settings_from(**values: Any) -> BipedSettings:
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
     """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
     return json.loads(json.dumps(asdict(settings)))
+
+
+def check_start(start: Any) -> None:
+    """Refuses what is neither "random" nor a stride phase in [0, 1)."""
+    if start != "random" and not (_is_number(start) and 0 <= start < 1):
+        raise SpringfootError(f"start must be 'random' or a stride phase in [0, 1), got {start!r}")
 
 
 def _plain(value: Any) -> Any:
@@ -173,6 +172,4 @@ def _check_weights(weights: Any) -> None:
         cost = DEFAULT_WEIGHTS[name] < 0
         if not _is_number(weight) or (weight > 0 if cost else weight < 0):
             allowed = "<= 0 (a cost)" if cost else ">= 0 (a reward)"
-            raise SpringfootError(
-                f"reward_weights[{name!r}] must be a finite number {allowed}, got {weight!r}"
-            )
+            raise SpringfootError(f"reward_weights[{name!r}] must be a finite number {allowed}, got {weight!r}")

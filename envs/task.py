@@ -67,10 +67,10 @@ def _entries() -> tuple[Entry, ...]:
             Entry(f"{joint}_rate_{side}", "sqrt(g/l)", -15.0, 15.0, f"angular rate, {sign[joint]} positive")
             for side, joint in legs
         ),
-        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x stride phase of the left leg"),
-        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x stride phase of the left leg"),
-        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x stride phase of the left leg"),
-        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x stride phase of the left leg"),
+        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase"),
+        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase"),
+        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase"),
+        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase"),
         *(
             Entry(
                 f"load_{contact}_{side}",
@@ -87,7 +87,7 @@ def _entries() -> tuple[Entry, ...]:
         Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
         *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before") for name in ACTIONS),
         *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive") for side in SIDES),
-        Entry("leading_leg", "1", -1.0, 1.0, "leg whose stance began last: +1 left, -1 right"),
+        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right"),
         Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)"),
         Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m"),
         Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg"),
@@ -126,7 +126,7 @@ class Task:
         self._stiffness_unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.mass_scale * length
         self._stiffness_share = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
         self._pose_share = np.array([POSE_WEIGHTS[joint] for joint in range(len(JOINTS))])
-        self._half_step = 0.5 * STEP_SECONDS / (2 * plan.step_time)
+        self._half_step = 0.5 * STEP_SECONDS / plan.stride_time
 
         self._step_length = plan.step_length
         self._plan = PhaseTable(_com_curves(plan))
@@ -265,7 +265,5 @@ class Task:
 def _com_curves(plan: WalkPlan) -> NDArray:
     """The plan's CoM over one step: x [m] less its mean advance, z [m], forward speed [m/s]; all periodic."""
     x, z = plan.com(GRID)
-    sway = x - plan.step_length * GRID
-    series = np.fft.rfft(sway)
-    rate = np.fft.irfft(2j * np.pi * np.arange(len(series)) * series, len(sway))
-    return np.stack((sway, z, (plan.step_length + rate) / plan.step_time), -1)
+    speed, _ = plan.com_velocity(GRID)
+    return np.stack((x - plan.step_length * GRID, z, speed), -1)

@@ -1,0 +1,89 @@
+"""Pictures of one body. The only module that needs OpenGL, and only once a frame is asked for."""
+
+import time
+import warnings
+from typing import Any
+
+import mujoco
+from numpy.typing import NDArray
+
+from springfoot.gait.errors import SpringfootError
+
+RENDER_MODES = ("human", "rgb_array")
+WIDTH, HEIGHT = 640, 480
+"""Size of a frame [pixels]."""
+CAMERA = "track"
+"""Name of the model's camera, which follows the body's CoM."""
+
+NO_GL = (
+    "cannot render: no OpenGL here ({}). Without a screen install libosmesa6 or libegl1 and set MUJOCO_GL=osmesa or "
+    "MUJOCO_GL=egl before Python starts; everything but rendering works without"
+)
+
+
+class Camera:
+    """Draws bodies of one model, in a window ("human") or into arrays ("rgb_array").
+
+    Raises `SpringfootError` with a hint where there is no OpenGL, or no screen for a window.
+    """
+
+    def __init__(self, model: mujoco.MjModel, mode: str, frames_per_second: float) -> None:
+        self._model = model
+        self._period = 1 / frames_per_second
+        self._next_frame = 0.0
+        self._window: Any = None
+        self._renderer: Any = None
+        if mode == "human":
+            self._data = mujoco.MjData(model)
+            self._window = _open_window(model, self._data)
+        else:
+            self._renderer = _renderer(model)
+
+    def show(self, data: mujoco.MjData) -> NDArray | None:
+        """One frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time."""
+        if self._renderer is not None:
+            self._renderer.update_scene(data, camera=CAMERA)
+            return self._renderer.render()
+        if self._window.is_running():
+            with self._window.lock():
+                mujoco.mj_copyData(self._data, self._model, data)
+            self._window.sync()
+            time.sleep(max(0.0, self._next_frame - time.perf_counter()))
+            self._next_frame = time.perf_counter() + self._period
+        return None
+
+    def close(self) -> None:
+        """Give window and OpenGL context back; may be called again."""
+        for drawing in (self._window, self._renderer):
+            if drawing is not None:
+                drawing.close()
+        self._window = None
+
+
+def _renderer(model: mujoco.MjModel) -> Any:
+    try:
+        return mujoco.Renderer(model, HEIGHT, WIDTH)
+    except Exception as error:  # each backend fails in its own way
+        raise SpringfootError(NO_GL.format(_first_line(error))) from None
+
+
+def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
+    try:
+        import glfw
+        import mujoco.viewer
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if not glfw.init():  # without this check launch_passive would wait for ever
+                raise RuntimeError("no screen")
+        window = mujoco.viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+    except Exception as error:
+        raise SpringfootError(NO_GL.format(_first_line(error))) from None
+    with window.lock():
+        window.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        window.cam.fixedcamid = model.camera(CAMERA).id
+    return window
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0]

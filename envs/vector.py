@@ -1,0 +1,206 @@
+"""`SegmentedFootBiped` N times over in one batched simulation, as a Gymnasium `VectorEnv`."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from springfoot.gait.errors import SpringfootError
+
+from .biped import Biped
+from .faces import METADATA, check_can_render, check_options, check_render_mode, spaces_of
+from .rendering import Camera
+from .settings import STEP_SECONDS, BipedSettings, settings_from
+
+
+class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
+    """N of `SegmentedFootBiped` in one batched simulation: same settings, spaces, rewards and bits.
+
+    Environment i of a vector seeded with s does what `SegmentedFootBiped` seeded with s + i does.
+
+    Args:
+        num_envs: N.
+        autoreset_mode: `AutoresetMode` or its value: "NextStep" (the step after an episode's last one ignores the
+            action and resets), "SameStep" (`final_obs`, `final_info` in the info), "Disabled"
+            (`reset(options={"reset_mask": mask})` by the caller).
+        num_threads: of the physics; any number gives the same bits.
+        max_episode_steps: truncate after so many steps, where `episode_seconds` is longer.
+        render_mode: "rgb_array" (a frame of each), "human" (a window on the first) or None.
+        settings: as for `SegmentedFootBiped`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int = 1,
+        max_episode_steps: int | None = None,
+        **settings: Any,
+    ) -> None:
+        for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
+            _check_count(name, count)
+        self.settings = _limit_steps(settings_from(**settings), max_episode_steps)
+        self.num_envs = num_envs
+        self.render_mode = check_render_mode(render_mode)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = METADATA | {"autoreset_mode": self.autoreset_mode}
+        self.biped = Biped(self.settings, num_envs, num_threads)
+        self.single_observation_space, self.single_action_space = spaces_of(self.biped)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._camera: Camera | None = None
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds = [-1] * num_envs
+        self._over = np.ones(num_envs, bool)
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The generator of each environment; None before its first reset."""
+        return tuple(self._generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The seed of each environment's generator; -1 before its first reset."""
+        return tuple(self._seeds)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray, dict[str, Any]]:
+        """Start episodes in all environments, or in those of `options["reset_mask"]`, a bool array (N,).
+
+        `seed` s gives environment i the seed s + i; a list gives each its own. `options["start"]` as in the Env.
+        """
+        chosen = check_options(options, ("start", "reset_mask"))
+        ids = np.flatnonzero(self._reset_mask(chosen.get("reset_mask")))
+        seeds = self._spread(seed)
+        for index in ids:
+            if seeds[index] is not None or self._generators[index] is None:
+                self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
+        self._restart(ids, chosen.get("start"))
+        self._over[ids] = False
+        if self.render_mode == "human":
+            self.render()
+        return self.biped.observe(), {}
+
+    def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
+        """Hold the stiffnesses that `actions` (N, 4) stand for during 20 ms."""
+        resetting = self._check_running()
+        if np.shape(actions) != self.action_space.shape:
+            raise SpringfootError(f"actions must have shape {self.action_space.shape}, got {np.shape(actions)}")
+        outcome = self.biped.step(np.where(resetting[:, None], 0.0, actions), active=~resetting)
+        ended = outcome.terminated | outcome.truncated
+        observation, infos = outcome.observation, _masked(outcome.info, ~resetting)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+            infos = _masked(outcome.info, ~ended) | _final(observation, outcome.info, ended)
+            resetting = ended
+        if resetting.any():
+            self._restart(np.flatnonzero(resetting))
+            observation = self.biped.observe()
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            self._over = ended.copy()
+        if self.render_mode == "human":
+            self.render()
+        return observation, outcome.reward, outcome.terminated, outcome.truncated, infos
+
+    def render(self) -> Any:
+        """A tuple of N frames, uint8 (480, 640, 3); "human" draws the first environment and gives None."""
+        mode = check_can_render(self.render_mode)
+        self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
+        if mode == "human":
+            return self._camera.show(self.biped.data(0))
+        return tuple(self._camera.show(self.biped.data(index)) for index in range(self.num_envs))
+
+    def close_extras(self, **_: Any) -> None:
+        """Close the window, if any."""
+        if self._camera is not None:
+            self._camera.close()
+
+    def _restart(self, ids: NDArray, start: float | str | None = None) -> None:
+        self.biped.reset(ids, [self._generators[index] for index in ids], start)
+
+    def _check_running(self) -> NDArray:
+        """Which environments this step resets, (N,); refuses a step that someone should have reset before."""
+        waiting = np.array([generator is None for generator in self._generators])
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            waiting |= self._over
+        if waiting.any():
+            which = ", ".join(map(str, np.flatnonzero(waiting)))
+            raise SpringfootError(f"no episode is running in environments {which}: call reset() before step()")
+        return self._over.copy()
+
+    def _spread(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """One seed for each environment."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, Integral):
+            return [int(seed) + index for index in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise SpringfootError(f"seed must be an integer or a list of {self.num_envs}, got {len(seed)} seeds")
+        return seed
+
+    def _reset_mask(self, mask: Any) -> NDArray:
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        if not isinstance(mask, np.ndarray) or mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
+            raise SpringfootError(
+                f"reset_mask must be a bool array of shape ({self.num_envs},) with at least one True, got {mask!r}"
+            )
+        return mask
+
+
+def _masked(info: dict[str, NDArray], mask: NDArray) -> dict[str, Any]:
+    """Gymnasium's form of a vector's info: fresh arrays, each with `_name`, the mask of whom it is about."""
+    infos: dict[str, Any] = {}
+    if not mask.any():
+        return infos
+    for name, value in info.items():
+        if value.dtype.kind == "U":
+            value = value.astype(object)
+            value[~mask] = None
+            infos[name] = value
+        else:
+            infos[name] = np.where(mask, value, 0)
+        infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def _final(observation: NDArray, info: dict[str, NDArray], ended: NDArray) -> dict[str, Any]:
+    """Last observation and info of the episodes that ended in this step."""
+    last = np.full(len(ended), None, dtype=object)
+    for index in np.flatnonzero(ended):
+        last[index] = observation[index].copy()
+    return {
+        "final_obs": last,
+        "_final_obs": ended.copy(),
+        "final_info": _masked(info, ended),
+        "_final_info": ended.copy(),
+    }
+
+
+def _check_count(name: str, value: Any) -> None:
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+        raise SpringfootError(f"{name} must be an integer >= 1, got {value!r}")
+
+
+def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        valid = ", ".join(repr(choice.value) for choice in AutoresetMode)
+        raise SpringfootError(f"autoreset_mode must be one of {valid}, got {mode!r}") from None
+
+
+def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> BipedSettings:
+    """Gymnasium puts no TimeLimit around a vector entry point: the limit goes into the settings."""
+    if max_episode_steps is None:
+        return settings
+    _check_count("max_episode_steps", max_episode_steps)
+    return replace(settings, episode_seconds=min(settings.episode_seconds, max_episode_steps * STEP_SECONDS))
