@@ -239,8 +239,9 @@ def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
         expected |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}
     for tensor_name in sorted(set(expected) | set(tensors)):
-        shape = tensors[tensor_name].shape if tensor_name in tensors else "nothing"
-        if shape != expected.get(tensor_name):
-            raise SpringfootError(f"{name}: {tensor_name} must be {expected.get(tensor_name)}, is {shape}")
+        wanted = expected.get(tensor_name, "absent")
+        found = tensors[tensor_name].shape if tensor_name in tensors else "absent"
+        if found != wanted:
+            raise SpringfootError(f"{name}: {tensor_name} must be {wanted}, is {found}")
     if (tensors["observation.variance"] < 0).any():
         raise SpringfootError(f"{name}: observation.variance must not be negative")

@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from ..envs.faces import SegmentedFootBipedVector
+from ..envs.vector import SegmentedFootBipedVector
 from ..gait.errors import SpringfootError
 
 
@@ -32,10 +32,12 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """First observations (N, D) of new episodes, with the seeds given to `seed` since the last reset."""
-        if any(self._options):
-            raise SpringfootError("the environment takes no reset options; settings are fixed when it is made")
-        observation, _ = self.env.reset(seed=self._seeds)
+        options = self._options[0]
+        if any(other != options for other in self._options):
+            raise SpringfootError("reset options must be the same for all: the batch is one simulation")
+        observation, _ = self.env.reset(seed=self._seeds, options=options or None)
         self._reset_seeds()
+        self._reset_options()
         self._returns[:], self._lengths[:] = 0.0, 0
         return observation
 
@@ -45,16 +47,18 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Observations (N, D), rewards (N,), dones (N,) and infos; ended episodes have begun anew."""
-        observation, reward, terminated, truncated, self.step_info = self.env.step(self._actions)
+        observation, reward, terminated, truncated, info = self.env.step(self._actions)
         done = terminated | truncated
         self._returns += reward
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        self.step_info = _values(info)
         if done.any():
-            final = self.step_info["final_info"]
+            final = _values(info["final_info"])
+            self.step_info = {name: np.where(done, last, info.get(name, last)) for name, last in final.items()}
             for i in np.flatnonzero(done):
-                infos[i] = {name: values[i].item() for name, values in final.items() if not name.startswith("_")} | {
-                    "terminal_observation": self.step_info["final_obs"][i],
+                infos[i] = {name: values[i] for name, values in final.items()} | {
+                    "terminal_observation": info["final_obs"][i],
                     "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
                     "episode": {"r": float(self._returns[i]), "l": int(self._lengths[i])},
                 }
@@ -93,3 +97,8 @@ class SegmentedFootBipedVecEnv(VecEnv):
     def _require_all(self, indices: VecEnvIndices, what: str) -> None:
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise SpringfootError(f"cannot {what} for some environments only: the batch is one simulation")
+
+
+def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:
+    """A vector environment's info without the masks and the last observations and infos."""
+    return {name: values for name, values in info.items() if not name.startswith(("_", "final_"))}

@@ -112,8 +112,8 @@ def changed(policy, path, header=None, tensors=None):
         ({}, {"layer.0.bias": np.full(64, np.nan, np.float32)}, "layer.0.bias must be finite"),
         ({}, {"layer.0.bias": np.zeros(64, np.int32)}, "layer.0.bias must be finite float"),
         ({}, {"layer.0.bias": np.zeros(63, np.float32)}, r"layer.0.bias must be \(64,\), is \(63,\)"),
-        ({}, {"layer.2.weight": None}, "layer.2.weight must be .* is nothing"),
-        ({}, {"layer.3.weight": np.zeros((4, 4), np.float32)}, "layer.3.weight must be nothing"),
+        ({}, {"layer.2.weight": None}, "layer.2.weight must be .* is absent"),
+        ({}, {"layer.3.weight": np.zeros((4, 4), np.float32)}, "layer.3.weight must be absent"),
     ],
 )
 def test_a_changed_file_is_refused_with_one_line(policy, tmp_path, header, tensors, words):

@@ -7,7 +7,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.envs.faces import SegmentedFootBipedVector
+from springfoot.envs.vector import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
 
 N = 6
@@ -20,14 +20,15 @@ def environments():
     made.close()
 
 
-def test_same_bits_as_the_vector_env_through_falls_and_time_limits(environments):
-    vector = SegmentedFootBipedVector(num_envs=N, autoreset_mode=AutoresetMode.SAME_STEP, episode_seconds=1.0)
+def test_same_bits_as_the_vector_env_through_falls_and_time_limits():
+    rough = {"episode_seconds": 1.0, "push_newton": 600.0, "push_interval": 1.0, "push_seconds": 0.3}
+    vector = SegmentedFootBipedVector(num_envs=N, autoreset_mode=AutoresetMode.SAME_STEP, **rough)
+    environments = SegmentedFootBipedVecEnv(N, num_threads=2, **rough)
     environments.seed(7)
     assert np.array_equal(environments.reset(), vector.reset(seed=7)[0])
     random, fell, timed_out = np.random.default_rng(0), 0, 0
     for _ in range(160):
         actions = random.uniform(-1, 1, (N, 4)).astype(np.float32)
-        actions[: N // 2] = -1.0  # the softest feet
         observation, reward, done, infos = environments.step(actions)
         expected, expected_reward, terminated, truncated, info = vector.step(actions)
         assert np.array_equal(observation, expected)
@@ -42,6 +43,7 @@ def test_same_bits_as_the_vector_env_through_falls_and_time_limits(environments)
                 assert infos[i]["termination"] == info["final_info"]["termination"][i]
     assert fell > 0 and timed_out > 0
     vector.close()
+    environments.close()
 
 
 def test_episode_statistics_add_up_from_reset_to_end(environments):
@@ -91,12 +93,19 @@ def test_attributes_and_methods_are_those_of_the_batch(environments):
         environments.get_attr("nothing")
 
 
-def test_reset_options_and_unknown_settings_are_refused(environments):
-    environments.set_options({"height": 1.8})
-    with pytest.raises(SpringfootError, match=r"no reset options"):
+def test_reset_options_reach_the_batch_once(environments):
+    environments.set_options({"start": 0.2})
+    first = environments.reset()
+    assert np.ptp(first, axis=0).max() < 1e-6  # one phase, no noise: all the same
+    assert np.ptp(environments.reset(), axis=0).max() > 0.1
+    environments.set_options([{"start": 0.2}, *[{}] * (N - 1)])
+    with pytest.raises(SpringfootError, match="same for all"):
         environments.reset()
     environments.set_options()
-    with pytest.raises(SpringfootError, match=r"hight"):
+
+
+def test_unknown_settings_are_refused():
+    with pytest.raises(SpringfootError, match="hight"):
         SegmentedFootBipedVecEnv(2, hight=1.8)
 
 

@@ -95,6 +95,7 @@ def test_state_is_all_there_is_to_a_learner(learner):
     for one in (learner, other):  # the same gradient step from the same samples
         samples = torch.as_tensor(np.random.default_rng(0).normal(size=(32, state["observation.mean"].size)))
         value, probability, _ = one.ppo.policy.evaluate_actions(samples.float(), torch.zeros(32, 4))
+        one.ppo.policy.optimizer.param_groups[0]["lr"] = 1e-3  # PPO sets it anew before each update
         one.ppo.policy.optimizer.zero_grad()
         (value.mean() + probability.mean()).backward()
         one.ppo.policy.optimizer.step()
