@@ -1,0 +1,393 @@
+"""The contracts of Gymnasium's Env and VectorEnv, and the same bits from both."""
+
+import re
+import subprocess
+import sys
+import warnings
+from dataclasses import fields
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from stable_baselines3.common.env_checker import check_env as check_env_sb3
+
+from springfoot.envs.faces import SegmentedFootBiped
+from springfoot.envs.model import ACTIONS
+from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from, settings_to_json
+from springfoot.envs.task import OBSERVATION
+from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.gait.errors import SpringfootError
+
+ID = "springfoot.envs:SegmentedFootBiped-v0"
+SHORT = {"episode_seconds": 0.8, "push_newton": 1200.0, "push_interval": 0.4, "start_noise": 0.05}
+"""Episodes that end both by falls and out of time within a few steps."""
+
+
+def rows_of(heading: str) -> list[list[str]]:
+    """Cells of the first table after `heading` in the Env's docstring, without its head."""
+    section = SegmentedFootBiped.__doc__.split(f"## {heading}\n")[1].split("\n    ## ")[0]
+    lines = [line.strip().strip("|") for line in section.splitlines() if line.strip().startswith("|")]
+    return [[cell.strip() for cell in line.split("|")] for line in lines[2:]]
+
+
+# The docstring is the specification -------------------------------------------------------------------------
+
+
+def test_docstring_lists_every_entry_of_the_observation():
+    env = SegmentedFootBiped()
+    rows = rows_of("Observation space")
+    assert [row[0] for row in rows] == [str(index) for index in range(len(rows))]
+    assert [row[1:] for row in rows] == [[e.name, e.unit, f"{e.low:g}", f"{e.high:g}", e.meaning] for e in OBSERVATION]
+    assert tuple(row[1] for row in rows) == env.biped.observation_names
+    np.testing.assert_array_equal(env.observation_space.low, [np.float32(row[3]) for row in rows])
+    np.testing.assert_array_equal(env.observation_space.high, [np.float32(row[4]) for row in rows])
+
+
+def test_docstring_lists_actions_rewards_and_arguments_with_their_values():
+    settings = BipedSettings()
+    ranges = {"ankle": settings.ankle_stiffness_range, "toe": settings.toe_stiffness_range}
+    actions = [[name, *(f"{k:g}" for k in ranges[name.split("_")[0]])] for name in ACTIONS]
+    assert [row[1:4] for row in rows_of("Action space")] == actions
+    assert {row[0]: float(row[1]) for row in rows_of("Rewards")} == DEFAULT_WEIGHTS
+    arguments = {row[0].strip("`"): row[1].strip("`").strip('"') for row in rows_of("Arguments")}
+    assert arguments == {field.name: str(getattr(settings, field.name)) for field in fields(settings)}
+
+
+def test_docstring_lists_every_key_of_info():
+    env = SegmentedFootBiped()
+    env.reset(seed=0)
+    info = env.step(np.zeros(4, np.float32))[-1]
+    text = SegmentedFootBiped.__doc__.split("## Info")[1].split("##")[0]
+    for key in info:
+        stem = re.sub(rf"/({'|'.join(ACTIONS)}|{'|'.join(DEFAULT_WEIGHTS)})$", "/", key)
+        assert f"`{stem}`" in text, key
+    assert all(isinstance(value, (float, str)) for value in info.values())
+
+
+# Env ----------------------------------------------------------------------------------------------------------
+
+
+def test_gymnasium_and_stable_baselines3_have_nothing_to_say():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gym.make(ID).unwrapped, skip_render_check=True)
+        check_env_sb3(SegmentedFootBiped(**SHORT))
+
+
+def test_spaces_are_float32_boxes_with_finite_bounds():
+    env = SegmentedFootBiped()
+    assert env.action_space == gym.spaces.Box(-1, 1, (4,), np.float32)
+    assert env.observation_space.dtype == np.float32
+    assert np.isfinite(env.observation_space.low).all() and np.isfinite(env.observation_space.high).all()
+
+
+@pytest.mark.parametrize("settings", [{}, SHORT, {"height": 1.4, "mass": 38.0, "equilibrium": "neutral"}])
+def test_observations_stay_inside_their_space(settings):
+    env = SegmentedFootBiped(**settings)
+    rng = np.random.default_rng(0)
+    observation, _ = env.reset(seed=0)
+    for _ in range(200):
+        assert observation in env.observation_space
+        observation, _, terminated, truncated, _ = env.step(rng.uniform(-1, 1, 4))
+        if terminated or truncated:
+            observation, _ = env.reset()
+
+
+def test_the_same_seed_gives_the_same_episode_and_another_seed_another():
+    def episode(seed):
+        env = SegmentedFootBiped(push_newton=100.0, push_interval=0.3)
+        observation, _ = env.reset(seed=seed)
+        return np.concatenate([observation] + [env.step(np.zeros(4))[0] for _ in range(30)])
+
+    np.testing.assert_array_equal(episode(3), episode(3))
+    assert not np.array_equal(episode(3), episode(4))
+
+
+def test_without_a_seed_the_generator_goes_on():
+    env = SegmentedFootBiped()
+    first, second = env.reset(seed=1)[0], env.reset()[0]
+    again, after = env.reset(seed=1)[0], env.reset()[0]
+    np.testing.assert_array_equal(first, again)
+    np.testing.assert_array_equal(second, after)
+    assert not np.array_equal(first, second)
+
+
+def test_start_option_sets_the_phase_of_one_episode():
+    env = SegmentedFootBiped()
+    phases = [env.reset(seed=0, options={"start": 0.25})[0], env.reset(seed=0)[0]]
+    index = env.biped.observation_names.index("phase_sin")
+    assert phases[0][index] == pytest.approx(1.0)
+    assert phases[1][index] != pytest.approx(1.0)
+
+
+def test_an_episode_ends_once_and_asks_for_reset():
+    env = SegmentedFootBiped(episode_seconds=0.1)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(4))[2:4] for _ in range(5)]
+    assert ends == [(False, False)] * 4 + [(False, True)]
+    with pytest.raises(SpringfootError, match=r"reset\(\)"):
+        env.step(np.zeros(4))
+
+
+def test_a_fall_terminates_with_its_reason_and_no_reward():
+    env = SegmentedFootBiped(push_newton=2000.0, push_interval=0.2)
+    env.reset(seed=0)
+    for _ in range(200):
+        _, reward, terminated, truncated, info = env.step(np.zeros(4))
+        if terminated:
+            break
+        assert info["termination"] == ""
+    assert terminated and not truncated
+    assert info["termination"].startswith("fell: ")
+    assert reward == 0.0
+    assert info["reward/alive"] == 0.0
+
+
+def test_reward_is_the_weighted_sum_of_the_terms_in_info():
+    env = gym.make(ID, reward_weights={"pose": 1.0, "grf": -0.5})
+    weights = DEFAULT_WEIGHTS | {"pose": 1.0, "grf": -0.5}
+    env.reset(seed=2)
+    for _ in range(20):
+        _, reward, terminated, _, info = env.step(env.action_space.sample())
+        assert not terminated
+        assert reward == pytest.approx(sum(weight * info[f"reward/{name}"] for name, weight in weights.items()))
+
+
+def test_actions_beyond_the_box_are_clipped():
+    observations = []
+    for action in (np.ones(4), np.full(4, 7.0)):
+        env = SegmentedFootBiped()
+        env.reset(seed=0)
+        observations.append(env.step(action)[0])
+    np.testing.assert_array_equal(*observations)
+
+
+BAD = [
+    (lambda: SegmentedFootBiped(render_mode="ascii"), "render_mode"),
+    (lambda: SegmentedFootBiped(heigth=1.8), "height"),
+    (lambda: SegmentedFootBiped().step(np.zeros(4)), "reset"),
+    (lambda: started(SegmentedFootBiped()).step(np.zeros(3)), r"\(4,\)"),
+    (lambda: started(SegmentedFootBiped()).step(np.full(4, np.nan)), "finite"),
+    (lambda: SegmentedFootBiped().reset(options={"stat": 0.2}), "start"),
+    (lambda: SegmentedFootBiped().reset(options={"start": 1.2}), r"\[0, 1\)"),
+    (lambda: SegmentedFootBiped().render(), "render_mode"),
+    (lambda: SegmentedFootBipedVector(0), "num_envs"),
+    (lambda: SegmentedFootBipedVector(2, num_threads=0), "num_threads"),
+    (lambda: SegmentedFootBipedVector(2, autoreset_mode="never"), "'NextStep', 'SameStep', 'Disabled'"),
+    (lambda: SegmentedFootBipedVector(2, max_episode_steps=0), "max_episode_steps"),
+    (lambda: SegmentedFootBipedVector(2).step(np.zeros((2, 4))), "environments 0, 1"),
+    (lambda: started(SegmentedFootBipedVector(2)).step(np.zeros((3, 4))), r"\(2, 4\)"),
+    (lambda: started(SegmentedFootBipedVector(2)).step(np.full((2, 4), np.nan)), "finite"),
+    (lambda: SegmentedFootBipedVector(2).reset(seed=[1, 2, 3]), "3 seeds"),
+    (lambda: SegmentedFootBipedVector(2).reset(options={"reset_mask": [True, False]}), "reset_mask"),
+    (lambda: SegmentedFootBipedVector(2).reset(options={"reset_mask": np.zeros(2, bool)}), "at least one"),
+]
+
+
+def started(env):
+    env.reset(seed=0)
+    return env
+
+
+@pytest.mark.parametrize(("attempt", "words"), BAD)
+def test_what_is_not_allowed_is_refused_in_one_clear_line(attempt, words):
+    with pytest.raises(SpringfootError, match=words) as caught:
+        attempt()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_refused_action_steps_nothing():
+    env, twin = started(SegmentedFootBiped()), started(SegmentedFootBiped())
+    with pytest.raises(SpringfootError):
+        env.step(np.full(4, np.nan))
+    np.testing.assert_array_equal(env.step(np.zeros(4))[0], twin.step(np.zeros(4))[0])
+
+
+# Registration -------------------------------------------------------------------------------------------------
+
+
+def test_a_spec_holds_its_settings_as_json_and_makes_the_same_environment():
+    env = gym.make(ID, height=1.5, mass=50.0, ankle_stiffness_range=(30.0, 600.0), reward_weights={"pose": 0.4})
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.settings == env.unwrapped.settings
+    np.testing.assert_array_equal(env.reset(seed=5)[0], again.reset(seed=5)[0])
+    vector = gym.make_vec(ID, num_envs=2, autoreset_mode="SameStep", height=1.5)
+    again = gym.make_vec(gym.envs.registration.EnvSpec.from_json(vector.spec.to_json()))
+    assert (again.num_envs, again.unwrapped.settings.height) == (2, 1.5)
+    assert again.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+def test_every_setting_is_an_argument_of_make():
+    values = settings_to_json(settings_from(height=1.6, mass=55.0, equilibrium="neutral", start=0.3))
+    assert settings_to_json(gym.make(ID, **values).unwrapped.settings) == values
+
+
+@pytest.mark.parametrize("make", [gym.make, lambda *a, **k: gym.make_vec(*a, num_envs=1, **k)])
+def test_max_episode_steps_truncates(make):
+    env = make(ID, max_episode_steps=7)
+    env.reset(seed=0)
+    truncated = [bool(env.step(np.zeros(env.action_space.shape, np.float32))[3]) for _ in range(7)]
+    assert truncated == [False] * 6 + [True]
+
+
+# VectorEnv ----------------------------------------------------------------------------------------------------
+
+SEED, STEPS, NUM = 11, 200, 4
+
+
+def same_info(ours: dict, theirs: dict) -> None:
+    assert set(ours) == set(theirs)
+    for key, value in theirs.items():
+        if isinstance(value, dict):
+            same_info(ours[key], value)
+        elif value.dtype == object:
+            for mine, other in zip(ours[key], value, strict=True):
+                np.testing.assert_array_equal(mine, other, err_msg=key)
+        else:
+            assert ours[key].dtype == value.dtype, key
+            np.testing.assert_array_equal(ours[key], value, err_msg=key)
+
+
+@pytest.mark.parametrize("num_threads", [1, 2])
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_a_vector_gives_the_same_bits_as_gymnasium_s_loop_over_environments(mode, num_threads):
+    ours = SegmentedFootBipedVector(NUM, autoreset_mode=mode, num_threads=num_threads, **SHORT)
+    theirs = SyncVectorEnv([lambda: SegmentedFootBiped(**SHORT)] * NUM, autoreset_mode=mode)
+    rng = np.random.default_rng(0)
+    falls = timeouts = 0
+    (seen, info), (expected, expected_info) = ours.reset(seed=SEED), theirs.reset(seed=SEED)
+    for _ in range(STEPS):
+        np.testing.assert_array_equal(seen, expected)
+        assert seen.dtype == expected.dtype
+        same_info(info, expected_info)
+        actions = rng.uniform(-1, 1, (NUM, 4)).astype(np.float32)
+        seen, *rest, info = ours.step(actions)
+        expected, *expected_rest, expected_info = theirs.step(actions)
+        for mine, other in zip(rest, expected_rest, strict=True):
+            assert mine.dtype == other.dtype
+            np.testing.assert_array_equal(mine, other)
+        _, terminated, truncated = rest
+        falls, timeouts = falls + terminated.sum(), timeouts + truncated.sum()
+        ended = terminated | truncated
+        if mode is AutoresetMode.DISABLED and ended.any():
+            np.testing.assert_array_equal(seen, expected)
+            same_info(info, expected_info)
+            seen, info = ours.reset(options={"reset_mask": ended})
+            expected, expected_info = theirs.reset(options={"reset_mask": ended})
+    assert falls > 5 and timeouts > 5
+
+
+def test_next_step_ignores_the_action_and_returns_the_new_start():
+    env = SegmentedFootBipedVector(2, episode_seconds=0.1)
+    env.reset(seed=0)
+    for _ in range(5):
+        _, _, _, truncated, _ = env.step(np.zeros((2, 4)))
+    assert truncated.all()
+    observation, reward, terminated, truncated, info = env.step(np.full((2, 4), np.nan))
+    assert not reward.any() and not terminated.any() and not truncated.any()
+    assert info == {}
+    loads = [index for index, name in enumerate(env.biped.observation_names) if name.startswith("load")]
+    assert not observation[:, loads].any()
+
+
+def test_same_step_gives_the_true_last_observation():
+    env = SegmentedFootBipedVector(3, autoreset_mode="SameStep", episode_seconds=0.2)
+    twin = SegmentedFootBiped(episode_seconds=0.2)
+    env.reset(seed=4)
+    twin.reset(seed=5)
+    for _ in range(10):
+        observation, _, _, truncated, info = env.step(np.zeros((3, 4)))
+        last, _, _, _, last_info = twin.step(np.zeros(4))
+    assert truncated.all() and info["_final_obs"].all()
+    np.testing.assert_array_equal(info["final_obs"][1], last)
+    assert info["final_info"]["time"][1] == last_info["time"] == pytest.approx(0.2)
+    assert not np.array_equal(observation[1], last)
+
+
+def test_disabled_refuses_to_step_what_was_not_reset_and_leaves_the_others_alone():
+    env = SegmentedFootBipedVector(2, autoreset_mode="Disabled", episode_seconds=0.1)
+    env.reset(seed=0)
+    for _ in range(5):
+        observation, *_ = env.step(np.zeros((2, 4)))
+    with pytest.raises(SpringfootError, match="environments 0, 1"):
+        env.step(np.zeros((2, 4)))
+    after, _ = env.reset(options={"reset_mask": np.array([True, False])})
+    np.testing.assert_array_equal(after[1], observation[1])
+    assert not np.array_equal(after[0], observation[0])
+    with pytest.raises(SpringfootError, match="environments 1:"):
+        env.step(np.zeros((2, 4)))
+
+
+def test_seeds_may_be_one_for_each_environment():
+    env = SegmentedFootBipedVector(3)
+    observation, _ = env.reset(seed=[7, 3, 7])
+    np.testing.assert_array_equal(observation[0], observation[2])
+    np.testing.assert_array_equal(observation[1], SegmentedFootBiped().reset(seed=3)[0])
+    assert env.np_random_seed == (7, 3, 7)
+    assert len(env.np_random) == 3
+
+
+def test_what_a_vector_returns_is_the_caller_s_to_keep():
+    env = SegmentedFootBipedVector(2)
+    kept = [env.reset(seed=0)]
+    copies = [kept[0][0].copy()]
+    for _ in range(3):
+        kept.append(env.step(np.zeros((2, 4))))
+        copies.append(kept[-1][0].copy())
+    infos = {key: value.copy() for key, value in kept[1][-1].items()}
+    env.step(np.ones((2, 4)))
+    for result, copy in zip(kept, copies, strict=True):
+        np.testing.assert_array_equal(result[0], copy)
+    same_info(kept[1][-1], infos)
+    arrays = [array for result in kept[1:] for array in (*result[:4], *result[4].values())]
+    shared = [(i, j) for i, a in enumerate(arrays) for j, b in enumerate(arrays[:i]) if np.shares_memory(a, b)]
+    assert not shared
+
+
+def test_each_vector_has_its_own_metadata():
+    disabled, default = SegmentedFootBipedVector(1, autoreset_mode="Disabled"), SegmentedFootBipedVector(1)
+    assert disabled.metadata["autoreset_mode"] is disabled.autoreset_mode is AutoresetMode.DISABLED
+    assert default.metadata["autoreset_mode"] is default.autoreset_mode is AutoresetMode.NEXT_STEP
+    assert "autoreset_mode" not in SegmentedFootBiped.metadata
+
+
+def test_make_vec_uses_the_batch_and_warns_of_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gym.make_vec(ID, num_envs=3, num_threads=2, speed=1.1)
+    assert isinstance(env.unwrapped, SegmentedFootBipedVector)
+    assert env.observation_space.shape == (3, len(OBSERVATION))
+    env.close()
+
+
+# Rendering ----------------------------------------------------------------------------------------------------
+
+RENDER = """
+import sys
+import numpy as np
+from springfoot.envs.faces import SegmentedFootBiped
+from springfoot.gait.errors import SpringfootError
+env = SegmentedFootBiped(render_mode="rgb_array")
+env.reset(seed=0)
+try:
+    frame = env.render()
+except SpringfootError as error:
+    print("hint" if "MUJOCO_GL" in str(error) else error)
+else:
+    env.step(np.zeros(4))
+    moved = env.render()
+    print("frame" if frame.shape == (480, 640, 3) and frame.std() > 5 and (moved != frame).any() else "blank")
+env.step(np.zeros(4))
+env.close()
+env.close()
+"""
+
+
+@pytest.mark.parametrize(("gl", "allowed"), [("disabled", ["hint"]), ("egl", ["frame", "hint"])])
+def test_rendering_gives_a_frame_or_says_what_to_install(gl, allowed, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", gl)
+    result = subprocess.run([sys.executable, "-c", RENDER], capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip() in allowed
