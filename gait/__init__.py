@@ -3,5 +3,6 @@
 from .body import GRAVITY, Body
 from .errors import SpringfootError
 from .human import HumanGait, human_gait
+from .plan import WalkPlan, plan_walk
 
-__all__ = ["GRAVITY", "Body", "HumanGait", "SpringfootError", "human_gait"]
+__all__ = ["GRAVITY", "Body", "HumanGait", "SpringfootError", "WalkPlan", "human_gait", "plan_walk"]

@@ -1,0 +1,141 @@
+"""Where a foot is over its stride: heel, ankle and toe rockers on the ground, then the swing.
+
+All positions are in the foot's own frame: x [m] forward of where its ankle is while the foot is flat, z [m] up from
+the floor. Pitch [rad] is positive toes up. Stride phase 0 is this foot's heel strike, 1 its next, two steps further on.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from .body import Body
+
+HEEL_ROCKER_POWER = 2
+"""The foot comes down from its heel-strike pitch as the square of what is left of the heel rocker."""
+TOE_ROCKER_POWER = 2.12
+"""The heel rises with this power of the time since heel-off."""
+
+# The swing passes two via points, a third and two thirds through it, and leaves and lands at the rockers' position,
+# velocity and acceleration. Found by least squares against people's thigh and knee curves at 0.8 to 1.8 m/s.
+VIA = (1 / 3, 2 / 3)
+"""Parts of the swing at which the via points lie."""
+VIA_FORWARD = (0.237, 0.693)
+"""Ankle forward, of its way from toe-off to heel strike."""
+VIA_UP = (0.225, 0.104)
+"""Ankle above the floor [m], at 1.70 m."""
+VIA_PITCH = (-1.0, -0.183)
+"""Pitch [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootPath:
+    """One foot's path over its stride."""
+
+    body: Body
+    step_length: float
+    """Heel strike to heel strike of the other foot [m]."""
+    foot_flat: float
+    """Stride phase at which the heel rocker ends."""
+    heel_off: float
+    """Stride phase at which the toe rocker begins."""
+    toe_off: float
+    """Stride phase at which the toe leaves the ground."""
+    heel_strike_pitch: float
+    """Foot to ground at heel strike [rad] (thesis q_f)."""
+    toe_off_pitch: float
+    """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
+
+    def pitch(self, stride_phase: ArrayLike) -> NDArray:
+        """Foot to ground [rad], toes up positive, 0 from foot flat to heel-off."""
+        return self._jet(stride_phase)[2]
+
+    def ankle(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Ankle axis (x, z) [m]."""
+        x, z, _ = self._jet(stride_phase)
+        return x, z
+
+    def toe_joint(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Toe joint (x, z) [m]; exactly at its standing place from foot flat to toe-off."""
+        phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        x, z, pitch = self._jet(phase)
+        forward, up = turned(pitch, self.body.ankle_to_toe_joint, -self._drop)
+        planted = (phase >= self.foot_flat) & (phase <= self.toe_off)
+        return (
+            np.where(planted, self.body.ankle_to_toe_joint, x + forward),
+            np.where(planted, self.body.toe_joint_height, z + up),
+        )
+
+    def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Back of the heel at the sole (x, z) [m]; on the floor from heel strike to heel-off."""
+        x, z, pitch = self._jet(stride_phase)
+        back, down = turned(pitch, -self.body.heel_to_ankle, -self.body.ankle_height)
+        return x + back, z + down
+
+    def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
+        """Ball of the foot above the floor [m]: the toe joint above its standing height."""
+        return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
+
+    def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Rear and front end (x, x) [m] of what is on the ground in stance: heel, sole, then toe joint to toe tip."""
+        phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        heel, joint = -self.body.heel_to_ankle, self.body.ankle_to_toe_joint
+        return np.where(phase <= self.heel_off, heel, joint), np.where(
+            phase >= self.foot_flat, joint + self.body.toe_length, heel
+        )
+
+    @property
+    def _drop(self) -> float:
+        """Toe joint below the ankle in a flat foot [m]."""
+        return self.body.ankle_height - self.body.toe_joint_height
+
+    def _jet(self, stride_phase: ArrayLike) -> NDArray:
+        """(x, z, pitch) of the ankle at any phases."""
+        phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        heel = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]
+        toe = self._toe_rocker(np.clip(phase, self.heel_off, self.toe_off))[0]
+        swing = np.moveaxis(self._swing(np.maximum(phase, self.toe_off)), -1, 0)
+        return np.where(phase < self.foot_flat, heel, np.where(phase <= self.toe_off, toe, swing))
+
+    def _heel_rocker(self, phase: ArrayLike) -> NDArray:
+        left, power = 1 - np.asarray(phase) / self.foot_flat, HEEL_ROCKER_POWER
+        pitch = self.heel_strike_pitch * left**power
+        rate = -self.heel_strike_pitch * power / self.foot_flat * left ** (power - 1)
+        curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * left ** (power - 2)
+        return _rolling(pitch, rate, curvature, (-self.body.heel_to_ankle, 0.0), self.body)
+
+    def _toe_rocker(self, phase: ArrayLike) -> NDArray:
+        lasts, power = self.toe_off - self.heel_off, TOE_ROCKER_POWER
+        done = (np.asarray(phase) - self.heel_off) / lasts
+        pitch = -self.toe_off_pitch * done**power
+        rate = -self.toe_off_pitch * power / lasts * done ** (power - 1)
+        curvature = -self.toe_off_pitch * power * (power - 1) / lasts**2 * done ** (power - 2)
+        return _rolling(pitch, rate, curvature, (self.body.ankle_to_toe_joint, self.body.toe_joint_height), self.body)
+
+    @cached_property
+    def _swing(self) -> BSpline:
+        """(x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously differentiable."""
+        start, end = self._toe_rocker(self.toe_off), self._heel_rocker(0.0)
+        end[0, 0] += 2 * self.step_length
+        forward = start[0, 0] + np.array(VIA_FORWARD) * (end[0, 0] - start[0, 0])
+        via = np.stack([forward, np.array(VIA_UP) * self.body.length_scale, VIA_PITCH], -1)
+        knots = self.toe_off + np.array([0.0, *VIA, 1.0]) * (1 - self.toe_off)
+        ends = ([(1, start[1]), (2, start[2])], [(1, end[1]), (2, end[2])])
+        return make_interp_spline(knots, np.stack([start[0], *via, end[0]]), k=5, bc_type=ends)
+
+
+def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:
+    """The vector (forward, up) of a flat foot, in a foot at `pitch`."""
+    return forward * np.cos(pitch) - up * np.sin(pitch), forward * np.sin(pitch) + up * np.cos(pitch)
+
+
+def _rolling(pitch: NDArray, rate: NDArray, curvature: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
+    """(3, 3, ...): value and two phase derivatives of ankle x, ankle z and pitch of a foot turning about `pivot`."""
+    arm = -pivot[0], body.ankle_height - pivot[1]
+    x, z = turned(pitch, *arm)
+    position = np.stack([pivot[0] + x, pivot[1] + z, pitch])
+    velocity = np.stack([-z * rate, x * rate, rate])
+    acceleration = np.stack([-z * curvature - x * rate**2, x * curvature - z * rate**2, curvature])
+    return np.stack([position, velocity, acceleration])
