@@ -1,12 +1,13 @@
 """From contact force to the gait cycle: heel strikes, toe-offs, strides, curves over percent of stride."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 CONTACT_THRESHOLD_BW = 0.05
-"""A foot is on the ground above this vertical force [body weights]: 31 N at 63 kg, the usual 20 to 30 N of force plates."""
+"""A foot is on the ground above this vertical force [body weights]: 31 N at 63 kg (force plates: 20 to 30 N)."""
 SHORTEST_CONTACT = 0.10
 """Contacts shorter than this [s] are scuffs of the swinging foot, not stance (people's is 0.5 s and more)."""
 SHORTEST_FLIGHT = 0.06
@@ -98,7 +99,7 @@ def _without_short_runs(flags: NDArray, value: bool, shortest: float) -> NDArray
     edges = np.flatnonzero(flags[:-1] != flags[1:]) + 1
     bounds = np.concatenate([[0], edges, [len(flags)]])
     result = flags.copy()
-    for start, stop in zip(bounds[1:-2], bounds[2:-1], strict=True):
+    for start, stop in pairwise(bounds[1:-1]):
         if flags[start] == value and stop - start < shortest:
             result[start:stop] = not value
     return result

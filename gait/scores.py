@@ -6,6 +6,8 @@ between them lie at every walking speed.
 """
 
 from dataclasses import dataclass
+from math import isfinite
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,10 +34,11 @@ def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
 
 def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
     """Pearson's r of two curves; None if either is constant."""
-    a, b = (np.asarray(values, float) - np.mean(values) for values in (curve, reference))
-    scale = np.sqrt(np.sum(a * a) * np.sum(b * b))
+    a, b = (np.asarray(values, float) for values in (curve, reference))
     # A constant curve keeps rounding errors of 1e-16 of its mean, which must not pass for a shape.
-    floor = 1e-12 * np.sqrt(np.sum(np.square(curve)) * np.sum(np.square(reference)))
+    floor = 1e-12 * np.sqrt(np.sum(a * a) * np.sum(b * b))
+    a, b = a - np.mean(a), b - np.mean(b)
+    scale = np.sqrt(np.sum(a * a) * np.sum(b * b))
     return _number(np.sum(a * b) / scale) if scale > floor else None
 
 
@@ -132,5 +135,6 @@ def _window(curve: NDArray, percent: tuple[int, int]) -> NDArray:
     return curve[percent[0] : percent[1] + 1]
 
 
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _number(value: SupportsFloat) -> float | None:
+    number = float(value)
+    return number if isfinite(number) else None

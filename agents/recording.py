@@ -1,0 +1,191 @@
+"""Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.envs.model import ANKLE
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
+from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import SpringfootError
+
+from .bundle import load_policy
+from .schedules import BASELINES, Policy, baseline, own_settings
+
+if TYPE_CHECKING:
+    from springfoot.envs.biped import Tick
+
+CONDITIONS = {
+    "height": REFERENCE_HEIGHT,
+    "mass": REFERENCE_MASS,
+    "speed": 1.2,
+    "push_newton": 0.0,
+    "start_noise": 0.0,
+}
+"""What every evaluation has unless told otherwise, whatever the policy was trained on."""
+TICK = 0.01
+"""Time between two samples [s]."""
+BATCH = 32
+"""Episodes simulated side by side."""
+
+SERIES: dict[str, Callable[["Tick"], NDArray]] = {
+    "root": lambda tick: tick.measurement.root,  # (3,) hip x [m], hip z [m], trunk pitch [rad]
+    "angle": lambda tick: tick.measurement.angle,  # (side, joint) [rad]
+    "velocity": lambda tick: tick.measurement.velocity,  # (side, joint) [rad/s]
+    "torque": lambda tick: tick.measurement.torque,  # (side, joint) actuator torque [N m]
+    "passive_torque": lambda tick: tick.passive_torque,  # (side, joint) joint damping [N m]
+    "com": lambda tick: tick.measurement.com,  # (x, z) [m]
+    "com_velocity": lambda tick: tick.measurement.com_velocity,  # (x, z) [m/s]
+    "com_reference": lambda tick: tick.com_reference,  # (x, z) where the plan wants it now [m]
+    "ankle": lambda tick: tick.measurement.ankle,  # (side, (x, z)) ankle axes [m]
+    "contact": lambda tick: tick.measurement.contact,  # (side, contact, (x, z)) lowest points [m]
+    "force": lambda tick: tick.measurement.force,  # (side, contact, (forward, up)) mean of the tick [N]
+    "phase": lambda tick: tick.phase,  # (side,) of the leg controller [0, 1)
+    "stiffness": lambda tick: tick.stiffness[..., ANKLE:],  # (side, (ankle, toe)) [N m/rad]
+    "equilibrium": lambda tick: tick.equilibrium[..., ANKLE:],  # (side, (ankle, toe)) [rad]
+}
+"""Name -> what is taken of a tick. Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.model`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """E episodes of up to T ticks of 10 ms; sample k stands at its end, (k + 1) * 10 ms; forces are its mean."""
+
+    policy: str
+    """What was run."""
+    settings: BipedSettings
+    """The environment it was run in."""
+    seed: int
+    """Episode i was seeded with seed + i."""
+    ticks: NDArray
+    """(E,) samples of each episode; series hold NaN beyond."""
+    returns: NDArray
+    """(E,) sum of the reward over each episode."""
+    fall_reason: NDArray
+    """(E,) why an episode ended early, "" where it did not."""
+    plan_com: NDArray
+    """(101, 2) planned CoM over percent of the step: x from the ankle of the foot whose stance began last, z [m]."""
+    series: dict[str, NDArray]
+    """Name -> (E, T, ...) float32, as listed in `SERIES`."""
+
+    def save(self, path: Path) -> None:
+        """Write `strides.npz`: the series and, as JSON text, policy, settings and seed. No object arrays."""
+        header = {"policy": self.policy, "settings": settings_to_json(self.settings), "seed": self.seed}
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com")}
+        np.savez(path, header=np.array(json.dumps(header)), **(arrays | self.series))
+
+
+def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, BipedSettings]:
+    """A policy by name and the environment it is evaluated in.
+
+    Args:
+        name: a .safetensors file, a run folder (its best policy), `pretrained`, or a baseline of `schedules`.
+        given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
+        seed: of the baseline `random`.
+
+    Raises `SpringfootError` for an unknown name or a bad setting.
+    """
+    wanted = CONDITIONS | given
+    if name.partition(":")[0] in BASELINES:
+        settings = settings_from(**(own_settings(name, wanted["height"], wanted["mass"]) | wanted))
+        return baseline(name, settings, seed), settings
+    if name != "pretrained" and not Path(name).exists():
+        known = ", ".join(["pretrained", *BASELINES])
+        raise SpringfootError(f"no policy {name!r}: give a .safetensors file, a run folder, or one of {known}")
+    policy = load_policy(name)
+    return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
+
+
+def load_recording(path: Path) -> Recording:
+    """The recording in a `strides.npz`; raises `SpringfootError` for any other file."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        header: dict[str, Any] = json.loads(str(arrays.pop("header")))
+        series = {name: arrays.pop(name) for name in SERIES}
+        settings = settings_from(**header.pop("settings"))
+        return Recording(**header, settings=settings, series=series, **arrays)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py: {error}") from None
+
+
+def record(
+    policy: Policy,
+    settings: BipedSettings,
+    *,
+    name: str,
+    episodes: int = 20,
+    seed: int = 0,
+    threads: int = 2,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> Recording:
+    """Run `episodes` episodes of `settings.episode_seconds` each, episode i seeded with `seed` + i.
+
+    Args:
+        policy: deterministic, observations to actions.
+        settings: of the environment.
+        name: what the policy is called in reports.
+        episodes: how many.
+        seed: of the first.
+        threads: of the physics; any number gives the same bits.
+        progress: told the simulated time [s] of all episodes together after every step.
+    """
+    from springfoot.envs.biped import Biped  # compiles MuJoCo models: not needed to read a recording
+
+    length = ceil(round(settings.episode_seconds / TICK, 6))
+    length += length % 2  # an action lasts two ticks
+    ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
+    reason = np.full(episodes, "", dtype="U64")
+    series: dict[str, NDArray] = {}
+    plan_com = np.empty((len(PERCENT), 2))
+    for first in range(0, episodes, BATCH):
+        rows = slice(first, min(first + BATCH, episodes))
+        count = rows.stop - first
+        biped = Biped(settings, num_envs=count, num_threads=threads)
+        biped.reset(np.arange(count), [seed + first + i for i in range(count)])
+        plan_com = planned_com(biped.plan)
+
+        def keep(tick: "Tick", rows: slice = rows) -> None:
+            index = int(ticks[rows].max())
+            for key, take in SERIES.items():
+                value = take(tick)
+                if key not in series:
+                    series[key] = np.full((episodes, length, *value.shape[1:]), np.nan, np.float32)
+                series[key][rows, index] = np.where(tick.active.reshape(-1, *[1] * (value.ndim - 1)), value, np.nan)
+            ticks[rows] += tick.active
+
+        biped.on_tick = keep
+        active = np.ones(count, bool)
+        observation = biped.observe()
+        while active.any():
+            outcome = biped.step(policy(observation), active=active)
+            observation = outcome.observation
+            returns[rows][active] += outcome.reward[active]
+            fell = active & outcome.terminated
+            reason[rows][fell] = outcome.info["termination"][fell]
+            progress(float(active.sum()) * biped.dt)
+            active &= ~(outcome.terminated | outcome.truncated)
+    return Recording(
+        policy=name,
+        settings=settings,
+        seed=seed,
+        ticks=ticks,
+        returns=returns,
+        fall_reason=reason,
+        plan_com=plan_com,
+        series=series,
+    )
+
+
+def planned_com(plan: Any) -> NDArray:
+    """(101, 2) CoM of a `WalkPlan` over percent of the step: x from the stance ankle, z [m]."""
+    # Percent 100 is the end of this step, not the beginning of the next.
+    step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
+    return np.stack(plan.com(step_phase), -1)

@@ -1,0 +1,117 @@
+"""Policies that nobody trained: what a learned one has to beat.
+
+Each is, like a trained policy, a function of observations (N, D) giving actions (N, 4) in [-1, 1]. They set stiffness
+in N m/rad through the inverse of the environment's own log scale, hence need `action_mode="absolute"`.
+"""
+
+from collections.abc import Callable
+from math import inf, nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from springfoot.envs.actuation import action_of
+from springfoot.envs.equilibrium import fixed_stiffness
+from springfoot.envs.legs import leg_constants
+from springfoot.envs.model import ACTIONS
+from springfoot.envs.phase import GRID, PhaseTable
+from springfoot.envs.settings import BipedSettings
+from springfoot.envs.task import OBSERVATION
+from springfoot.gait.body import Body
+from springfoot.gait.errors import SpringfootError
+from springfoot.gait.stiffness import StiffnessSchedule, thesis_schedule
+
+Policy = Callable[[NDArray], NDArray]
+
+CONSTANT_STIFFNESS = (300.0, 40.0)
+"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg."""
+
+_SIN, _COS = ([entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos"))
+
+
+def leg_phase(observation: NDArray) -> NDArray:
+    """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike, read from observations (N, D)."""
+    left = np.arctan2(observation[:, _SIN], observation[:, _COS], dtype=float) / (2 * np.pi) % 1.0
+    return np.stack([left, (left + 0.5) % 1.0], -1)
+
+
+def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> Policy:
+    """The same ankle and toe stiffness always: (ankle, toe) [N m/rad], for 1.70 m and 63 kg, scaled with the body."""
+    body = Body(settings.height, settings.mass)
+    scaled = np.asarray(stiffness, float) * body.mass_scale * body.length_scale
+    action = np.tile(_absolute(scaled, settings, body), 2)
+    return lambda observation: np.tile(action, (len(observation), 1))
+
+
+def untrained(settings: BipedSettings) -> Policy:
+    """What training starts from: mean action 0, the middle of the (log) stiffness range."""
+    return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
+
+
+def uniform(settings: BipedSettings, seed: int = 0) -> Policy:
+    """Every action anew from the whole range; the generator starts from `seed` and goes on from call to call."""
+    generator = np.random.default_rng(seed)
+    return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
+
+
+def schedule(settings: BipedSettings) -> Policy:
+    """The fixed stiffness over the stride that came out of the leg tuning."""
+    body = Body(settings.height, settings.mass)
+    table = fixed_stiffness(leg_constants(settings.equilibrium, settings.cadence), body)
+    return _follow(table, settings, body)
+
+
+def thesis(settings: BipedSettings) -> Policy:
+    """The thesis's straight lines between gait events; wants `equilibrium="phase"` with the same schedule."""
+    body = Body(settings.height, settings.mass)
+    stored = settings.schedule
+    lines = thesis_schedule(body) if stored is None else StiffnessSchedule.from_json(stored)
+    return _follow(lines.at(GRID)[0], settings, body)
+
+
+def _follow(stiffness: NDArray, settings: BipedSettings, body: Body) -> Policy:
+    """The policy that sets (samples, (ankle, toe)) [N m/rad] over the stride at each leg's phase."""
+    actions = PhaseTable(_absolute(stiffness, settings, body)[None])
+    return lambda observation: actions.at(leg_phase(observation)).reshape(len(observation), -1).astype(np.float32)
+
+
+def _absolute(stiffness: NDArray, settings: BipedSettings, body: Body) -> NDArray:
+    if settings.action_mode != "absolute":
+        raise SpringfootError("a stiffness schedule or constant needs action_mode 'absolute', got 'residual'")
+    return action_of(stiffness, settings, body).astype(np.float32)
+
+
+BASELINES = ("untrained", "random", "constant", "schedule", "thesis")
+"""Names of the baselines; `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad]."""
+
+
+def baseline(name: str, settings: BipedSettings, seed: int = 0) -> Policy:
+    """A baseline by name, in the environment of `settings`; `seed` is that of `random`."""
+    kind, colon, numbers = name.partition(":")
+    if colon and kind != "constant":
+        raise SpringfootError(f"only constant takes numbers, as in constant:300,40, got {name!r}")
+    if kind == "constant":
+        return constant(settings, _stiffness_from(numbers) if colon else CONSTANT_STIFFNESS)
+    if kind == "random":
+        return uniform(settings, seed)
+    if kind in BASELINES:
+        return {"untrained": untrained, "schedule": schedule, "thesis": thesis}[kind](settings)
+    raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
+
+
+def own_settings(name: str, height: float, mass: float) -> dict[str, Any]:
+    """The environment settings that a baseline brings with it, for a body of `height` [m] and `mass` [kg]."""
+    if name != "thesis":
+        return {}
+    return {"equilibrium": "phase", "schedule": thesis_schedule(Body(height, mass)).to_json()}
+
+
+def _stiffness_from(text: str) -> tuple[float, float]:
+    try:
+        ankle, toe = map(float, text.split(","))
+    except ValueError:
+        ankle = toe = nan
+    if not (0 < ankle < inf and 0 < toe < inf):
+        raise SpringfootError(f"constant takes two positive stiffnesses, as in constant:300,40, got {text!r}")
+    return ankle, toe

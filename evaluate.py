@@ -1,0 +1,113 @@
+"""Evaluate a policy: `python evaluate.py pretrained`, `python evaluate.py runs/walk --episodes 100`."""
+
+import shutil
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from springfoot.agents.config import SettingsFlags, given
+from springfoot.gait.errors import SpringfootError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flags:
+    """How human is the walk? Runs a policy, prints its gait beside people's, writes numbers and pictures.
+
+    A fall is a result: the exit code is 0 with falls, 2 for bad input.
+    """
+
+    policy: tyro.conf.Positional[str]
+    """A .safetensors file, a run folder (its best policy), or one of: pretrained, untrained, random,
+    constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning), thesis."""
+    episodes: int = 20
+    """How many episodes."""
+    seconds: float = 20.0
+    """Length of each; --episode-seconds means the same."""
+    seed: int = 0
+    """Episode i is seeded with seed + i."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/eval-POLICY-N)")] = (
+        None
+    )
+    """New folder for the results."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
+    """What to walk in. A trained policy brings its own settings, height, mass, speed, pushes and start noise aside."""
+
+
+def main() -> int:
+    """Exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C."""
+    flags = tyro.cli(Flags)
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
+    try:
+        run(flags)
+    except (SpringfootError, OSError) as error:
+        print(f"evaluate.py: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def run(flags: Flags) -> None:
+    """Evaluates, prints the table and says where the results lie."""
+    for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
+        if getattr(flags, name) < least:
+            raise SpringfootError(f"{name} must be a whole number >= {least}, got {getattr(flags, name)}")
+    label = policy_label(flags.policy)
+    out = flags.out or next_free(Path("runs"), f"eval-{label}")
+    if out.exists():
+        raise SpringfootError(f"{out} exists already; give --out a new folder")
+    from springfoot.agents import evaluation, recording, report  # bad flags are told without waiting for imports
+
+    settings = {"episode_seconds": flags.seconds} | given(flags.environment)
+    policy, environment = recording.prepare(flags.policy, settings, flags.seed)
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        total = flags.episodes * environment.episode_seconds
+        with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
+            episodes = recording.record(
+                policy,
+                environment,
+                name=label,
+                episodes=flags.episodes,
+                seed=flags.seed,
+                threads=flags.threads,
+                progress=bar.update,
+            )
+        gait = evaluation.measure(episodes)
+        report.write_report(part, episodes, gait)
+        part.chmod(0o755)  # mkdtemp makes it private
+        part.rename(out)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    report.print_table(gait.metrics)
+    print(f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif)")
+
+
+def policy_label(name: str) -> str:
+    """What a policy is called in results: its name, its run's, or its file's; without folders."""
+    path = Path(name)
+    if path.suffix != ".safetensors":
+        return path.resolve().name.replace(":", "-").replace(",", "-")
+    return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem
+
+
+def next_free(folder: Path, stem: str) -> Path:
+    """`folder`/`stem`-N with the first N from 1 on that is free."""
+    number = 1
+    while (path := folder / f"{stem}-{number}").exists():
+        number += 1
+    return path
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,198 @@
+"""The measurement of a gait: people fed in as a recording come out as people."""
+
+import json
+
+import numpy as np
+import pytest
+
+from springfoot.agents.evaluation import CURVES, measure
+from springfoot.agents.recording import SERIES, Recording, load_recording
+from springfoot.envs.settings import BipedSettings
+from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
+from springfoot.gait.cycle import PERCENT
+
+BODY = Body()
+HUMAN = human_gait(1.2)
+STRIDE_LENGTH = 2 * HUMAN.step_length
+SPEED = STRIDE_LENGTH / HUMAN.stride_time
+WEIGHT = BODY.mass * GRAVITY
+PITCH = 0.05
+CLEARANCE = 0.03
+
+
+def people(episodes=2, seconds=10.0, fell=(), cut=None) -> Recording:
+    """Episodes of people's mean curves walking over a flat plan; `cut` is the length of those that `fell` [ticks]."""
+    count = round(seconds * 100)
+    time = (np.arange(count) + 1) * 0.01
+    strides = time[:, None] / HUMAN.stride_time + np.array([0.3, 0.8])
+    phase = strides % 1
+    middle = (strides - 0.005 / HUMAN.stride_time) % 1
+
+    def joints(curve):
+        return np.stack([curve(name) for name in ("thigh", "knee", "ankle", "toe")], -1)
+
+    angle = joints(lambda name: HUMAN.mean(name, phase))
+    velocity = joints(lambda name: HUMAN.rate(name, phase) / HUMAN.stride_time)
+    angle[..., 0] += PITCH  # hip = thigh + trunk pitch
+    torque = np.zeros((count, 2, 4))
+    for joint, name in enumerate(("hip", "knee", "ankle")):
+        torque[..., joint] = -HUMAN.mean(f"{name}_moment", phase) * BODY.mass
+    force = np.zeros((count, 2, 3, 2))
+    force[:, :, 1, 0] = HUMAN.mean("grf_forward", middle) * WEIGHT
+    force[:, :, 1, 1] = HUMAN.mean("grf_vertical", middle) * WEIGHT
+    # A foot stands where it landed and moves evenly through its swing; a third of a step behind the CoM on landing.
+    swing = np.clip((phase - HUMAN.toe_off) / (1 - HUMAN.toe_off), 0, 1)
+    com = np.stack([SPEED * time, 0.97 - 0.02 * np.cos(4 * np.pi * phase[:, 0])], -1)
+    landed = (np.floor(strides) - [0.3, 0.8]) * STRIDE_LENGTH + 0.2
+    ankle = np.stack([landed + swing * STRIDE_LENGTH, np.full_like(phase, 0.07)], -1)
+    contact = np.zeros((count, 2, 3, 2))
+    contact[..., 0] = ankle[..., None, 0]
+    contact[..., 1] = np.where(swing > 0, CLEARANCE, 0.0)[..., None]
+    step = PERCENT / 100
+    plan = np.stack([-0.2 + HUMAN.step_length * step, 0.97 - 0.02 * np.cos(2 * np.pi * step)], -1)
+    series = {
+        "root": np.tile([0.0, 0.88, PITCH], (count, 1)),
+        "angle": angle,
+        "velocity": velocity,
+        "torque": 0.9 * torque,
+        "passive_torque": 0.1 * torque,
+        "com": com,
+        "com_velocity": np.gradient(com, 0.01, axis=0),
+        "com_reference": com,
+        "ankle": ankle,
+        "contact": contact,
+        "force": force,
+        "phase": phase,
+        "stiffness": np.broadcast_to([300.0, 40.0], (count, 2, 2)),
+        "equilibrium": np.zeros((count, 2, 2)),
+    }
+    stacked = {name: np.stack([values] * episodes).astype(np.float32) for name, values in series.items()}
+    ticks = np.full(episodes, count)
+    for episode in fell:
+        ticks[episode] = cut
+        for values in stacked.values():
+            values[episode, cut:] = np.nan
+    return Recording(
+        policy="people",
+        settings=BipedSettings(episode_seconds=seconds),
+        seed=0,
+        ticks=ticks,
+        returns=np.arange(episodes, dtype=float),
+        fall_reason=np.array(["fell: hip too low" if i in fell else "" for i in range(episodes)]),
+        plan_com=plan,
+        series=stacked,
+    )
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return measure(people())
+
+
+def test_people_recorded_are_people_measured(gait):
+    metrics = gait.metrics
+    for name, joint in metrics["joints"].items():
+        assert joint["rmse_deg"] < 0.3, name
+        assert joint["r"] > 0.999
+        assert joint["within_1sd_percent"] == 100
+    grf = metrics["grf"]
+    assert grf["vertical_peak1_bw"] == pytest.approx(HUMAN.mean("grf_vertical", PERCENT / 100)[3:26].max(), abs=0.01)
+    assert grf["vertical_r"] > 0.99 and grf["forward_r"] > 0.99
+    for name in ("hip", "knee", "ankle"):
+        assert metrics["moments"][name]["r"] > 0.99
+    ankle = HUMAN.mean("ankle_moment", PERCENT / 100)
+    assert metrics["moments"]["ankle"]["peak_Nm_kg"] == pytest.approx(ankle.max(), abs=0.01)
+    assert metrics["moments"]["ankle"]["peak_percent"] == pytest.approx(ankle.argmax(), abs=1)
+    assert metrics["moments"]["toe"] == {"peak_Nm_kg": 0.0, "peak_percent": 0, "r": None}
+
+
+def test_distances_and_times_of_the_gait(gait):
+    metrics = gait.metrics
+    assert metrics["speed_m_s"]["mean"] == pytest.approx(SPEED, rel=1e-4)
+    assert metrics["step_length_m"] == pytest.approx(HUMAN.step_length, abs=0.005)
+    assert metrics["cadence_steps_min"] == pytest.approx(120 / HUMAN.stride_time, rel=1e-3)
+    assert metrics["double_support_s"] == pytest.approx((HUMAN.toe_off - 0.5) * HUMAN.stride_time, abs=0.015)
+    assert metrics["toe_off_percent"] == pytest.approx(100 * HUMAN.toe_off, abs=1.5)
+    assert metrics["contact_travel_m"] == pytest.approx(0.0, abs=1e-3)
+    assert metrics["toe_clearance_m"] == pytest.approx(CLEARANCE, abs=1e-6)
+
+
+def test_centre_of_mass_on_its_plan_has_no_error(gait):
+    com = gait.metrics["com"]
+    # Heel strike is seen at 0.05 BW, a few ms after it: 1.2 m/s makes that a few mm.
+    assert com["x_rmse_m"] < 0.008
+    assert com["z_rmse_m"] < 0.001
+    assert com["z_r"] > 0.995
+    assert com["rise_m"] == pytest.approx(0.04, abs=5e-4)
+
+
+def test_moments_are_actuator_and_passive_torque_with_extension_positive(gait):
+    moment = gait.both.mean("ankle_moment_Nm_per_kg")
+    assert moment[48] == pytest.approx(HUMAN.mean("ankle_moment", 0.48), abs=0.02)
+    power = gait.both.mean("ankle_power_W_per_kg")
+    assert power.argmax() == pytest.approx(HUMAN.mean("ankle_power", PERCENT / 100).argmax(), abs=1)
+    assert power.max() > 2
+
+
+def test_segment_angles_follow_from_joint_angles(gait):
+    mean = gait.both.mean
+    assert mean("pelvis_anterior_tilt_deg") == pytest.approx(np.degrees(PITCH), abs=1e-4)
+    assert mean("hip_flexion_deg") == pytest.approx(mean("thigh_flexion_deg") + mean("pelvis_anterior_tilt_deg"))
+    assert mean("shank_pitch_deg") == pytest.approx(mean("thigh_flexion_deg") - mean("knee_flexion_deg"))
+    assert mean("foot_pitch_deg") == pytest.approx(mean("shank_pitch_deg") + mean("ankle_dorsiflexion_deg"))
+
+
+def test_cost_of_transport_is_the_positive_work_of_all_joints(gait):
+    phase = np.arange(1000) / 1000
+    power = sum(
+        np.maximum(-HUMAN.mean(f"{joint}_moment", phase) * HUMAN.rate(curve, phase), 0).mean()
+        for joint, curve in (("hip", "thigh"), ("knee", "knee"), ("ankle", "ankle"))
+    )
+    # The rate is per stride, so the mean over phase is work per stride, body mass and leg.
+    assert gait.metrics["cost_of_transport"] == pytest.approx(2 * power / (GRAVITY * STRIDE_LENGTH), rel=0.03)
+
+
+def test_feet_and_both_are_consistent(gait):
+    left, right = gait.feet
+    assert left.count + right.count == gait.both.count == gait.metrics["strides"]["count"]
+    for name in CURVES:
+        pooled = (left.mean(name) * left.count + right.mean(name) * right.count) / gait.both.count
+        assert gait.both.mean(name) == pytest.approx(pooled, abs=1e-9)
+    assert gait.both.sd("knee_flexion_deg").max() < 0.5
+
+
+def test_falls_are_counted_and_their_strides_too():
+    whole, cut = measure(people(3)), measure(people(3, fell=[1], cut=600))
+    assert (cut.metrics["falls"], cut.metrics["fall_reasons"]) == (1, {"fell: hip too low": 1})
+    assert cut.metrics["seconds_mean"] == pytest.approx((10 + 6 + 10) / 3)
+    assert 0 < cut.metrics["strides"]["in_episodes_that_fell"] < whole.both.count / 3
+    assert cut.both.count < whole.both.count
+    assert cut.metrics["return"] == {"mean": 1.0, "sd": 1.0}
+
+
+def test_a_gait_that_never_was_is_null_never_nan():
+    gait = measure(people(2, fell=[0, 1], cut=150))
+    text = json.dumps(gait.metrics, allow_nan=False)
+    assert gait.metrics["falls"] == 2 and gait.metrics["strides"]["count"] == 0
+    for path in (("speed_m_s", "mean"), ("joints", "knee", "rmse_deg"), ("grf", "vertical_max_bw"), ("com", "rise_m")):
+        value = json.loads(text)
+        for key in path:
+            value = value[key]
+        assert value is None, path
+
+
+def test_numbers_can_be_recomputed_from_the_saved_series(tmp_path):
+    recording = people(2, fell=[1], cut=700)
+    recording.save(tmp_path / "strides.npz")
+    with np.load(tmp_path / "strides.npz", allow_pickle=False) as file:
+        assert not any(values.dtype.hasobject for values in file.values())
+        assert set(SERIES) < set(file)
+    assert measure(load_recording(tmp_path / "strides.npz")).metrics == measure(recording).metrics
+
+
+def test_a_foreign_file_is_refused_with_one_line(tmp_path):
+    foreign = tmp_path / "foreign.npz"
+    foreign.write_bytes(b"not an archive")
+    with pytest.raises(SpringfootError, match=r"strides\.npz") as caught:
+        load_recording(foreign)
+    assert "\n" not in str(caught.value)

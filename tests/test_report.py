@@ -1,0 +1,195 @@
+"""The files of an evaluation and its command line."""
+
+import csv
+import io
+import json
+import os
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+from rich.console import Console
+
+import evaluate
+from springfoot.agents.evaluation import CURVES, measure
+from springfoot.agents.recording import load_recording, prepare, record
+from springfoot.agents.report import people_metrics, print_table, write_report
+from springfoot.gait import SpringfootError
+
+FILES = {
+    "metrics.json",
+    "gait_cycle.csv",
+    "gait_cycle_left.csv",
+    "gait_cycle_right.csv",
+    "strides.npz",
+    "gait.png",
+    "walk.gif",
+}
+
+
+def walked(episodes=2, name="schedule", **settings):
+    policy, environment = prepare(name, {"episode_seconds": 6.0} | settings)
+    return record(policy, environment, name=name, episodes=episodes)
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return walked()
+
+
+@pytest.fixture(scope="module")
+def folder(recording, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report")
+    write_report(path, recording, measure(recording))
+    return path
+
+
+def rows_of(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_folder_holds_what_it_promises(folder, recording):
+    assert {path.name for path in folder.iterdir()} == FILES
+    metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics == measure(load_recording(folder / "strides.npz")).metrics
+
+
+def test_gait_cycles_have_a_row_for_each_percent_and_a_spread_for_each_curve(folder):
+    for name in ("gait_cycle", "gait_cycle_left", "gait_cycle_right"):
+        rows = rows_of(folder / f"{name}.csv")
+        assert [int(row["percent"]) for row in rows] == list(range(101))
+        assert set(CURVES) | {f"{curve}_sd" for curve in CURVES} < set(rows[0])
+    counts = [int(rows_of(folder / f"gait_cycle{foot}.csv")[0]["n"]) for foot in ("_left", "_right", "")]
+    assert counts[0] + counts[1] == counts[2] > 2
+
+
+def test_csv_and_metrics_agree(folder):
+    metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    vertical = [float(row["grf_vertical_bw"]) for row in rows_of(folder / "gait_cycle.csv")]
+    assert max(vertical[3:26]) == pytest.approx(metrics["grf"]["vertical_peak1_bw"], rel=1e-5)
+    assert max(vertical[35:61]) == pytest.approx(metrics["grf"]["vertical_peak2_bw"], rel=1e-5)
+
+
+def test_pictures_open_and_the_animation_is_two_strides_below_a_megabyte(folder):
+    with Image.open(folder / "gait.png") as picture:
+        assert min(picture.size) > 800
+    assert os.path.getsize(folder / "walk.gif") < 1_000_000
+    with Image.open(folder / "walk.gif") as clip:
+        frames, delay = sum(1 for _ in ImageSequence.Iterator(clip)), clip.info["duration"]
+    stride = 120 / json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["cadence_steps_min"]
+    assert frames * delay / 1000 == pytest.approx(2 * stride, abs=0.1)
+
+
+def test_a_walk_that_only_falls_is_reported_too(tmp_path):
+    fallen = walked(name="constant", push_newton=3000.0, push_interval=0.5)
+    gait = measure(fallen)
+    assert gait.metrics["falls"] == 2 and gait.metrics["strides"]["count"] == 0
+    write_report(tmp_path, fallen, gait)
+    assert {path.name for path in tmp_path.iterdir()} == FILES
+    assert "nan" not in (tmp_path / "gait_cycle.csv").read_text(encoding="utf-8").lower()
+    assert rows_of(tmp_path / "gait_cycle.csv")[50]["knee_flexion_deg"] == ""
+    text = printed(gait.metrics)
+    assert "2 of 2" in text and "fell" in text
+
+
+def printed(metrics, **console):
+    stream = io.StringIO()
+    print_table(metrics, Console(file=stream, highlight=False, **console))
+    return stream.getvalue()
+
+
+def test_the_table_is_plain_text_within_80_columns(recording):
+    text = printed(measure(recording).metrics, width=80)
+    assert "\x1b" not in text and "…" not in text
+    for words in ("falls", "knee angle, RMSE", "vertical force, peak 1", "people", "cost of transport"):
+        assert words in text
+
+
+def test_people_beside_the_model_are_those_of_the_reference():
+    people = people_metrics(1.2, 1.70)
+    assert people["step_length_m"] == pytest.approx(0.655, abs=0.005)
+    assert people["toe_off_percent"] == pytest.approx(63.3, abs=0.2)
+    assert people["moments"]["ankle"] == pytest.approx(1.31, abs=0.02)
+
+
+def test_an_episode_is_the_same_whatever_runs_beside_it(recording):
+    more = walked(episodes=3)
+    for name, values in recording.series.items():
+        assert np.array_equal(values, more.series[name][:2], equal_nan=True), name
+    assert np.array_equal(recording.returns, more.returns[:2])
+
+
+def test_every_tick_is_recorded_and_what_a_constant_sets_arrives_in_the_curves():
+    held = walked(episodes=1, name="constant")
+    assert held.ticks[0] == 600
+    assert held.series["stiffness"][0] == pytest.approx(np.tile([300.0, 40.0], (600, 2, 1)), rel=1e-6)
+    assert measure(held).both.mean("ankle_stiffness_Nm_per_rad") == pytest.approx(300.0, rel=1e-6)
+
+
+def test_conditions_are_the_same_for_every_policy_and_flags_win():
+    _, standard = prepare("schedule", {})
+    assert (standard.height, standard.mass, standard.speed, standard.push_newton) == (1.70, 63.0, 1.2, 0.0)
+    _, flagged = prepare("thesis", {"speed": 1.0, "equilibrium": "angle"})
+    assert (flagged.speed, flagged.equilibrium) == (1.0, "angle")
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """Runs evaluate.py in an empty folder: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["evaluate.py", *words])
+        try:
+            code = evaluate.main()
+        except SystemExit as exit:  # what tyro does with a flag it does not know
+            code = exit.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_path):
+    for number in (1, 2):
+        code, out, _ = command("random", "--episodes", "1", "--seconds", "1")
+        assert code == 0
+        assert f"runs/eval-random-{number}" in out.replace("\\", "/")
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"eval-random-1", "eval-random-2"}
+    assert {path.name for path in (tmp_path / "runs" / "eval-random-1").iterdir()} == FILES
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["nonsense"],
+        ["constant", "--mass", "-3"],
+        ["constant", "--episodes", "0"],
+        ["constant", "--seconds", "0"],
+        ["constant", "--seed", "-1"],
+        ["constant", "--ankle-stiffness-range", "800", "20"],
+        ["constant", "--equilibrium", "phase"],
+        ["constant:1,2,3"],
+        ["foreign.safetensors"],
+    ],
+)
+def test_bad_input_is_one_line_exit_code_2_and_nothing_written(command, tmp_path, words):
+    (tmp_path / "foreign.safetensors").write_bytes(b"12345678 no policy")
+    code, out, err = command(*words)
+    assert code == 2
+    assert len(err.strip().splitlines()) == 1 and out == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["foreign.safetensors"]
+
+
+def test_an_existing_folder_is_refused_before_anything_runs(command, tmp_path):
+    (tmp_path / "mine").mkdir()
+    code, _, err = command("constant", "--out", "mine")
+    assert code == 2 and "mine" in err
+    assert not list((tmp_path / "mine").iterdir())
+
+
+def test_a_foreign_policy_name_lists_what_is_allowed():
+    with pytest.raises(SpringfootError, match=r"run folder.*pretrained.*thesis"):
+        prepare("nonsense", {})

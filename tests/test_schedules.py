@@ -1,0 +1,94 @@
+"""The baselines set the stiffness they promise, read at the phase the environment shows."""
+
+import numpy as np
+import pytest
+
+from springfoot.agents.schedules import BASELINES, baseline, leg_phase, own_settings
+from springfoot.envs.actuation import stiffness_of
+from springfoot.envs.biped import Biped
+from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.gait import Body, SpringfootError
+
+
+def settings_of(name, **values):
+    body = {"height": 1.70, "mass": 63.0} | values
+    return settings_from(**(own_settings(name, body["height"], body["mass"]) | values))
+
+
+def started(settings, phases):
+    """A batch whose left legs stand at `phases`."""
+    biped = Biped(settings, len(phases))
+    for index, phase in enumerate(phases):
+        biped.reset(np.array([index]), [0], start=float(phase))
+    return biped
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_every_baseline_gives_valid_actions_and_the_core_takes_them(name):
+    settings = settings_of(name)
+    biped = started(settings, [0.1, 0.3, 0.7])
+    actions = baseline(name, settings, seed=3)(biped.observe())
+    assert actions.shape == (3, 4) and actions.dtype == np.float32
+    assert np.all(np.abs(actions) <= 1)
+    assert np.all(np.isfinite(biped.step(actions).reward))
+
+
+def test_phase_is_read_from_the_observation():
+    phases = np.array([0.0, 0.1, 0.5, 0.75, 0.999])
+    read = leg_phase(started(BipedSettings(), phases).observe())
+    assert read[:, 0] == pytest.approx(phases, abs=1e-6)
+    assert read[:, 1] == pytest.approx((phases + 0.5) % 1, abs=1e-6)
+
+
+def test_constant_is_300_and_40_newton_metres_a_radian_scaled_with_the_body():
+    for values, scale in (({}, 1.0), ({"height": 1.87, "mass": 90.0}, 1.1 * 90 / 63)):
+        settings = settings_of("constant", **values)
+        outcome = started(settings, [0.2]).step(baseline("constant", settings)(np.zeros((1, 60))))
+        for joint, value in (("ankle", 300.0), ("toe", 40.0)):
+            for side in ("left", "right"):
+                assert outcome.info[f"stiffness/{joint}_{side}"][0] == pytest.approx(value * scale, rel=1e-6)
+
+
+def test_constant_of_other_stiffness():
+    settings = BipedSettings()
+    action = baseline("constant:450,30", settings)(np.zeros((1, 60)))
+    assert stiffness_of(action.reshape(2, 2), settings, Body()) == pytest.approx(
+        np.array([[450.0, 30.0]] * 2), rel=1e-5
+    )
+
+
+def test_schedule_sets_the_stiffness_of_the_leg_tuning():
+    biped = started(BipedSettings(), np.linspace(0, 1, 21)[:-1])
+    action = baseline("schedule", biped.settings)(biped.observe()).reshape(20, 2, 2)
+    assert stiffness_of(action, biped.settings, Body()) == pytest.approx(biped.scheduled_stiffness(), rel=1e-4)
+
+
+def test_thesis_brings_its_schedule_and_swings_at_the_lowest_stiffness():
+    settings = settings_of("thesis")
+    assert settings.equilibrium == "phase" and settings.schedule is not None
+    biped = started(settings, [0.8])
+    action = baseline("thesis", settings)(biped.observe())
+    assert action[0, 0] == -1.0  # left ankle in swing
+    assert action[0, 2] > -1.0  # right ankle in stance
+
+
+def test_untrained_is_mid_range_and_random_is_seeded():
+    observation = np.zeros((5, 60))
+    assert not baseline("untrained", BipedSettings())(observation).any()
+    first, again, other = (baseline("random", BipedSettings(), seed)(observation) for seed in (1, 1, 2))
+    assert np.array_equal(first, again) and not np.array_equal(first, other)
+
+
+def test_stiffness_in_residual_mode_is_refused():
+    for name in ("constant", "schedule"):
+        with pytest.raises(SpringfootError, match="action_mode"):
+            baseline(name, BipedSettings(action_mode="residual"))
+
+
+@pytest.mark.parametrize(
+    "name", ["standing", "constant:1", "constant:1,-2", "constant:a,b", "constant:nan,3", "random:3"]
+)
+def test_unknown_baselines_are_refused_with_one_line(name):
+    with pytest.raises(SpringfootError) as caught:
+        baseline(name, BipedSettings())
+    assert "\n" not in str(caught.value)
