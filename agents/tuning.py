@@ -36,9 +36,9 @@ SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 3
 TOLERANCE = {
     "speed": 0.03,  # m/s
     "period": 0.03,  # share of the plan's stride time
-    "thigh": np.deg2rad(2.5),
-    "knee": np.deg2rad(3.5),
-    "ankle": np.deg2rad(2.5),
+    "thigh": np.deg2rad(2.2),
+    "knee": np.deg2rad(2.5),
+    "ankle": np.deg2rad(2.2),
     "toe": np.deg2rad(12.0),
     "grf_vertical": 0.06,  # body weights
     "grf_forward": 0.03,

@@ -6,7 +6,7 @@ operations for any N, so a batch of N gives the same bits as N batches of one.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -180,10 +180,13 @@ class Biped:
         springs, feet = self._springs, self._now.angle[..., FEET]
         work_stiffness = springs.set_stiffness(action, self._legs.phase, feet)
         work_equilibrium = np.zeros_like(work_stiffness)
-        forces = []
-        for _ in range(WINDOWS):
+        forces, diverged = [], self._now.diverged
+        for window in range(WINDOWS):
             work_equilibrium += self._window(running, ids)
             forces.append(self._now.force)
+            # MuJoCo puts what diverged back to its start and steps on: the name must outlive the window
+            diverged = np.where(diverged == "", self._now.diverged, diverged) if window else self._now.diverged
+        self._now = replace(self._now, diverged=diverged)
         self._steps += running
         self._force = sum(forces) / WINDOWS
 

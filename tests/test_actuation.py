@@ -1,0 +1,72 @@
+"""Actions to stiffness, and the work of changing a spring."""
+
+import numpy as np
+import pytest
+
+from springfoot.envs.actuation import FootSprings, action_of, stiffness_of, stiffness_ranges
+from springfoot.envs.phase import GRID, SAMPLES, PhaseTable
+from springfoot.envs.settings import BipedSettings
+from springfoot.gait.body import Body
+
+
+def test_the_map_is_logarithmic_between_the_ends():
+    settings, body = BipedSettings(), Body()
+    ends = stiffness_of(np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]]), settings, body)
+    np.testing.assert_allclose(ends, [[20, 5], [np.sqrt(20 * 800), np.sqrt(5 * 200)], [800, 200]], rtol=1e-12)
+
+
+def test_stiffness_scales_with_mass_and_height():
+    settings, body = BipedSettings(), Body(1.9, 100.0)
+    low, high = stiffness_ranges(settings, body)
+    scale = 100 / 63 * 1.9 / 1.7
+    np.testing.assert_allclose([low, high], np.array([[20, 5], [800, 200]]) * scale, rtol=1e-12)
+
+
+def test_action_of_inverts_the_map_and_stops_at_the_ends():
+    settings, body = BipedSettings(), Body(1.6, 70.0)
+    actions = np.random.default_rng(0).uniform(-1, 1, (50, 2))
+    np.testing.assert_allclose(action_of(stiffness_of(actions, settings, body), settings, body), actions, atol=1e-12)
+    np.testing.assert_array_equal(action_of([[1e-9, 1e9]], settings, body), [[-1.0, 1.0]])
+
+
+def springs(mode: str = "absolute", num: int = 3) -> FootSprings:
+    rest = np.stack([0.3 * np.sin(2 * np.pi * GRID), 0.1 * np.cos(2 * np.pi * GRID)], -1)[None]
+    schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
+    return FootSprings(BipedSettings(action_mode=mode), Body(), rest, schedule, num)
+
+
+def test_a_residual_action_multiplies_the_schedule():
+    feet = springs("residual")
+    action = np.random.default_rng(1).uniform(-1, 1, (3, 4))
+    phase = np.array([[0.1, 0.6], [0.25, 0.75], [0.0, 0.5]])
+    feet.set_stiffness(action, phase, np.zeros((3, 2, 2)))
+    expected = np.stack([200 + 100 * phase, np.full((3, 2), 30.0)], -1) * np.exp(action.reshape(3, 2, 2))
+    np.testing.assert_allclose(feet.stiffness, expected, rtol=1e-9)
+
+
+def test_the_works_add_up_to_the_change_of_the_springs_energy():
+    feet, random = springs(), np.random.default_rng(2)
+    angle = 0.1 * random.normal(size=(3, 2, 2))
+    phase = np.array([[0.1, 0.6], [0.2, 0.7], [0.3, 0.8]])
+    assert not feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle).any()  # a new episode costs nothing
+    assert not feet.move_equilibrium(phase, angle).any()
+
+    def energy():
+        return 0.5 * feet.stiffness * (feet.equilibrium - angle) ** 2
+
+    before = energy()
+    work = feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle)
+    work = work + feet.move_equilibrium(phase + 0.05, angle)
+    np.testing.assert_allclose(work, energy() - before, atol=1e-12)
+    assert np.abs(work).max() > 1e-3
+
+
+def test_phase_tables_are_periodic_and_linear_between_samples():
+    table = PhaseTable(np.stack([np.sin(2 * np.pi * GRID), GRID], -1))
+    phase = np.random.default_rng(3).uniform(0, 1 - 1 / SAMPLES, (7, 2))
+    values = table.at(phase)
+    np.testing.assert_allclose(values[..., 0], np.sin(2 * np.pi * phase), atol=1e-5)
+    np.testing.assert_allclose(values[..., 1], phase, atol=1e-12)
+    last = table.at(np.array([1 - 1e-12]))
+    assert last[0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert table.at(np.array([np.nextafter(1, 0)]))[0, 0] == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,195 @@
+"""The walking body as a whole: physics of a walk, mirror symmetry, work, pushes, frozen environments."""
+
+import numpy as np
+import pytest
+
+from springfoot.envs.actuation import FEET, action_of
+from springfoot.envs.biped import Biped, Tick
+from springfoot.envs.model import DAMPING_TIME, SIDES, torque_limits
+from springfoot.envs.settings import BipedSettings
+from springfoot.gait.body import GRAVITY
+from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
+from springfoot.gait.errors import SpringfootError
+
+
+def scheduled(biped: Biped) -> np.ndarray:
+    action = action_of(biped.scheduled_stiffness(), biped.settings, biped.body)
+    return action.reshape(biped.num_envs, -1)
+
+
+def walk(biped: Biped, seconds: float) -> list[Tick]:
+    """Walk with the fixed schedule; the ticks of every control window."""
+    ticks: list[Tick] = []
+    biped.on_tick = ticks.append
+    biped.reset(np.arange(biped.num_envs), range(biped.num_envs))
+    for _ in range(round(seconds / biped.dt)):
+        assert not biped.step(scheduled(biped)).terminated.any()
+    return ticks
+
+
+@pytest.fixture(scope="module")
+def walked() -> tuple[Biped, list[Tick]]:
+    biped = Biped(BipedSettings(), 2)
+    return biped, walk(biped, 12.0)
+
+
+def test_over_whole_strides_the_floor_carries_the_weight(walked):
+    biped, ticks = walked
+    weight = biped.body.mass * GRAVITY
+    force = np.stack([tick.measurement.force[:, :, :, 1].sum(2) for tick in ticks])  # (T, N, side)
+    for index in range(biped.num_envs):
+        contacts = find_contacts(force[:, index, 0], biped.tick_dt, CONTACT_THRESHOLD_BW * weight)
+        strikes = contacts.heel_strikes[contacts.heel_strikes > 3.0]
+        first, last = (round(time / biped.tick_dt) for time in (strikes[0], strikes[-1]))
+        assert len(strikes) > 5
+        assert force[first:last, index].sum(1).mean() == pytest.approx(weight, rel=0.01)
+
+
+def test_over_whole_strides_braking_and_propulsion_cancel(walked):
+    biped, ticks = walked
+    forward = np.stack([tick.measurement.force[..., 0].sum((1, 2)) for tick in ticks])[300:]
+    speed = np.stack([tick.measurement.com_velocity[:, 0] for tick in ticks])[300:]
+    # impulse = change of momentum, whatever the stride: drift in speed is what does not cancel
+    change = biped.body.mass * (speed[-1] - speed[0])
+    np.testing.assert_allclose(forward[1:].sum(0) * biped.tick_dt, change, atol=0.02 * biped.body.mass)
+    assert (np.abs(forward).max(0) > 0.1 * biped.body.mass * GRAVITY).all()
+
+
+def test_the_joint_torque_is_the_spring_equation_while_walking(walked):
+    biped, ticks = walked
+    limit = torque_limits(biped.body)[FEET]
+    for tick in ticks[-50:]:
+        m = tick.measurement
+        angle, velocity = m.angle[..., FEET], m.velocity[..., FEET]
+        spring = tick.stiffness[..., FEET] * (tick.equilibrium[..., FEET] - angle - np.array(DAMPING_TIME)[FEET] * velocity)
+        below = np.abs(spring) < limit
+        np.testing.assert_allclose(m.torque[..., FEET][below], spring[below], rtol=0, atol=1e-9)
+    joints = biped.data(0).qfrc_actuator[3:].reshape(2, 4)
+    np.testing.assert_allclose(joints, m.torque[0], rtol=0, atol=1e-9)
+
+
+def test_left_and_right_are_mirror_images():
+    biped = Biped(BipedSettings(), 2)
+    biped.reset(np.array([0]), [0], start=0.2)
+    biped.reset(np.array([1]), [0], start=0.7)
+    for _ in range(50):
+        action = scheduled(biped)
+        action[:, 0] = 0.3  # left ankle of the one, right ankle of the other
+        action[1] = action[0][[2, 3, 0, 1]]
+        outcome = biped.step(action)
+    left, right = biped._now.angle[0], biped._now.angle[1][::-1]
+    np.testing.assert_allclose(left, right, atol=1e-6)
+    assert outcome.reward[0] == pytest.approx(outcome.reward[1], abs=1e-6)
+
+
+def test_the_start_stands_on_the_floor_at_the_phase_asked_for():
+    biped = Biped(BipedSettings(), 3)
+    biped.reset(np.arange(3), [1, 2, 3], start=0.25)
+    lowest = biped._now.contact[..., 1].min((1, 2))
+    np.testing.assert_allclose(lowest, -0.001, atol=1e-12)
+    np.testing.assert_allclose(biped._now.com_velocity[:, 0], 1.2, atol=0.6)
+    names = list(biped.observation_names)
+    observation = biped.observe()
+    np.testing.assert_allclose(observation[:, names.index("phase_sin")], 1.0, atol=1e-6)
+
+
+def test_pushes_come_once_in_each_interval_in_both_directions():
+    biped = Biped(BipedSettings(push_newton=10.0, push_interval=1.0, episode_seconds=30.0), 8)
+    forces = []
+    original = biped._simulation.push
+    biped._simulation.push = lambda force: (forces.append(force.copy()), original(force))
+    walk_ticks = walk(biped, 4.0)
+    force = np.stack(forces)
+    assert len(force) == len(walk_ticks)
+    assert set(np.unique(force)) == {-10.0, 0.0, 10.0}
+    for second in range(4):
+        window = force[100 * second : 100 * (second + 1)]
+        np.testing.assert_allclose((window != 0).sum(0), 10, atol=1)
+
+
+def test_an_environment_left_out_does_not_notice():
+    with_pause, without = Biped(BipedSettings(), 2), Biped(BipedSettings(), 2)
+    for biped in (with_pause, without):
+        biped.reset(np.arange(2), [4, 5])
+    for _ in range(20):
+        action = np.zeros((2, 4))
+        outcome = with_pause.step(action, active=np.array([True, False]))
+        assert outcome.reward[1] == 0.0
+        assert outcome.info["time"][1] == 0.0
+    with_pause.reset(np.arange(2), [4, 5])
+    for _ in range(20):
+        a, b = with_pause.step(np.zeros((2, 4))), without.step(np.zeros((2, 4)))
+        np.testing.assert_array_equal(a.observation, b.observation)
+        np.testing.assert_array_equal(a.reward, b.reward)
+
+
+def test_a_fall_ends_the_episode_with_its_reason():
+    biped = Biped(BipedSettings(), 4)
+    biped.reset(np.arange(4), range(4))
+    reasons = set()
+    active = np.ones(4, bool)
+    for _ in range(400):
+        outcome = biped.step(np.tile([1.0, -1.0, -1.0, 1.0], (4, 1)), active)  # one ankle rigid, one limp
+        reasons |= set(outcome.info["termination"][outcome.terminated])
+        assert not outcome.reward[outcome.terminated].any()
+        active &= ~outcome.terminated
+        if not active.any():
+            break
+    assert not active.any()
+    assert reasons <= {"fell: hip too low", "fell: trunk too tilted"}
+
+
+def test_a_diverged_simulation_ends_its_episode_alone():
+    biped = Biped(BipedSettings(), 2)
+    biped.reset(np.arange(2), range(2))
+    biped._simulation._qvel[1, 0] = 1e20
+    outcome = biped.step(np.zeros((2, 4)))
+    assert outcome.info["termination"][1].startswith("diverged: BAD")
+    assert outcome.info["termination"][0] == ""
+    assert np.isfinite(outcome.observation).all()
+    assert np.isfinite(outcome.reward).all()
+
+
+def test_time_runs_out_after_episode_seconds():
+    biped = Biped(BipedSettings(episode_seconds=0.1), 1)
+    biped.reset(np.array([0]), [0])
+    ends = [bool(biped.step(np.zeros((1, 4))).truncated[0]) for _ in range(5)]
+    assert ends == [False] * 4 + [True]
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.full((1, 4), np.nan), "actions must be finite numbers in [-1, 1], got NaN or infinity"),
+        (np.zeros((2, 4)), "actions must have shape (1, 4), got (2, 4)"),
+    ],
+)
+def test_bad_actions_are_refused_and_nothing_moves(action, message):
+    biped = Biped(BipedSettings(), 1)
+    biped.reset(np.array([0]), [0])
+    before = biped.observe()
+    with pytest.raises(SpringfootError, match="actions must") as error:
+        biped.step(action)
+    assert str(error.value) == message
+    np.testing.assert_array_equal(biped.observe(), before)
+
+
+def test_info_carries_what_the_springs_do():
+    biped = Biped(BipedSettings(), 1)
+    biped.reset(np.array([0]), [0])
+    biped.step(np.zeros((1, 4)))
+    info = biped.step(np.array([[0.5, -0.5, 0.0, 1.0]])).info
+    low, high = 20.0, 800.0
+    assert info["stiffness/ankle_left"][0] == pytest.approx(low * (high / low) ** 0.75, rel=1e-9)
+    assert info["stiffness/toe_right"][0] == pytest.approx(200.0)
+    for side in SIDES:
+        m = biped._now
+        k = info[f"stiffness/ankle_{side}"][0]
+        spring = k * (
+            info[f"equilibrium/ankle_{side}"][0]
+            - m.angle[0, SIDES.index(side), 2]
+            - 0.02 * m.velocity[0, SIDES.index(side), 2]
+        )
+        assert info[f"torque/ankle_{side}"][0] == pytest.approx(spring, abs=1e-9)
+    assert info["work/stiffness/toe_left"][0] < 0  # softer under load gives energy back
+    assert np.isfinite(list(value[0] for name, value in info.items() if name != "termination")).all()

@@ -1,0 +1,95 @@
+"""The compiled model against the body it was compiled from."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from springfoot.envs.model import CONTACTS, JOINTS, SIDES, build_model, build_spec, contact_offsets, geom_name
+from springfoot.gait.body import GRAVITY, Body
+
+BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0)]
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_masses_and_lengths_are_the_bodys(body):
+    model = build_model(body)
+    assert model.body_mass.sum() == pytest.approx(body.mass, rel=1e-12)
+    for side in SIDES:
+        assert model.body(f"toe_{side}").mass[0] == pytest.approx(body.toe_mass, rel=1e-12)
+        assert model.body(f"thigh_{side}").inertia[1] == pytest.approx(body.thigh_inertia, rel=1e-12)
+        assert -model.body(f"foot_{side}").pos[2] == pytest.approx(body.shank_length, rel=1e-12)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_standing_straight_the_soles_touch_the_floor(body):
+    model = build_model(body)
+    data = mujoco.MjData(model)
+    data.joint("z").qpos = body.leg_length
+    mujoco.mj_forward(model, data)
+    for side in SIDES:
+        for contact in CONTACTS:
+            geom = model.geom(geom_name(contact, side)).id
+            assert data.geom_xpos[geom, 2] - model.geom_size[geom, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_foot_is_as_long_as_the_bodys():
+    body = Body()
+    offsets = contact_offsets(body)
+    heel, toe = offsets["heel"], offsets["toe"]
+    back = heel[0] - heel[2]
+    front = body.ankle_to_toe_joint + toe[0] + toe[2]
+    assert front - back == pytest.approx(body.foot_length, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("joint", "segment", "direction"),
+    [
+        ("hip_left", "shank_left", (1, 0)),  # flexion swings the knee forward
+        ("knee_left", "foot_left", (-1, 0)),  # flexion swings the ankle back
+        ("ankle_left", "toe_left", (0, 1)),  # dorsiflexion lifts the toes
+        ("pitch", "thigh_left", None),
+    ],
+)
+def test_positive_angles_mean_what_their_names_say(joint, segment, direction):
+    model = build_model(Body())
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    before = data.body(segment).xpos.copy()
+    com = data.body("trunk").xipos.copy()
+    data.joint(joint).qpos = 0.1
+    mujoco.mj_forward(model, data)
+    if direction is None:
+        assert data.body("trunk").xipos[0] > com[0]  # the trunk leans forward
+        return
+    moved = (data.body(segment).xpos - before)[[0, 2]]
+    assert moved @ np.array(direction) > 0.5 * np.abs(moved).max() > 0
+
+
+def test_toe_up_lifts_the_toe_tip():
+    model = build_model(Body())
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    before = data.geom("toe_left").xpos[2]
+    data.joint("toe_left").qpos = 0.1
+    mujoco.mj_forward(model, data)
+    assert data.geom("toe_left").xpos[2] > before
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_at_rest_the_floor_carries_the_weight(body):
+    spec = build_spec(body)
+    for held in ("x", "pitch"):
+        equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=held)
+        equality.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.joint("z").qpos = body.leg_length
+    scale = body.mass_scale * body.length_scale
+    for side in SIDES:
+        for joint in JOINTS:
+            data.actuator(f"stiffness_{joint}_{side}").ctrl = 800.0 * scale
+    for _ in range(10_000):
+        mujoco.mj_step(model, data)
+    assert np.abs(data.qacc).max() < 1e-3
+    vertical = sum(data.sensor(f"force_{geom_name(contact, side)}").data[2] for side in SIDES for contact in CONTACTS)
+    assert vertical == pytest.approx(body.mass * GRAVITY, rel=1e-3)
