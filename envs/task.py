@@ -55,7 +55,7 @@ class Entry(NamedTuple):
 
 def _entries() -> tuple[Entry, ...]:
     legs = [(side, joint) for side in SIDES for joint in JOINTS]
-    sign = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
+    sign: dict[str, str] = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
     return (
         Entry("hip_height", "leg length", 0.0, 2.0, "height of the hip"),
         Entry("pitch", "rad", -3.2, 3.2, "pitch of the trunk, forward positive"),

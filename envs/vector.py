@@ -57,7 +57,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._camera: Camera | None = None
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._generators: list[Any] = [None] * num_envs
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
 
@@ -81,7 +81,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         chosen = check_options(options, ("start", "reset_mask"))
         ids = np.flatnonzero(self._reset_mask(chosen.get("reset_mask")))
         seeds = self._spread(seed)
-        for index in ids:
+        for index in ids.tolist():
             if seeds[index] is not None or self._generators[index] is None:
                 self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
         self._restart(ids, chosen.get("start"))
@@ -140,7 +140,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         """One seed for each environment."""
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, Integral):
+        if isinstance(seed, (int, np.integer)):
             return [int(seed) + index for index in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise SpringfootError(f"seed must be an integer or a list of {self.num_envs}, got {len(seed)} seeds")

@@ -5,10 +5,12 @@ import subprocess
 import sys
 import warnings
 from dataclasses import fields
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
@@ -21,13 +23,21 @@ from springfoot.envs.vector import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
 
 ID = "springfoot.envs:SegmentedFootBiped-v0"
-SHORT = {"episode_seconds": 0.8, "push_newton": 1200.0, "push_interval": 0.4, "start_noise": 0.05}
+SHORT: dict[str, Any] = {"episode_seconds": 0.8, "push_newton": 1200.0, "push_interval": 0.4, "start_noise": 0.05}
 """Episodes that end both by falls and out of time within a few steps."""
+
+
+def make(**settings) -> Any:
+    return gym.make(ID, **settings)
+
+
+def make_vec(**settings) -> Any:
+    return gym.make_vec(ID, **settings)
 
 
 def rows_of(heading: str) -> list[list[str]]:
     """Cells of the first table after `heading` in the Env's docstring, without its head."""
-    section = SegmentedFootBiped.__doc__.split(f"## {heading}\n")[1].split("\n    ## ")[0]
+    section = (SegmentedFootBiped.__doc__ or "").split(f"## {heading}\n")[1].split("\n    ## ")[0]
     lines = [line.strip().strip("|") for line in section.splitlines() if line.strip().startswith("|")]
     return [[cell.strip() for cell in line.split("|")] for line in lines[2:]]
 
@@ -36,7 +46,7 @@ def rows_of(heading: str) -> list[list[str]]:
 
 
 def test_docstring_lists_every_entry_of_the_observation():
-    env = SegmentedFootBiped()
+    env: Any = SegmentedFootBiped()
     rows = rows_of("Observation space")
     assert [row[0] for row in rows] == [str(index) for index in range(len(rows))]
     assert [row[1:] for row in rows] == [[e.name, e.unit, f"{e.low:g}", f"{e.high:g}", e.meaning] for e in OBSERVATION]
@@ -59,7 +69,7 @@ def test_docstring_lists_every_key_of_info():
     env = SegmentedFootBiped()
     env.reset(seed=0)
     info = env.step(np.zeros(4, np.float32))[-1]
-    text = SegmentedFootBiped.__doc__.split("## Info")[1].split("##")[0]
+    text = (SegmentedFootBiped.__doc__ or "").split("## Info")[1].split("##")[0]
     for key in info:
         stem = re.sub(rf"/({'|'.join(ACTIONS)}|{'|'.join(DEFAULT_WEIGHTS)})$", "/", key)
         assert f"`{stem}`" in text, key
@@ -72,15 +82,17 @@ def test_docstring_lists_every_key_of_info():
 def test_gymnasium_and_stable_baselines3_have_nothing_to_say():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(gym.make(ID).unwrapped, skip_render_check=True)
+        check_env(make().unwrapped, skip_render_check=True)
         check_env_sb3(SegmentedFootBiped(**SHORT))
 
 
 def test_spaces_are_float32_boxes_with_finite_bounds():
     env = SegmentedFootBiped()
     assert env.action_space == gym.spaces.Box(-1, 1, (4,), np.float32)
-    assert env.observation_space.dtype == np.float32
-    assert np.isfinite(env.observation_space.low).all() and np.isfinite(env.observation_space.high).all()
+    space = env.observation_space
+    assert isinstance(space, gym.spaces.Box)
+    assert space.dtype == np.float32
+    assert np.isfinite([space.low, space.high]).all()
 
 
 @pytest.mark.parametrize("settings", [{}, SHORT, {"height": 1.4, "mass": 38.0, "equilibrium": "neutral"}])
@@ -146,7 +158,7 @@ def test_a_fall_terminates_with_its_reason_and_no_reward():
 
 
 def test_reward_is_the_weighted_sum_of_the_terms_in_info():
-    env = gym.make(ID, reward_weights={"pose": 1.0, "grf": -0.5})
+    env = make(reward_weights={"pose": 1.0, "grf": -0.5})
     weights = DEFAULT_WEIGHTS | {"pose": 1.0, "grf": -0.5}
     env.reset(seed=2)
     for _ in range(20):
@@ -209,24 +221,24 @@ def test_a_refused_action_steps_nothing():
 
 
 def test_a_spec_holds_its_settings_as_json_and_makes_the_same_environment():
-    env = gym.make(ID, height=1.5, mass=50.0, ankle_stiffness_range=(30.0, 600.0), reward_weights={"pose": 0.4})
-    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    env = make(height=1.5, mass=50.0, ankle_stiffness_range=(30.0, 600.0), reward_weights={"pose": 0.4})
+    again: Any = gym.make(EnvSpec.from_json(env.spec.to_json()))
     assert again.unwrapped.settings == env.unwrapped.settings
     np.testing.assert_array_equal(env.reset(seed=5)[0], again.reset(seed=5)[0])
-    vector = gym.make_vec(ID, num_envs=2, autoreset_mode="SameStep", height=1.5)
-    again = gym.make_vec(gym.envs.registration.EnvSpec.from_json(vector.spec.to_json()))
+    vector = make_vec(num_envs=2, autoreset_mode="SameStep", height=1.5)
+    again: Any = gym.make_vec(EnvSpec.from_json(vector.spec.to_json()))
     assert (again.num_envs, again.unwrapped.settings.height) == (2, 1.5)
     assert again.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 
 
 def test_every_setting_is_an_argument_of_make():
     values = settings_to_json(settings_from(height=1.6, mass=55.0, equilibrium="neutral", start=0.3))
-    assert settings_to_json(gym.make(ID, **values).unwrapped.settings) == values
+    assert settings_to_json(make(**values).unwrapped.settings) == values
 
 
-@pytest.mark.parametrize("make", [gym.make, lambda *a, **k: gym.make_vec(*a, num_envs=1, **k)])
-def test_max_episode_steps_truncates(make):
-    env = make(ID, max_episode_steps=7)
+@pytest.mark.parametrize("maker", [make, make_vec])
+def test_max_episode_steps_truncates(maker):
+    env = maker(max_episode_steps=7)
     env.reset(seed=0)
     truncated = [bool(env.step(np.zeros(env.action_space.shape, np.float32))[3]) for _ in range(7)]
     assert truncated == [False] * 6 + [True]
@@ -331,7 +343,7 @@ def test_seeds_may_be_one_for_each_environment():
 
 def test_what_a_vector_returns_is_the_caller_s_to_keep():
     env = SegmentedFootBipedVector(2)
-    kept = [env.reset(seed=0)]
+    kept: list[Any] = [env.reset(seed=0)]
     copies = [kept[0][0].copy()]
     for _ in range(3):
         kept.append(env.step(np.zeros((2, 4))))
@@ -356,7 +368,7 @@ def test_each_vector_has_its_own_metadata():
 def test_make_vec_uses_the_batch_and_warns_of_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gym.make_vec(ID, num_envs=3, num_threads=2, speed=1.1)
+        env = make_vec(num_envs=3, num_threads=2, speed=1.1)
     assert isinstance(env.unwrapped, SegmentedFootBipedVector)
     assert env.observation_space.shape == (3, len(OBSERVATION))
     env.close()

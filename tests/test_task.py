@@ -202,7 +202,7 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     measured.diverged[:] = ""
     terms = setup.terms(measured, PHASES, action=np.full((len(PHASES), 4), 0.1))
     assert set(terms) == set(weights)
-    expected = sum(weights[name] * terms[name] for name in weights)
+    expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
     expected[0] = 0.0
     np.testing.assert_allclose(setup.task.reward(terms), expected, rtol=1e-12)
 
