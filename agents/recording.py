@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.envs.model import ANKLE
+from springfoot.envs.model import ANKLE, CONTACTS, JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.cycle import PERCENT
@@ -76,10 +76,16 @@ class Recording:
     """Name -> (E, T, ...) float32, as listed in `SERIES`."""
 
     def save(self, path: Path) -> None:
-        """Write `strides.npz`: the series and, as JSON text, policy, settings and seed. No object arrays."""
-        header = {"policy": self.policy, "settings": settings_to_json(self.settings), "seed": self.seed}
+        """Write `strides.npz`: the series and, as JSON text, what they are of. No object arrays."""
+        header = {
+            "policy": self.policy,
+            "settings": settings_to_json(self.settings),
+            "seed": self.seed,
+            "tick_s": TICK,
+            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS},
+        }
         arrays: dict[str, Any] = {name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com")}
-        np.savez(path, header=np.array(json.dumps(header)), **(arrays | self.series))
+        np.savez(path, header=np.array(json.dumps(header)), **(arrays | dict[str, Any](self.series)))
 
 
 def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, BipedSettings]:
@@ -110,8 +116,8 @@ def load_recording(path: Path) -> Recording:
             arrays = dict(file)
         header: dict[str, Any] = json.loads(str(arrays.pop("header")))
         series = {name: arrays.pop(name) for name in SERIES}
-        settings = settings_from(**header.pop("settings"))
-        return Recording(**header, settings=settings, series=series, **arrays)
+        settings = settings_from(**header["settings"])
+        return Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py: {error}") from None
 
