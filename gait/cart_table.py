@@ -4,6 +4,7 @@ Equation (1) of the thesis, its sign and its missing terms restored: p = x - z x
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -75,7 +76,7 @@ def periodic_com(
     state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
     times, states = [], []
     # The ZMP has corners: integrating piece by piece keeps the order of the method.
-    for start, end in zip(zmp_times[:-1], zmp_times[1:], strict=True):
+    for start, end in pairwise(zmp_times):
         grid = np.linspace(start, end, round(SAMPLES * (end - start) / step_time) + 2)
         piece = solve_ivp(motion, (start, end), state, "DOP853", grid, rtol=1e-12, atol=1e-13)
         times.append(grid[:-1])
