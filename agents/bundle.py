@@ -154,7 +154,7 @@ def find_policy(name: str | Path) -> Path:
     """The file meant by a path, a run folder (its best) or `pretrained`; `SpringfootError` if there is none."""
     path = Path(name)
     if str(name) == "pretrained":
-        path = Path(str(resources.files(__package__) / "pretrained" / "walk.safetensors"))
+        path = Path(str(resources.files("springfoot.agents") / "pretrained" / "walk.safetensors"))
         if not path.is_file():
             raise SpringfootError("this installation of springfoot has no pretrained policy; train one: train.py")
     elif path.is_dir():

@@ -107,7 +107,7 @@ def _field_help(settings: type) -> dict[str, str]:
     """The docstring below each field of a dataclass, on one line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
     return {
-        item.target.id: " ".join(doc.value.value.split())
+        item.target.id: " ".join(str(doc.value.value).split())
         for item, doc in pairwise(body)
         if isinstance(item, ast.AnnAssign)
         and isinstance(item.target, ast.Name)

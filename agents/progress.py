@@ -41,8 +41,9 @@ class Progress:
     def _print_line(self) -> None:
         if self._bar.disable:
             self._last_line = monotonic()
-            rate = (self._done - self._first) / (self._last_line - self._began)
-            left = f"{tqdm.format_interval((self._total - self._done) / rate)} left" if rate else ""
+            rate = (self._done - self._first) / max(self._last_line - self._began, 1e-9)
+            missing = max(self._total - self._done, 0)
+            left = f"{tqdm.format_interval(missing / rate)} left" if rate and missing else ""
             parts = f"{self._done:,} of {self._total:,} steps", self._state, left
             print(" · ".join(part for part in parts if part), file=sys.stderr, flush=True)
 

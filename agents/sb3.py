@@ -8,6 +8,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from ..envs.model import ACTIONS
 from ..envs.vector import SegmentedFootBipedVector
 from ..gait.errors import SpringfootError
 
@@ -27,7 +28,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         )
         super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
         self.step_info: dict[str, np.ndarray] = {}
-        self._actions = np.zeros((num_envs, *self.action_space.shape), np.float32)
+        self._actions = np.zeros((num_envs, len(ACTIONS)), np.float32)
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, int)
 
     def reset(self) -> np.ndarray:

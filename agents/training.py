@@ -69,7 +69,8 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     try:
         record = json.loads((out / RUN).read_text(encoding="utf-8"))
         config = config_from_json(record["config"])
-        record["sessions"], record["evaluations"]
+        if not isinstance(record["sessions"], list) or not isinstance(record["evaluations"], list):
+            raise ValueError("sessions and evaluations must be lists")
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
     header, arrays = read_tensors(out / STATE, "springfoot-training", "training state")
@@ -150,7 +151,7 @@ class _Run(BaseCallback):
             self._stopping = True
             signal.signal(number, before[number])
 
-        before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        before: dict[int, Any] = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
         for number in before:
             signal.signal(number, stop)
         try:

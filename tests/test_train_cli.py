@@ -14,7 +14,7 @@ from springfoot.agents.bundle import load_policy
 from springfoot.agents.config import PRESETS, SettingsFlags, TrainingConfig, given
 from springfoot.envs.settings import BipedSettings
 
-SCRIPT = Path(train.__file__)
+SCRIPT, RUN = Path(train.__file__), "run.json"
 SHORT = [
     *("--num-envs", "8", "--threads", "1", "--update-steps", "1024", "--eval-interval", "1024"),
     *("--eval-episodes", "2", "--episode-seconds", "1"),
@@ -103,17 +103,21 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
 def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number):
     folder = tmp_path / "run"
     command = [sys.executable, SCRIPT, "--out", folder, "--timesteps", "10_000_000", *SHORT]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while not (folder / "run.json").exists() or json.loads((folder / "run.json").read_text())["timesteps"] < 1024:
-        assert process.poll() is None and time.monotonic() < deadline
-        time.sleep(0.05)
-    process.send_signal(number)
-    out, error = process.communicate(timeout=60)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            deadline = time.monotonic() + 60
+            while not (folder / RUN).exists() or json.loads((folder / RUN).read_text())["timesteps"] < 1024:
+                assert process.poll() is None, process.stderr and process.stderr.read()
+                assert time.monotonic() < deadline
+                time.sleep(0.05)
+            process.send_signal(number)
+            out, error = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert process.returncode == 130, error
     assert "Traceback" not in error
     assert f"train.py --resume {folder}" in out
-    record = json.loads((folder / "run.json").read_text())
+    record = json.loads((folder / RUN).read_text())
     assert record["status"] == "interrupted"
     policy = load_policy(folder)
     action = policy(policy.observation_mean)
@@ -123,4 +127,4 @@ def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number)
         again = [sys.executable, SCRIPT, "--resume", folder, "--timesteps", "1000"]
         resumed = subprocess.run(again, capture_output=True, text=True)
         assert resumed.returncode == 0, resumed.stderr
-        assert json.loads((folder / "run.json").read_text())["timesteps"] == done + 1024
+        assert json.loads((folder / RUN).read_text())["timesteps"] == done + 1024
