@@ -2,9 +2,19 @@
 
 import gymnasium as gym
 
+from .biped import Biped
+from .faces import SegmentedFootBiped
 from .settings import BipedSettings, settings_from, settings_to_json
+from .vector import SegmentedFootBipedVector
 
-__all__ = ["BipedSettings", "settings_from", "settings_to_json"]
+__all__ = [
+    "Biped",
+    "BipedSettings",
+    "SegmentedFootBiped",
+    "SegmentedFootBipedVector",
+    "settings_from",
+    "settings_to_json",
+]
 
 gym.register(
     id="SegmentedFootBiped-v0",

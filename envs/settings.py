@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError
+from springfoot.gait.stiffness import StiffnessSchedule
 
 Cadence = Literal["people", "thesis"]
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -101,13 +102,8 @@ class BipedSettings:
                 raise SpringfootError(
                     "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
                 )
-        elif not isinstance(self.schedule, dict):
-            raise SpringfootError(f"schedule must be a stiffness schedule in JSON form or None, got {self.schedule!r}")
         else:
-            try:
-                json.dumps(self.schedule, allow_nan=False)
-            except (TypeError, ValueError) as error:
-                raise SpringfootError(f"schedule must hold plain JSON values: {error}") from None
+            StiffnessSchedule.from_json(self.schedule)
 
 
 def settings_from(**values: Any) -> BipedSettings:
@@ -117,7 +113,10 @@ def settings_from(**values: Any) -> BipedSettings:
         if name not in names:
             likely = get_close_matches(name, names, n=3, cutoff=0.5) or names
             raise SpringfootError(f"unknown setting {name!r}; valid: {', '.join(likely)}")
-    return BipedSettings(**{name: _plain(value) for name, value in values.items()})
+    values = {name: _plain(value) for name, value in values.items()}
+    if values.get("schedule") is not None:
+        values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
+    return BipedSettings(**values)
 
 
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
