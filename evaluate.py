@@ -21,9 +21,9 @@ class Flags:
     A fall is a result: the exit code is 0 with falls, 2 for bad input.
     """
 
-    policy: tyro.conf.Positional[str]
+    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
     """A .safetensors file, a run folder (its best policy), or one of: pretrained, untrained, random,
-    constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning), thesis."""
+    constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule), thesis."""
     episodes: int = 20
     """How many episodes."""
     seconds: float = 20.0

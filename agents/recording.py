@@ -100,7 +100,7 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, Bi
     """
     wanted = CONDITIONS | given
     if name.partition(":")[0] in BASELINES:
-        settings = settings_from(**(own_settings(name, wanted["height"], wanted["mass"]) | wanted))
+        settings = settings_from(**(own_settings(name, *(wanted[key] for key in ("height", "mass", "speed"))) | wanted))
         return baseline(name, settings, seed), settings
     if name != "pretrained" and not Path(name).exists():
         known = ", ".join(["pretrained", *BASELINES])

@@ -56,18 +56,11 @@ def uniform(settings: BipedSettings, seed: int = 0) -> Policy:
 
 
 def schedule(settings: BipedSettings) -> Policy:
-    """The fixed stiffness over the stride that came out of the leg tuning."""
+    """A fixed stiffness over the stride: that of `settings.schedule`, or else the one of the leg tuning."""
     body = Body(settings.height, settings.mass)
-    table = fixed_stiffness(leg_constants(settings.equilibrium, settings.cadence), body)
-    return _follow(table, settings, body)
-
-
-def thesis(settings: BipedSettings) -> Policy:
-    """The thesis's straight lines between gait events; wants `equilibrium="phase"` with the same schedule."""
-    body = Body(settings.height, settings.mass)
-    stored = settings.schedule
-    lines = thesis_schedule(body) if stored is None else StiffnessSchedule.from_json(stored)
-    return _follow(lines.at(GRID)[0], settings, body)
+    if settings.schedule is not None:
+        return _follow(StiffnessSchedule.from_json(settings.schedule).at(GRID)[0], settings, body)
+    return _follow(fixed_stiffness(leg_constants(settings.equilibrium, settings.cadence), body), settings, body)
 
 
 def _follow(stiffness: NDArray, settings: BipedSettings, body: Body) -> Policy:
@@ -96,15 +89,18 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> Policy:
     if kind == "random":
         return uniform(settings, seed)
     if kind in BASELINES:
-        return {"untrained": untrained, "schedule": schedule, "thesis": thesis}[kind](settings)
+        return {"untrained": untrained, "schedule": schedule, "thesis": schedule}[kind](settings)
     raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
 
 
-def own_settings(name: str, height: float, mass: float) -> dict[str, Any]:
-    """The environment settings that a baseline brings with it, for a body of `height` [m] and `mass` [kg]."""
+def own_settings(name: str, height: float, mass: float, speed: float) -> dict[str, Any]:
+    """The environment settings that a baseline brings with it, for a body [m, kg] and a walking speed [m/s].
+
+    `thesis` brings the thesis's straight lines between gait events, and their equilibrium angles.
+    """
     if name != "thesis":
         return {}
-    return {"equilibrium": "phase", "schedule": thesis_schedule(Body(height, mass)).to_json()}
+    return {"equilibrium": "phase", "schedule": thesis_schedule(Body(height, mass), speed).to_json()}
 
 
 def _stiffness_from(text: str) -> tuple[float, float]:

@@ -11,8 +11,8 @@ from springfoot.gait import Body, SpringfootError
 
 
 def settings_of(name, **values):
-    body = {"height": 1.70, "mass": 63.0} | values
-    return settings_from(**(own_settings(name, body["height"], body["mass"]) | values))
+    body = {"height": 1.70, "mass": 63.0, "speed": 1.2} | values
+    return settings_from(**(own_settings(name, **body) | values))
 
 
 def started(settings, phases):
@@ -70,6 +70,16 @@ def test_thesis_brings_its_schedule_and_swings_at_the_lowest_stiffness():
     action = baseline("thesis", settings)(biped.observe())
     assert action[0, 0] == -1.0  # left ankle in swing
     assert action[0, 2] > -1.0  # right ankle in stance
+
+
+def test_schedule_follows_one_that_is_given():
+    given = {"ankle": [[0.0, 100.0, 0.0], [0.6, 50.0, 0.0]], "toe": [[0.0, 20.0, 0.0]]}
+    biped = started(BipedSettings(schedule=given), [0.3, 0.8])
+    stiffness = stiffness_of(
+        baseline("schedule", biped.settings)(biped.observe()).reshape(2, 2, 2), biped.settings, Body()
+    )
+    assert stiffness[0] == pytest.approx(np.array([[100.0, 20.0], [50.0, 20.0]]), rel=1e-5)
+    assert stiffness[1] == pytest.approx(stiffness[0, ::-1], rel=1e-6)
 
 
 def test_untrained_is_mid_range_and_random_is_seeded():
