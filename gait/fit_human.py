@@ -40,9 +40,7 @@ def fit(reference: Path) -> dict:
     """The series of every curve, as `human.py` reads them, from the CSV files in folder `reference`."""
     rows = _read(reference / "human_gait.csv")
     toe_rows = _read(reference / "human_mtp.csv")
-    names = sorted(
-        {row["condition"] for row in rows}, key=lambda name: float(_of(rows, name)[0]["speed_m_s"])
-    )
+    names = sorted({row["condition"] for row in rows}, key=lambda name: float(_of(rows, name)[0]["speed_m_s"]))
     conditions, table = [], {"mean": {}, "sd": {}}
     for condition in names:
         own = _of(rows, condition)

@@ -72,7 +72,7 @@ class HumanGait:
         if np.iscomplexobj(coefficients):
             turn = 2j * np.pi * np.arange(len(coefficients))
             terms = turn * coefficients if derivative else coefficients
-            return (np.exp(phase[..., None] * turn) @ terms).real
+            return np.real(np.exp(phase[..., None] * turn) @ terms)
         wave = np.pi / self.toe_off * np.arange(1, len(coefficients) + 1)
         angle = phase[..., None] * wave
         value = np.cos(angle) @ (wave * coefficients) if derivative else np.sin(angle) @ coefficients
@@ -122,7 +122,7 @@ def human_gait(speed: float, height: float = 1.70) -> HumanGait:
 @cache
 def _harmonics() -> dict:
     """The fitted series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
-    text = resources.files(__package__).joinpath("human_harmonics.json").read_text(encoding="utf-8")
+    text = resources.files("springfoot.gait").joinpath("human_harmonics.json").read_text(encoding="utf-8")
     table = json.loads(text)
     for kind in ("mean", "sd"):
         for name, rows in table[kind].items():

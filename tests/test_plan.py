@@ -1,0 +1,251 @@
+"""The plan against its own physics (cart-table, rockers, kinematics) and against people."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp
+
+from springfoot.gait import GRAVITY, Body, SpringfootError, plan_walk
+from springfoot.gait.feet import turned
+from springfoot.gait.posture import leg_angles
+
+PHASE = np.arange(10_000) / 10_000
+
+
+@cache
+def plan_of(cadence="people", speed=1.2, height=1.70, **settings):
+    return plan_walk(Body(height, 63.0), speed, cadence, **settings)
+
+
+PLANS = pytest.mark.parametrize(
+    "arguments",
+    [("people",), ("thesis",), ("people", 0.6), ("people", 1.8), ("people", 1.0, 1.5), ("thesis", 1.4, 2.0)],
+    ids=str,
+)
+
+
+def rms_deg(plan, name):
+    phase = np.arange(1000) / 1000
+    return np.degrees(np.sqrt(np.mean((plan.joint_angles(phase)[name] - plan.human.mean(name, phase)) ** 2)))
+
+
+def recomputed_zmp(plan, phase, step=1e-4):
+    """Equation (1) with accelerations by finite differences of the positions alone."""
+    (x0, z0), (x1, z1), (x2, z2) = (plan.com(phase + shift) for shift in (-step, 0.0, step))
+    interval = step * plan.step_time
+    return x1 - z1 * (x2 - 2 * x1 + x0) / ((z2 - 2 * z1 + z0) + GRAVITY * interval**2)
+
+
+def test_step_is_that_of_people_or_of_the_thesis():
+    people, thesis = plan_of(), plan_of("thesis")
+    assert people.step_length == pytest.approx(0.66, abs=0.005) and people.step_time == pytest.approx(0.55, abs=0.005)
+    assert thesis.step_length == pytest.approx(0.6) and thesis.step_time == pytest.approx(0.5)
+    assert thesis.double_support == pytest.approx(0.06)
+
+
+@PLANS
+def test_zmp_recomputed_from_the_motion_stays_inside_the_support(arguments):
+    plan = plan_of(*arguments)
+    inside_step = PHASE[2:-2]
+    for zmp, phase, tolerance in (
+        (plan.zmp(PHASE), PHASE, 0.0),
+        (recomputed_zmp(plan, inside_step), inside_step, 1e-4),
+    ):
+        rear, front = plan.support(phase)
+        assert np.all(zmp >= rear - tolerance) and np.all(zmp <= front + tolerance)
+
+
+@PLANS
+def test_speed_closes_and_net_fore_aft_impulse_is_zero(arguments):
+    plan = plan_of(*arguments)
+    assert plan.step_length / plan.step_time == pytest.approx(plan.speed)
+    (start, _), (end, _) = plan.com(0.0), plan.com(1 - 1e-12)
+    assert end - start == pytest.approx(plan.step_length, abs=1e-9)
+    for ends in (plan.com_velocity, plan.com_acceleration):
+        np.testing.assert_allclose(ends(0.0), ends(1 - 1e-12), atol=1e-6)
+    forward, up = plan.com_acceleration(PHASE)
+    assert abs(forward.mean()) < 1e-6 and abs(up.mean()) < 1e-9
+
+
+@PLANS
+def test_com_is_lowest_in_double_support(arguments):
+    plan = plan_of(*arguments)
+    _, height = plan.com(PHASE)
+    assert PHASE[height.argmin()] * plan.step_time == pytest.approx(plan.double_support / 2, abs=1e-3)
+
+
+def test_walking_com_height_and_rise_are_peoples():
+    plan = plan_of()
+    _, height = plan.com(PHASE)
+    assert 0.965 < height.mean() < 0.985
+    assert 0.034 < height.max() - height.min() < 0.041
+
+
+def test_at_constant_height_the_com_is_the_closed_form():
+    plan = plan_of(com_amplitude=0.0)
+    rate = np.sqrt(GRAVITY / plan.motion.height)
+    times = np.array([0.0, plan.double_support, plan.step_time])
+    zmp = np.array([0.140 - plan.step_length, -0.020, 0.140])
+    # Over a straight ZMP x = p + a cosh + b sinh; four conditions: smooth inside, repeating at the ends.
+    first, second = np.diff(times)
+    slopes = np.diff(zmp) / np.diff(times)
+    cosh, sinh = np.cosh(rate * np.array([first, second])), np.sinh(rate * np.array([first, second]))
+    matrix = np.array(
+        [
+            [cosh[0], sinh[0], -1, 0],
+            [sinh[0], cosh[0], 0, -1],
+            [-1, 0, cosh[1], sinh[1]],
+            [0, -1, sinh[1], cosh[1]],
+        ]
+    )
+    kink = (slopes[1] - slopes[0]) / rate
+    a1, b1, a2, b2 = np.linalg.solve(matrix, [0.0, kink, 0.0, -kink])
+    t = PHASE * plan.step_time
+    u = rate * np.where(t < first, t, t - first)
+    expected = np.interp(t, times, zmp) + np.where(
+        t < first, a1 * np.cosh(u) + b1 * np.sinh(u), a2 * np.cosh(u) + b2 * np.sinh(u)
+    )
+    assert np.abs(plan.com(PHASE)[0] - expected).max() < 1e-9
+
+
+def test_at_moving_height_the_com_is_the_periodic_solution_of_the_cart_table():
+    plan = plan_of()
+    times = np.array([0.0, plan.double_support, plan.step_time])
+    zmp = np.array([0.140 - plan.step_length, -0.020, 0.140])
+
+    def motion(t, state):
+        _, height = plan.motion.position(t)
+        _, lift = plan.motion.acceleration(t)
+        return np.stack([state[1], (GRAVITY + lift) / height * (state[0] - np.interp(t, times, zmp))])
+
+    def repeats(start, end):
+        return np.array([end[0] - start[0] - plan.step_length, end[1] - start[1]])
+
+    grid = np.union1d(np.linspace(0, plan.step_time, 401), times)
+    guess = np.stack([np.linspace(-0.33, 0.33, len(grid)), np.full(len(grid), 1.2)])
+    solution = solve_bvp(motion, repeats, grid, guess, tol=1e-9, max_nodes=20_000)
+    assert solution.success
+    assert np.abs(plan.motion.path(grid) - solution.sol(grid)[0]).max() < 1e-8
+
+
+@PLANS
+def test_toe_joint_stands_still_until_the_toe_leaves_the_ground(arguments):
+    plan = plan_of(*arguments)
+    feet, body = plan.feet, plan.body
+    assert 0 < feet.foot_flat < feet.heel_off < 0.5 < feet.toe_off < 1
+    planted = np.linspace(feet.foot_flat, feet.toe_off, 2001)
+    x, z = plan.toe_joint_position(planted)
+    assert np.ptp(z) <= 1e-12 and np.ptp(x) <= 1e-12
+    assert z[0] == pytest.approx(body.toe_joint_height, abs=1e-12)
+    # It is where ankle and pitch put it, not merely declared so.
+    ankle, pitch = feet.ankle(planted), feet.pitch(planted)
+    arm = turned(pitch, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
+    np.testing.assert_allclose([ankle[0] + arm[0], ankle[1] + arm[1]], [x, z], atol=1e-12)
+    flat = np.linspace(feet.foot_flat, feet.heel_off, 500)
+    assert np.all(feet.pitch(flat) == 0) and np.all(plan.joint_angles(flat[5:-5])["toe"] == 0)
+    heel_x, heel_z = feet.heel(np.linspace(0, feet.heel_off, 500))
+    assert np.ptp(heel_x) < 1e-12 and np.abs(heel_z).max() < 1e-12
+
+
+@PLANS
+def test_swing_foot_clears_the_floor_and_lands_two_steps_on_smoothly(arguments):
+    plan = plan_of(*arguments)
+    feet = plan.feet
+    swing = np.linspace(feet.toe_off, 1, 500)[1:-1]
+    assert feet.ball_clearance(swing).min() > -1e-12 and feet.heel(swing)[1].min() > -0.003
+    middle = feet.toe_off + np.linspace(0.2, 0.9, 200) * (1 - feet.toe_off)
+    assert feet.ball_clearance(middle).min() > 0.005 * plan.body.length_scale
+    tiny = 1e-7
+    for event, step in ((feet.toe_off, 0.0), (1.0, 2 * plan.step_length)):
+        for before, after in zip(feet.ankle(event - tiny), feet.ankle(event + tiny), strict=True):
+            assert min(abs(after - before), abs(after + step - before)) < 1e-5
+
+
+@PLANS
+def test_joint_angles_rebuild_the_planned_body(arguments):
+    """Forward kinematics from the angles: the ankle lies where the foot is, the whole body's CoM where planned."""
+    plan = plan_of(*arguments)
+    body = plan.body
+    phase = np.arange(600) / 600
+    angles, hip = plan.joint_angles(phase), np.array(plan.hip_position(phase))
+
+    def along(angle, length):
+        return length * np.stack([np.sin(angle), -np.cos(angle)])
+
+    thigh, shank = angles["thigh"], angles["thigh"] - angles["knee"]
+    knee = hip + along(thigh, body.thigh_length)
+    ankle = knee + along(shank, body.shank_length)
+    np.testing.assert_allclose(ankle, plan.ankle_position(phase), atol=1e-9)
+    pitch = shank + angles["ankle"]
+    np.testing.assert_allclose(pitch, plan.feet.pitch(phase), atol=1e-9)
+
+    forward, below = body.foot_com
+    toe_joint = ankle + turned(pitch, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
+    leg = (
+        body.thigh_mass * (hip + along(thigh, body.thigh_com))
+        + body.shank_mass * (knee + along(shank, body.shank_com))
+        + body.foot_mass * (ankle + turned(pitch, forward, -below))
+        + body.toe_mass * (toe_joint + turned(pitch + angles["toe"], body.toe_com, 0.0))
+    )
+    trunk = body.trunk_mass * (hip + np.array([[0.0], [body.trunk_com_above_hip]]))
+    other = np.roll(leg, 300, axis=1)
+    leg_mass = (body.mass - body.trunk_mass) / 2
+    other[0] += leg_mass * plan.step_length * np.where(phase < 0.5, -1, 1)
+    com = (trunk + leg + other) / body.mass
+    planned = np.array(plan.com(2 * phase))
+    planned[0] += plan.step_length * (phase >= 0.5)
+    np.testing.assert_allclose(com, planned, atol=1e-9)
+
+
+@pytest.mark.parametrize("arguments", [("people",), ("thesis",)], ids=str)
+def test_angles_are_like_peoples_at_1_2(arguments):
+    plan = plan_of(*arguments)
+    assert rms_deg(plan, "thigh") < 4.0
+    assert rms_deg(plan, "knee") < 5.0
+    assert rms_deg(plan, "ankle") < 7.0
+
+
+def test_joint_rates_are_the_derivatives_and_phases_wrap():
+    plan, phase, step = plan_of(), np.linspace(0.01, 0.99, 40), 1e-6
+    ahead, behind = plan.joint_angles(phase + step), plan.joint_angles(phase - step)
+    for name, rate in plan.joint_rates(phase).items():  # the table is a cubic: its curvature jumps at samples
+        np.testing.assert_allclose(rate, (ahead[name] - behind[name]) / (2 * step * plan.stride_time), atol=1e-3)
+    np.testing.assert_allclose(plan.joint_angles([1.25, -0.75])["knee"], plan.joint_angles(0.25)["knee"], atol=1e-12)
+    assert plan.joint_angles(np.zeros((2, 3)))["toe"].shape == (2, 3)
+
+
+def test_equal_froude_speed_gives_equal_angles_and_no_effect_of_mass():
+    ratio = 1.9 / 1.6
+    small, large = plan_walk(Body(1.6, 50.0), 1.1), plan_walk(Body(1.9, 90.0), 1.1 * np.sqrt(ratio))
+    phase = np.linspace(0, 1, 101)
+    for name, angle in small.joint_angles(phase).items():
+        np.testing.assert_allclose(large.joint_angles(phase)[name], angle, atol=1e-4)
+    assert large.step_time / small.step_time == pytest.approx(np.sqrt(ratio))
+
+
+def test_leg_inverse_kinematics_reaches_its_target():
+    thigh, knee = leg_angles(0.2, 0.7, 0.40, 0.43)
+    assert 0.40 * np.sin(thigh) + 0.43 * np.sin(thigh - knee) == pytest.approx(0.2)
+    assert 0.40 * np.cos(thigh) + 0.43 * np.cos(thigh - knee) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "settings", "reason"),
+    [
+        ((0.39,), {}, "speed"),
+        ((2.01,), {}, "speed"),
+        ((float("nan"),), {}, "speed"),
+        ((1.2, "robot"), {}, "cadence"),
+        ((2.0, "thesis"), {}, r"legs too short.* \d\.\d+ m"),
+        ((1.2,), {"com_height": 1.0}, r"legs too short by 0\.\d+ m"),
+        ((1.2,), {"zmp_travel": (-0.02, 0.20)}, r"outside by 0\.028 m"),
+        ((1.2,), {"zmp_travel": (-0.10, 0.14)}, "outside by"),
+        ((1.2,), {"double_support": 0.0}, "double_support"),
+        ((1.2,), {"com_amplitude": 0.2}, "com_amplitude"),
+    ],
+)
+def test_impossible_plans_are_refused_with_their_reason(arguments, settings, reason):
+    with pytest.raises(SpringfootError, match=reason) as caught:
+        plan_walk(Body(), *arguments, **settings)
+    assert "\n" not in str(caught.value)
