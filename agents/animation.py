@@ -87,7 +87,7 @@ class _Canvas:
         self._force(LEFT, FORCE)
         self._masses()
         self._words()
-        return image.resize(SIZE, Image.Resampling.LANCZOS)
+        return image.reduce(OVERSAMPLING)
 
     def _at(self, name: str) -> NDArray:
         return self._series[name][self._tick]
