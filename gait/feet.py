@@ -19,7 +19,8 @@ TOE_ROCKER_POWER = 2.12
 """The heel rises with this power of the time since heel-off."""
 
 # The swing passes two via points, a third and two thirds through it, and leaves and lands at the rockers' position,
-# velocity and acceleration. Found by least squares against people's thigh, knee and (weighing less) ankle at 0.8 to 1.7 m/s.
+# velocity and acceleration. Found by least squares against people's thigh, knee and, weighing less, ankle curves at
+# 0.8 to 1.7 m/s.
 VIA = (1 / 3, 2 / 3)
 """Parts of the swing at which the via points lie."""
 VIA_FORWARD = (0.237, 0.693)
