@@ -209,6 +209,7 @@ class _Run(BaseCallback):
         past.append(entry)
         for name in ("return_mean", "falls", "seconds_mean"):
             self.logger.record(f"evaluation/{name}", entry[name])
+        self.logger.dump(self._trained)
         self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {len(returns)} fell")
         self._save()
 
