@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from springfoot.envs.actuation import stiffness_ranges
 from springfoot.envs.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE, contact_offsets
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
@@ -72,9 +73,7 @@ class _Canvas:
         self._title = recording.policy
         self._subtitle = f"{settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s"
         self._fonts = {size: ImageFont.load_default(OVERSAMPLING * size) for size in (11, 15)}
-        scale = body.mass_scale * body.length_scale
-        ranges = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range]) * scale
-        self._stiffness_range = np.log(ranges)
+        self._stiffness_range = np.log(np.stack(stiffness_ranges(settings, body), axis=-1))
 
     def frame(self, tick: int) -> Image.Image:
         image = Image.new("RGB", (OVERSAMPLING * SIZE[0], OVERSAMPLING * SIZE[1]), PAPER)

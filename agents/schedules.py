@@ -15,7 +15,7 @@ from springfoot.envs.actuation import action_of
 from springfoot.envs.equilibrium import fixed_stiffness
 from springfoot.envs.legs import leg_constants
 from springfoot.envs.model import ACTIONS
-from springfoot.envs.phase import GRID, PhaseTable
+from springfoot.envs.phase import GRID, PhaseTable, leg_phases
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.task import OBSERVATION
 from springfoot.gait.body import Body
@@ -33,13 +33,13 @@ _SIN, _COS = ([entry.name for entry in OBSERVATION].index(name) for name in ("ph
 def leg_phase(observation: NDArray) -> NDArray:
     """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike, read from observations (N, D)."""
     left = np.arctan2(observation[:, _SIN], observation[:, _COS], dtype=float) / (2 * np.pi) % 1.0
-    return np.stack([left, (left + 0.5) % 1.0], -1)
+    return leg_phases(left)
 
 
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> Policy:
     """The same ankle and toe stiffness always: (ankle, toe) [N m/rad], for 1.70 m and 63 kg, scaled with the body."""
     body = Body(settings.height, settings.mass)
-    scaled = np.asarray(stiffness, float) * body.mass_scale * body.length_scale
+    scaled = np.asarray(stiffness, float) * body.stiffness_scale
     action = np.tile(_absolute(scaled, settings, body), 2)
     return lambda observation: np.tile(action, (len(observation), 1))
 

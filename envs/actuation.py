@@ -1,6 +1,6 @@
 """Actions to stiffness to control, for the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
 
-Axes: (N, side, 2), the last one ankle and toe; an action's four numbers are this array's rows in the order of `ACTIONS`.
+Axes: (N, side, 2), the last one ankle and toe; an action's four numbers are these rows in the order of `ACTIONS`.
 """
 
 import numpy as np
@@ -19,8 +19,7 @@ FEET = slice(ANKLE, None)
 def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
     """Lowest and highest (ankle, toe) stiffness of this body [N m/rad]."""
     low, high = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
-    scale = body.mass_scale * body.length_scale
-    return low * scale, high * scale
+    return low * body.stiffness_scale, high * body.stiffness_scale
 
 
 def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
@@ -72,26 +71,32 @@ class FootSprings:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
         return self._schedule.at(leg_phase, self._variant)
 
-    def set_stiffness(self, action: NDArray, leg_phase: NDArray, angle: NDArray) -> NDArray:
+    def set_stiffness(
+        self, action: NDArray, leg_phase: NDArray, angle: NDArray, frozen: NDArray | None = None
+    ) -> NDArray:
         """Take new stiffness from an action (N, 4) at foot angles (N, side, 2); returns the work put in [J].
 
-        Changing K under a deflection x puts 1/2 (K' - K) x^2 into the spring.
+        Changing K under a deflection x puts 1/2 (K' - K) x^2 into the spring. Rows in the mask `frozen` (N,) stay.
         """
         action = action.reshape(self.stiffness.shape)
         if self._settings.action_mode == "residual":
             stiffness = self.scheduled(leg_phase) * np.exp(action)
         else:
             stiffness = stiffness_of(action, self._settings, self._body)
+        if frozen is not None:
+            stiffness[frozen] = self.stiffness[frozen]
         work = 0.5 * (stiffness - self.stiffness) * (self.equilibrium - angle) ** 2
         self.stiffness = stiffness
         return np.where(self._fresh[:, None, None], 0.0, work)
 
-    def move_equilibrium(self, leg_phase: NDArray, angle: NDArray) -> NDArray:
+    def move_equilibrium(self, leg_phase: NDArray, angle: NDArray, frozen: NDArray | None = None) -> NDArray:
         """Take the rest angles of the legs' phases; returns the work put in, 1/2 K (x'^2 - x^2) [J]."""
         equilibrium = self._equilibrium.at(leg_phase, self._variant)
+        if frozen is not None:
+            equilibrium[frozen] = self.equilibrium[frozen]
         before, after = self.equilibrium - angle, equilibrium - angle
         work = 0.5 * self.stiffness * (after * after - before * before)
         self.equilibrium = equilibrium
         work = np.where(self._fresh[:, None, None], 0.0, work)
-        self._fresh[:] = False
+        self._fresh = np.zeros_like(self._fresh) if frozen is None else self._fresh & frozen
         return work

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.human import human_gait
+from springfoot.gait.human import ANGLES, human_gait
 from springfoot.gait.plan import plan_walk
 from springfoot.gait.stiffness import StiffnessSchedule
 
 from . import equilibrium
 from .actuation import FEET, FootSprings
 from .legs import LegConstants, Legs, leg_constants
-from .model import ACTIONS, JOINTS, SIDES, passive_damping
-from .phase import GRID, PhaseTable
+from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
+from .phase import GRID, PhaseTable, leg_phases
 from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
 from .task import Task
@@ -102,7 +102,7 @@ class Biped:
         self.on_tick: Callable[[Tick], None] | None = None
 
         constants = legs or [leg_constants(settings.equilibrium, settings.cadence)]
-        stride_time = 2 * self.plan.step_time
+        stride_time = self.plan.stride_time
         self._legs = Legs(constants, self.body, self.human, stride_time, settings.speed, num_envs, variant)
         rest, stiffness = self._curves(constants, stride_time)
         self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
@@ -119,7 +119,7 @@ class Biped:
         self._random: list[np.random.Generator | None] = [None] * num_envs
         self._steps = np.zeros(num_envs, int)
         self._last_action = np.zeros((num_envs, len(ACTIONS)))
-        self._force = np.zeros((num_envs, len(SIDES), 3, 2))
+        self._force = np.zeros((num_envs, len(SIDES), len(CONTACTS), 2))
         self._pushes = _Pushes(settings, num_envs)
         self._stiffness = np.zeros((num_envs, len(SIDES), len(JOINTS)))
         self._drive = np.zeros_like(self._stiffness)
@@ -138,12 +138,14 @@ class Biped:
         """(N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
         return self._springs.scheduled(self._legs.phase)
 
-    def reset(self, ids: NDArray, seeds: Sequence[int | None], start: float | str | None = None) -> None:
+    def reset(
+        self, ids: NDArray, seeds: Sequence[int | np.random.Generator | None], start: float | str | None = None
+    ) -> None:
         """Start environments `ids` anew, at people's posture in single support.
 
         Args:
             ids: (K,) which.
-            seeds: K seeds; None goes on with the environment's own generator.
+            seeds: K seeds, or generators to draw from; None goes on with the environment's own.
             start: stride phase of the left leg [0, 1) or "random", in place of the setting.
         """
         if len(ids) == 0:
@@ -151,9 +153,9 @@ class Biped:
         start = self.settings.start if start is None else start
         phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
         for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
-            if seed is not None or self._random[index] is None:
-                self._random[index] = np.random.default_rng(seed)
             random = self._random[index]
+            if seed is not None or random is None:
+                random = self._random[index] = np.random.default_rng(seed)
             drawn = (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
             phase[row] = drawn if start == "random" else start
             if self.settings.start_noise:
@@ -175,23 +177,29 @@ class Biped:
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
         """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
         action = self._decode(actions)
-        ids = None if active is None or active.all() else np.flatnonzero(active)
         running = np.ones(self.num_envs, bool) if active is None else active
+        frozen = None if running.all() else ~running
+        if frozen is not None:
+            action[frozen] = self._last_action[frozen]
         springs, feet = self._springs, self._now.angle[..., FEET]
-        work_stiffness = springs.set_stiffness(action, self._legs.phase, feet)
+        work_stiffness = springs.set_stiffness(action, self._legs.phase, feet, frozen)
         work_equilibrium = np.zeros_like(work_stiffness)
         forces, diverged = [], self._now.diverged
         for window in range(WINDOWS):
-            work_equilibrium += self._window(running, ids)
+            work_equilibrium += self._window(running, frozen)
             forces.append(self._now.force)
             # MuJoCo puts what diverged back to its start and steps on: the name must outlive the window
             diverged = np.where(diverged == "", self._now.diverged, diverged) if window else self._now.diverged
         self._now = replace(self._now, diverged=diverged)
         self._steps += running
-        self._force = sum(forces) / WINDOWS
+        windows = np.stack(forces)
+        force = windows.sum(0) / WINDOWS
+        if frozen is not None:
+            force[frozen] = self._force[frozen]
+        self._force = force
 
         m, phase = self._now, self._legs.phase
-        terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, np.stack(forces))
+        terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, windows)
         self._last_action = action
         termination = np.where(m.diverged == "", self._task.fallen(m), np.char.add("diverged: ", m.diverged))
         termination[~running] = ""
@@ -222,25 +230,22 @@ class Biped:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         return np.clip(action, -1.0, 1.0)
 
-    def _window(self, running: NDArray, ids: NDArray | None) -> NDArray:
+    def _window(self, running: NDArray, frozen: NDArray | None) -> NDArray:
         """One control window; returns the work of moving the foot springs' equilibrium, (N, side, 2) [J]."""
         springs, legs, m = self._springs, self._legs, self._now
         phase = legs.phase
-        work = springs.move_equilibrium(phase, m.angle[..., FEET])
-        hip_knee_stiffness, hip_knee_drive = legs.command(m)
-        self._stiffness[..., : FEET.start], self._drive[..., : FEET.start] = (
-            hip_knee_stiffness,
-            hip_knee_drive,
-        )
+        work = springs.move_equilibrium(phase, m.angle[..., FEET], frozen)
+        self._stiffness[..., : FEET.start], self._drive[..., : FEET.start] = legs.command(m)
         self._stiffness[..., FEET] = springs.stiffness
         self._drive[..., FEET] = springs.stiffness * springs.equilibrium
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
         before = legs.left_phase
+        ids = None if frozen is None else np.flatnonzero(running)
         self._now = self._simulation.advance(self._stiffness, self._drive, ids)
         legs.advance(self._now)
-        if ids is not None:
-            legs.left_phase = np.where(running, legs.left_phase, before)
+        if frozen is not None:
+            legs.left_phase[frozen] = before[frozen]
         if self.on_tick is not None:
             self.on_tick(self._tick(phase, running))
         return work
@@ -276,16 +281,15 @@ class Biped:
 
     def _start_curves(self, period: float) -> PhaseTable:
         """People's joint angles, hip as thigh to the vertical [rad], and their rates [rad/s] over the stride."""
-        angles = [self.human.mean(name, GRID) for name in ("thigh", "knee", "ankle", "toe")]
-        rates = [self.human.rate(name, GRID) / period for name in ("thigh", "knee", "ankle", "toe")]
+        angles = [self.human.mean(name, GRID) for name in ANGLES]
+        rates = [self.human.rate(name, GRID) / period for name in ANGLES]
         return PhaseTable(np.stack(angles + rates, axis=-1))
 
     def _place(self, ids: NDArray, left_phase: NDArray, noise: NDArray) -> None:
         """People's posture at the phase, at the commanded speed, the lowest contact point in the floor."""
-        legs = np.stack([left_phase, (left_phase + 0.5) % 1.0], axis=-1)
-        angle, velocity = np.split(self._start.at(legs), 2, axis=-1)
+        angle, velocity = np.split(self._start.at(leg_phases(left_phase)), 2, axis=-1)
         angle, velocity = angle * (1.0 + noise[:, 0]), velocity * (1.0 + noise[:, 1])
-        angle[..., 0] += self._trunk_pitch
+        angle[..., HIP] += self._trunk_pitch
         root, rate = np.zeros((2, len(ids), 3))
         root[:, 2], rate[:, 0] = self._trunk_pitch, self.settings.speed
         self._simulation.reset(ids, root, rate, angle, velocity)
@@ -311,7 +315,7 @@ class _Pushes:
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
         """(N,) push [N] at these step counts; only those running draw their next one."""
         time = steps * STEP_SECONDS
-        for index in np.flatnonzero(running & (time >= self._ends)):
+        for index in np.flatnonzero(running & (time >= self._ends)).tolist():
             generator = random[index]
             if generator is not None:
                 self._draw(index, generator)

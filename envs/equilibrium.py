@@ -5,7 +5,6 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
 from springfoot.gait.human import HumanGait
-from springfoot.gait.stiffness import StiffnessSchedule
 
 from .legs import LegConstants, knot_curve
 from .model import ANKLE, damping_times
@@ -30,13 +29,7 @@ def plateau_curve(values: tuple[float, ...]) -> NDArray:
 def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
     """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the schedule that was tuned with the legs."""
     toe = np.full(len(GRID), constants.toe_schedule)
-    return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.mass_scale * body.length_scale
-
-
-def schedule_curves(schedule: StiffnessSchedule) -> tuple[NDArray, NDArray]:
-    """(SAMPLES, 2) stiffness [N m/rad] and (SAMPLES, 2) equilibrium [rad] of a piecewise schedule."""
-    stiffness, equilibrium = schedule.at(GRID)
-    return stiffness, equilibrium
+    return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.stiffness_scale
 
 
 def planned(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:
@@ -46,7 +39,7 @@ def planned(constants: LegConstants, body: Body, human: HumanGait, stride_time: 
     (plantarflexion positive). The toe rests at 0 from foot flat to toe-off and 10 deg up otherwise.
     """
     beta, period = damping_times(body)[ANKLE], constants.period_factor * stride_time
-    quasi = plateau_curve(REFERENCE_STIFFNESS) * body.mass_scale * body.length_scale
+    quasi = plateau_curve(REFERENCE_STIFFNESS) * body.stiffness_scale
     moment = human.mean("ankle_moment", GRID) * body.mass * body.length_scale
     lead = beta * human.rate("ankle", GRID) / period - moment / quasi
     ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)

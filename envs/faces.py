@@ -161,8 +161,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         """Start an episode; `options={"start": phase}` sets the left leg's stride phase, or "random"."""
         start = check_options(options, ("start",)).get("start")
         super().reset(seed=seed)
-        generators: list[Any] = [self.np_random]  # in place of seeds: the core draws from Gymnasium's generator
-        self.biped.reset(np.array([0]), generators, start)
+        self.biped.reset(np.array([0]), [self.np_random], start)
         self._over = False
         if self.render_mode == "human":
             self.render()

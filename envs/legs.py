@@ -12,30 +12,29 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 from springfoot.gait.human import HumanGait
 
 from .model import HIP, KNEE, damping_times
-from .phase import GRID, PhaseTable
+from .phase import GRID, PhaseTable, leg_phases
 from .simulation import WINDOW, Measurement
 
 KNOTS = np.arange(10) / 10
 """Stride phases of the knots that correct people's curves (periodic cubic spline)."""
 STANCE_FALL = (0.5, 0.6)
 """Phases over which the trunk torque of the leg that ends its stance falls to zero."""
-TOUCHDOWN_LOAD = 30.0 / (63.0 * GRAVITY)
+TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
 """Vertical force of a foot that counts as touchdown [body weights]: 30 N at 63 kg."""
 TOUCHDOWN_PHASE = 0.80
 """Touchdown before this phase of the leg is a scuff, not a step."""
 HOLD = 0.001
 """A leg's phase waits this far before 1 until its foot touches down."""
-START_PHASES = (0.08, 0.38)
-"""A start is drawn from this part of either step: near double support a planned state falls."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,9 +88,11 @@ def leg_constants(equilibrium: str, cadence: str) -> LegConstants:
     return constants_from(_committed()[constants_name(equilibrium, cadence)])
 
 
-def constants_from(values: dict) -> LegConstants:
+def constants_from(values: dict[str, Any]) -> LegConstants:
     """`LegConstants` from its JSON form (lists for tuples)."""
-    as_tuple = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+    as_tuple: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
+    }
     return LegConstants(**as_tuple)
 
 
@@ -129,7 +130,7 @@ class Legs:
         variant: NDArray | None = None,
     ):
         variant = np.zeros(num, int) if variant is None else variant
-        scale, root = body.mass_scale * body.length_scale, sqrt(body.length_scale)
+        scale, root = body.stiffness_scale, sqrt(body.length_scale)
 
         def of_each(value):
             return np.array([value(c) for c in constants], float)[variant]
@@ -150,7 +151,7 @@ class Legs:
     @property
     def phase(self) -> NDArray:
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike."""
-        return np.stack([self.left_phase, (self.left_phase + 0.5) % 1.0], axis=-1)
+        return leg_phases(self.left_phase)
 
     def advance(self, m: Measurement) -> None:
         """Let one window pass: the phase runs on, waits for a late foot, and starts anew with the one that lands."""
@@ -159,8 +160,7 @@ class Legs:
         waiting = np.where(phase < 0.5, 0.5, 1.0) - HOLD
         phase = np.minimum(phase + np.maximum(rate, 0.0), np.maximum(waiting, phase))
         landed = m.force[..., 1].sum(-1) > self._touchdown_force
-        legs = np.stack([phase, (phase + 0.5) % 1.0], axis=-1)
-        strike = landed & (legs > TOUCHDOWN_PHASE)
+        strike = landed & (leg_phases(phase) > TOUCHDOWN_PHASE)
         self.left_phase = np.where(strike[:, 0], 0.0, np.where(strike[:, 1], 0.5, phase))
 
     def command(self, m: Measurement) -> tuple[NDArray, NDArray]:
@@ -189,7 +189,7 @@ def _leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_ti
         (HIP, "thigh", "hip_moment", constants.hip_knots_deg, constants.hip_stiffness),
         (KNEE, "knee", "knee_moment", constants.knee_knots_deg, constants.knee_stiffness),
     ):
-        stiffness = (in_swing + (in_stance - in_swing) * stance) * body.mass_scale * body.length_scale
+        stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
         feed = -constants.feedforward[joint] * human.mean(moment, GRID) * torque  # people count extension positive
         columns.append(stiffness)

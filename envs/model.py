@@ -61,12 +61,12 @@ def damping_times(body: Body) -> np.ndarray:
 
 def torque_limits(body: Body) -> np.ndarray:
     """Largest actuator torque [N m] of each joint in the order of `JOINTS`, shape (4,)."""
-    return np.array(TORQUE_LIMIT) * body.mass_scale * body.length_scale
+    return np.array(TORQUE_LIMIT) * body.stiffness_scale
 
 
 def passive_damping(body: Body) -> np.ndarray:
     """Joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
-    return np.array(PASSIVE_DAMPING) * body.mass_scale * body.length_scale * sqrt(body.length_scale)
+    return np.array(PASSIVE_DAMPING) * body.stiffness_scale * sqrt(body.length_scale)
 
 
 def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
@@ -118,11 +118,8 @@ def build_spec(body: Body) -> mujoco.MjSpec:
         friction=(FRICTION, 0.005, 0.0001),
     )
     trunk = _segment(world, "trunk", (0, 0, 0), body.trunk_mass, (0, body.trunk_com_above_hip), body.trunk_inertia)
-    for name, kind, axis in (
-        ("x", mujoco.mjtJoint.mjJNT_SLIDE, (1, 0, 0)),
-        ("z", mujoco.mjtJoint.mjJNT_SLIDE, (0, 0, 1)),
-        ("pitch", mujoco.mjtJoint.mjJNT_HINGE, (0, 1, 0)),
-    ):
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    for name, kind, axis in zip(ROOT, (slide, slide, hinge), ((1, 0, 0), (0, 0, 1), (0, 1, 0)), strict=True):
         trunk.add_joint(name=name, type=kind, axis=axis)
     trunk.add_camera(
         name="track",
@@ -218,14 +215,14 @@ def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> Non
     _bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
 
 
-def _segment(parent, name, pos, mass, com, inertia, joint=None, body=None):
+def _segment(parent, name, pos, mass, com, inertia, joint: str = "", body: Body | None = None):
     """A rigid segment with an explicit inertia; the hinge, if any, is named after the joint and the segment's side."""
     segment = parent.add_body(name=name, pos=pos)
     segment.explicitinertial = True
     segment.mass = mass
     segment.ipos = (com[0], 0.0, com[1])
     segment.inertia = (inertia, inertia, inertia)  # only the sagittal one acts
-    if joint is not None:
+    if body is not None:
         index = JOINTS.index(joint)
         length, scale = body.length_scale, body.mass_scale
         limit = float(torque_limits(body)[index])

@@ -1,4 +1,4 @@
-"""Curves over the stride, tabulated once and read at many phases: the same bits for any number of bodies."""
+"""Phases of the stride, and curves over it, tabulated once and read at many: the same bits for any number of bodies."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +7,11 @@ SAMPLES = 1000
 """Samples of a stride; between them curves are linear."""
 GRID = np.arange(SAMPLES) / SAMPLES
 """Their phases, (SAMPLES,)."""
+
+
+def leg_phases(left: NDArray) -> NDArray:
+    """(N,) stride phase of the left leg -> (N, side) of both, half a stride apart, in [0, 1)."""
+    return np.stack([left, (left + 0.5) % 1.0], axis=-1)
 
 
 class PhaseTable:

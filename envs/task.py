@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.gait.body import GRAVITY, Body
-from springfoot.gait.human import HumanGait
+from springfoot.gait.human import ANGLES, HumanGait
 from springfoot.gait.plan import WalkPlan
 
 from .model import ACTIONS, ANKLE, CONTACTS, HIP, JOINTS, KNEE, LEFT, RIGHT, SIDES, TOE
@@ -123,14 +123,14 @@ class Task:
         self._tracking_tolerance = np.array(
             [COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)]
         )
-        self._stiffness_unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.mass_scale * length
+        self._stiffness_unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
         self._stiffness_share = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
         self._pose_share = np.array([POSE_WEIGHTS[joint] for joint in range(len(JOINTS))])
         self._half_step = 0.5 * STEP_SECONDS / plan.stride_time
 
         self._step_length = plan.step_length
         self._plan = PhaseTable(_com_curves(plan))
-        self._pose = PhaseTable(np.stack([human.mean(name, GRID) for name in ("thigh", "knee", "ankle", "toe")], -1))
+        self._pose = PhaseTable(np.stack([human.mean(name, GRID) for name in ANGLES], -1))
         force = ("grf_forward", "grf_vertical")
         mean, sd = [human.mean(name, GRID) for name in force], [human.sd(name, GRID) for name in force]
         self._force = PhaseTable(np.stack(mean + sd, -1))

@@ -57,7 +57,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._camera: Camera | None = None
-        self._generators: list[Any] = [None] * num_envs
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
 

@@ -56,6 +56,11 @@ class Body:
         """mass / 63 kg."""
         return self.mass / REFERENCE_MASS
 
+    @property
+    def stiffness_scale(self) -> float:
+        """Of stiffness and torque, at equal strain: mass scale x length scale."""
+        return self.mass_scale * self.length_scale
+
     # Lengths ------------------------------------------------------------------------------------------------
 
     @property

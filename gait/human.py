@@ -15,9 +15,11 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .body import HEIGHT_RANGE
+from .body import HEIGHT_RANGE, REFERENCE_HEIGHT
 from .errors import SpringfootError, require_within
 
+ANGLES = ("thigh", "knee", "ankle", "toe")
+"""Curves that give a leg's posture, from the hip down; the thigh to the vertical: hip = thigh + trunk pitch."""
 SPEED_RANGE = (0.01, 10.0)
 """Speeds accepted [m/s]; people's curves reach over a part of it only and are clamped beyond."""
 
@@ -79,7 +81,7 @@ class HumanGait:
         return np.where(phase < self.toe_off, value, 0.0)
 
 
-def human_gait(speed: float, height: float = 1.70) -> HumanGait:
+def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
     """People's gait at `speed` [m/s] for a body of `height` [m].
 
     Interpolated linearly between the measured conditions at equal Froude speed v / sqrt(g l), and clamped to the

@@ -19,7 +19,7 @@ from .body import GRAVITY, Body
 from .cart_table import ComMotion, periodic_com, zmp
 from .errors import SpringfootError, require_within
 from .feet import FootPath
-from .human import HumanGait, human_gait
+from .human import ANGLES, HumanGait, human_gait
 from .posture import GRID, Legs, full_reach, legs_under_com
 
 Cadence = Literal["people", "thesis"]
@@ -305,4 +305,4 @@ def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolato
 
 
 def _named(columns: NDArray) -> dict[str, NDArray]:
-    return dict(zip(("thigh", "knee", "ankle", "toe"), np.moveaxis(columns, -1, 0), strict=True))
+    return dict(zip(ANGLES, np.moveaxis(columns, -1, 0), strict=True))

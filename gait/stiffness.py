@@ -106,7 +106,7 @@ def thesis_schedule(
     no line of the ankle falls below it.
     """
     human = human_gait(speed, body.height)
-    scale = body.mass_scale * body.length_scale
+    scale = body.stiffness_scale
     lowest_ankle, lowest_toe = (
         require_within("swing_stiffness", k, STIFFNESS_RANGE, "N m/rad") for k in swing_stiffness
     )

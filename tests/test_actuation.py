@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.envs.actuation import FootSprings, action_of, stiffness_of, stiffness_ranges
 from springfoot.envs.phase import GRID, SAMPLES, PhaseTable
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import ActionMode, BipedSettings
 from springfoot.gait.body import Body
 
 
@@ -29,7 +29,7 @@ def test_action_of_inverts_the_map_and_stops_at_the_ends():
     np.testing.assert_array_equal(action_of([[1e-9, 1e9]], settings, body), [[-1.0, 1.0]])
 
 
-def springs(mode: str = "absolute", num: int = 3) -> FootSprings:
+def springs(mode: ActionMode = "absolute", num: int = 3) -> FootSprings:
     rest = np.stack([0.3 * np.sin(2 * np.pi * GRID), 0.1 * np.cos(2 * np.pi * GRID)], -1)[None]
     schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
     return FootSprings(BipedSettings(action_mode=mode), Body(), rest, schedule, num)

@@ -61,7 +61,8 @@ def test_the_joint_torque_is_the_spring_equation_while_walking(walked):
     for tick in ticks[-50:]:
         m = tick.measurement
         angle, velocity = m.angle[..., FEET], m.velocity[..., FEET]
-        spring = tick.stiffness[..., FEET] * (tick.equilibrium[..., FEET] - angle - np.array(DAMPING_TIME)[FEET] * velocity)
+        deflection = tick.equilibrium[..., FEET] - angle - np.array(DAMPING_TIME)[FEET] * velocity
+        spring = tick.stiffness[..., FEET] * deflection
         below = np.abs(spring) < limit
         np.testing.assert_allclose(m.torque[..., FEET][below], spring[below], rtol=0, atol=1e-9)
     joints = biped.data(0).qfrc_actuator[3:].reshape(2, 4)
@@ -96,31 +97,43 @@ def test_the_start_stands_on_the_floor_at_the_phase_asked_for():
 def test_pushes_come_once_in_each_interval_in_both_directions():
     biped = Biped(BipedSettings(push_newton=10.0, push_interval=1.0, episode_seconds=30.0), 8)
     forces = []
-    original = biped._simulation.push
-    biped._simulation.push = lambda force: (forces.append(force.copy()), original(force))
-    walk_ticks = walk(biped, 4.0)
+    biped.on_tick = lambda tick: forces.append(biped._simulation._push[:, 0].copy())
+    biped.reset(np.arange(8), range(8))
+    for _ in range(200):
+        biped.step(scheduled(biped))
     force = np.stack(forces)
-    assert len(force) == len(walk_ticks)
     assert set(np.unique(force)) == {-10.0, 0.0, 10.0}
     for second in range(4):
         window = force[100 * second : 100 * (second + 1)]
         np.testing.assert_allclose((window != 0).sum(0), 10, atol=1)
 
 
-def test_an_environment_left_out_does_not_notice():
-    with_pause, without = Biped(BipedSettings(), 2), Biped(BipedSettings(), 2)
-    for biped in (with_pause, without):
+@pytest.mark.parametrize("mode", ["absolute", "residual"])
+@pytest.mark.parametrize("begun", [0, 5])
+def test_an_environment_left_out_does_not_notice(mode, begun):
+    settings = BipedSettings(action_mode=mode, push_newton=100.0, push_interval=0.2)
+    paused, straight = Biped(settings, 2), Biped(settings, 2)
+    actions = np.random.default_rng(0).uniform(-1, 1, (30, 2, 4))
+    for biped in (paused, straight):
         biped.reset(np.arange(2), [4, 5])
-    for _ in range(20):
-        action = np.zeros((2, 4))
-        outcome = with_pause.step(action, active=np.array([True, False]))
+    for action in actions[:begun]:
+        paused.step(action)
+        before = straight.step(action)
+    seen = paused.observe()[1]
+    for _ in range(7):
+        outcome = paused.step(np.ones((2, 4)), active=np.array([True, False]))
+        np.testing.assert_array_equal(outcome.observation[1], seen)
         assert outcome.reward[1] == 0.0
-        assert outcome.info["time"][1] == 0.0
-    with_pause.reset(np.arange(2), [4, 5])
-    for _ in range(20):
-        a, b = with_pause.step(np.zeros((2, 4))), without.step(np.zeros((2, 4)))
-        np.testing.assert_array_equal(a.observation, b.observation)
-        np.testing.assert_array_equal(a.reward, b.reward)
+        if begun:
+            assert outcome.info["stiffness/toe_right"][1] == before.info["stiffness/toe_right"][1]
+        for name in ("ankle_left", "toe_left", "ankle_right", "toe_right"):
+            assert outcome.info[f"work/stiffness/{name}"][1] == outcome.info[f"work/equilibrium/{name}"][1] == 0.0
+    for action in actions[begun:]:
+        a, b = paused.step(action), straight.step(action)
+        np.testing.assert_array_equal(a.observation[1], b.observation[1])
+        assert a.reward[1] == b.reward[1]
+        for name, value in a.info.items():
+            assert value[1] == b.info[name][1], name
 
 
 def test_a_fall_ends_the_episode_with_its_reason():
@@ -192,4 +205,4 @@ def test_info_carries_what_the_springs_do():
         )
         assert info[f"torque/ankle_{side}"][0] == pytest.approx(spring, abs=1e-9)
     assert info["work/stiffness/toe_left"][0] < 0  # softer under load gives energy back
-    assert np.isfinite(list(value[0] for name, value in info.items() if name != "termination")).all()
+    assert np.isfinite([value[0] for name, value in info.items() if name != "termination"]).all()

@@ -8,13 +8,14 @@ from scipy.integrate import solve_bvp
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, plan_walk
 from springfoot.gait.feet import turned
+from springfoot.gait.plan import Cadence
 from springfoot.gait.posture import leg_angles
 
 PHASE = np.arange(10_000) / 10_000
 
 
 @cache
-def plan_of(cadence="people", speed=1.2, height=1.70, **settings):
+def plan_of(cadence: Cadence = "people", speed=1.2, height=1.70, **settings):
     return plan_walk(Body(height, 63.0), speed, cadence, **settings)
 
 

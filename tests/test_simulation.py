@@ -61,7 +61,7 @@ def test_joint_torque_is_the_spring_equation_up_to_the_limit():
 
 
 def test_force_is_the_mean_over_the_windows_physics_steps():
-    simulation, random = started(1)
+    simulation, _ = started(1)
     model = simulation.model
     stiffness = np.full((1, *LEGS), 300.0)
     for _ in range(10):
@@ -84,7 +84,7 @@ def test_force_is_the_mean_over_the_windows_physics_steps():
 
 
 def test_simulations_left_out_stand_still():
-    simulation, random = started(3)
+    simulation, _ = started(3)
     before = simulation.measure()
     m = simulation.advance(np.full((3, *LEGS), 100.0), np.zeros((3, *LEGS)), ids=np.array([1]))
     for index in (0, 2):

@@ -305,9 +305,7 @@ def test_observation_is_finite_and_within_bounds_whatever_happens(thesis_body):
 def test_names_are_unique_and_name_the_actions():
     names = [entry.name for entry in OBSERVATION]
     assert len(set(names)) == len(names)
-    assert [name.removeprefix("last_action_") for name in names if name.startswith("last_action_")] == list(
-        ACTIONS
-    )
+    assert [name.removeprefix("last_action_") for name in names if name.startswith("last_action_")] == list(ACTIONS)
 
 
 def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
@@ -326,9 +324,7 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
     planned = rng.normal(0, 0.2, (n, 2))
 
     def results(rows):
-        measured = Measurement(
-            diverged=base.diverged[rows], **{name: value[rows] for name, value in numbers.items()}
-        )
+        measured = Measurement(diverged=base.diverged[rows], **{name: value[rows] for name, value in numbers.items()})
         legs = leg_phases(left[rows])
         seen = setup.task.observe(measured, legs, last[rows], planned[rows], force[0, rows])
         terms = setup.task.terms(measured, legs, action[rows], last[rows], stiffness[rows], force[:, rows])
