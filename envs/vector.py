@@ -35,6 +35,8 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         settings: as for `SegmentedFootBiped`.
     """
 
+    _camera: Camera | None = None
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -56,7 +58,6 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self.single_observation_space, self.single_action_space = spaces_of(self.biped)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._camera: Camera | None = None
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)

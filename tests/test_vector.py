@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from springfoot.envs.faces import SegmentedFootBiped
+from springfoot.envs.faces import METADATA, SegmentedFootBiped
 from springfoot.envs.task import OBSERVATION
 from springfoot.envs.vector import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
@@ -132,7 +132,7 @@ def test_each_vector_has_its_own_metadata():
     disabled, default = SegmentedFootBipedVector(1, autoreset_mode="Disabled"), SegmentedFootBipedVector(1)
     assert disabled.metadata["autoreset_mode"] is disabled.autoreset_mode is AutoresetMode.DISABLED
     assert default.metadata["autoreset_mode"] is default.autoreset_mode is AutoresetMode.NEXT_STEP
-    assert "autoreset_mode" not in SegmentedFootBiped.metadata
+    assert "autoreset_mode" not in METADATA
 
 
 BAD = [
