@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import tyro
 
-from ..envs.settings import BipedSettings, settings_from, settings_to_json
-from ..gait.errors import SpringfootError
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.gait.errors import SpringfootError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from ..gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError
+
 from .bundle import Policy
 from .config import TrainingConfig
 

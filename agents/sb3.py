@@ -8,9 +8,9 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from ..envs.model import ACTIONS
-from ..envs.vector import SegmentedFootBipedVector
-from ..gait.errors import SpringfootError
+from springfoot.envs.model import ACTIONS
+from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.gait.errors import SpringfootError
 
 
 class SegmentedFootBipedVecEnv(VecEnv):

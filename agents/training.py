@@ -23,9 +23,10 @@ from safetensors.numpy import save as to_safetensors
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from ..envs.biped import Biped
-from ..envs.settings import settings_to_json
-from ..gait.errors import SpringfootError
+from springfoot.envs.biped import Biped
+from springfoot.envs.settings import settings_to_json
+from springfoot.gait.errors import SpringfootError
+
 from .bundle import BEST, LAST, fingerprint, load_policy, read_tensors, save_policy, write_atomically
 from .config import TrainingConfig, config_from_json, config_to_json
 from .learner import Learner
