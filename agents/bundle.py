@@ -9,7 +9,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -19,10 +19,12 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_safetensors
 
-from ..envs.actuation import stiffness_of
-from ..envs.biped import Biped
-from ..envs.settings import BipedSettings, settings_from, settings_to_json
-from ..gait.errors import SpringfootError
+from springfoot.envs.actuation import stiffness_of
+from springfoot.envs.biped import Biped
+from springfoot.envs.equilibrium import foot_curves
+from springfoot.envs.legs import leg_curves
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.gait.errors import SpringfootError
 
 FORMAT_VERSION = 1
 """Version of the file layout; a reader refuses any other."""
@@ -33,15 +35,7 @@ BEST, LAST = "best.safetensors", "last.safetensors"
 
 _MODEL_NUMBERS = (
     *("body_mass", "body_inertia", "body_pos", "body_ipos", "jnt_range", "jnt_actfrcrange", "dof_damping"),
-    *(
-        "dof_armature",
-        "geom_size",
-        "geom_pos",
-        "geom_friction",
-        "geom_solref",
-        "geom_solimp",
-        "actuator_gainprm",
-    ),
+    *("dof_armature", "geom_size", "geom_pos", "geom_friction", "geom_solref", "geom_solimp", "actuator_gainprm"),
 )
 
 
@@ -106,15 +100,19 @@ class Policy:
 
 
 def fingerprint(biped: Biped) -> dict[str, str]:
-    """SHA-256 of what a policy relies on: its `observation`, its `action`, and the compiled `model`.
+    """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
 
-    Numbers count to six significant digits, so that compilers and processors agree.
+    The legs are the constants of hips, knees and foot springs and the curves they follow. Numbers count to six
+    significant digits, so that compilers and processors agree.
     """
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
+    legs, walk = biped.constants[0], (biped.body, biped.human, biped.plan.stride_time)
+    curves = (leg_curves(legs, *walk), *foot_curves(biped.settings, legs, *walk))
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
+        "legs": _digest(asdict(legs), *asdict(legs).values(), *(curve[::50] for curve in curves)),
     }
 
 
@@ -170,8 +168,8 @@ def load_policy(name: str | Path) -> Policy:
     """The policy in a file, a run folder (its best) or `pretrained`, checked against this springfoot.
 
     Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of
-    another format version, incomplete or not finite, or made for other spaces or another model than this
-    version has.
+    another format version, incomplete or not finite, or made for other spaces, another model or other legs than
+    this version has.
     """
     path = find_policy(name)
     header, tensors = read_tensors(path, "springfoot", "policy")
@@ -181,11 +179,7 @@ def load_policy(name: str | Path) -> Policy:
         )
     try:
         network, values = header["network"], header["settings"]
-        clip, sizes, stored = (
-            float(network["observation_clip"]),
-            list(network["layer_sizes"]),
-            header["fingerprint"],
-        )
+        clip, sizes, stored = float(network["observation_clip"]), list(network["layer_sizes"]), header["fingerprint"]
         settings = settings_from(**values)
         biped = Biped(settings, 1)
     except (KeyError, TypeError, ValueError, OverflowError) as error:

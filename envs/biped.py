@@ -16,10 +16,9 @@ from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import ANGLES, human_gait
 from springfoot.gait.plan import plan_walk
-from springfoot.gait.stiffness import StiffnessSchedule
 
-from . import equilibrium
 from .actuation import FEET, FootSprings
+from .equilibrium import foot_curves
 from .legs import LegConstants, Legs, leg_constants
 from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
 from .phase import GRID, PhaseTable, leg_phases
@@ -101,14 +100,15 @@ class Biped:
         self.plan = plan_walk(self.body, settings.speed, settings.cadence)
         self.on_tick: Callable[[Tick], None] | None = None
 
-        constants = legs or [leg_constants(settings.equilibrium, settings.cadence)]
+        self.constants = tuple(legs or [leg_constants(settings.equilibrium, settings.cadence)])
         stride_time = self.plan.stride_time
-        self._legs = Legs(constants, self.body, self.human, stride_time, settings.speed, num_envs, variant)
-        rest, stiffness = self._curves(constants, stride_time)
+        self._legs = Legs(self.constants, self.body, self.human, stride_time, settings.speed, num_envs, variant)
+        curves = [foot_curves(settings, c, self.body, self.human, stride_time) for c in self.constants]
+        rest, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
         self._ankle = PhaseTable(self.human.mean("ankle", GRID)[:, None])
-        self._start = self._start_curves(constants[0].period_factor * stride_time)
-        self._trunk_pitch = np.deg2rad(constants[0].trunk_pitch_deg)
+        self._start = self._start_curves(self.constants[0].period_factor * stride_time)
+        self._trunk_pitch = np.deg2rad(self.constants[0].trunk_pitch_deg)
         self._passive_damping = passive_damping(self.body)
 
         self._simulation = Simulation(self.body, num_envs, num_threads)
@@ -261,23 +261,6 @@ class Biped:
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),
         )
-
-    def _curves(self, constants: Sequence[LegConstants], stride_time: float) -> tuple[NDArray, NDArray]:
-        """(V, SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of the foot springs."""
-        body, human, mode = self.body, self.human, self.settings.equilibrium
-        stiffness = np.stack([equilibrium.fixed_stiffness(c, body) for c in constants])
-        if self.settings.schedule is not None:
-            brought, rest = StiffnessSchedule.from_json(self.settings.schedule).at(GRID)
-            stiffness[:] = brought
-        if mode == "planned":
-            rest = np.stack([equilibrium.planned(c, body, human, stride_time) for c in constants])
-        elif mode == "angle":
-            rest = np.stack([equilibrium.angle(human) for _ in constants])
-        elif mode == "neutral":
-            rest = np.stack([equilibrium.neutral(c) for c in constants])
-        else:
-            rest = np.stack([rest for _ in constants])
-        return rest, stiffness
 
     def _start_curves(self, period: float) -> PhaseTable:
         """People's joint angles, hip as thigh to the vertical [rad], and their rates [rad/s] over the stride."""

@@ -5,10 +5,12 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
 from springfoot.gait.human import HumanGait
+from springfoot.gait.stiffness import StiffnessSchedule
 
 from .legs import LegConstants, knot_curve
 from .model import ANKLE, damping_times
 from .phase import GRID
+from .settings import BipedSettings
 
 PLATEAUS = (0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95)
 """Start and end of loading, early stance, late stance, push-off, swing; stiffness is linear between these plateaus."""
@@ -24,6 +26,24 @@ TOE_SWING_DEG = 10.0
 def plateau_curve(values: tuple[float, ...]) -> NDArray:
     """Five plateau values on `GRID`, linear between the plateaus and periodic."""
     return np.interp(GRID, PLATEAUS, np.repeat(values, 2), period=1.0)
+
+
+def foot_curves(
+    settings: BipedSettings, constants: LegConstants, body: Body, human: HumanGait, stride_time: float
+) -> tuple[NDArray, NDArray]:
+    """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
+    if settings.schedule is None:
+        stiffness, rest = fixed_stiffness(constants, body), neutral(constants)
+    else:
+        stiffness, rest = StiffnessSchedule.from_json(settings.schedule).at(GRID)
+    match settings.equilibrium:
+        case "planned":
+            rest = planned(constants, body, human, stride_time)
+        case "angle":
+            rest = angle(human)
+        case "neutral":
+            rest = neutral(constants)
+    return rest, stiffness
 
 
 def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:

@@ -145,7 +145,7 @@ class Legs:
         self._trunk_damping = of_each(lambda c: c.trunk_damping * scale * root)
         self._speed_torque = of_each(lambda c: c.speed_torque * scale / root)
         self._swing_gain = of_each(lambda c: c.swing_speed_gain / root)
-        self._table = PhaseTable(np.stack([_leg_curves(c, body, human, stride_time) for c in constants]))
+        self._table = PhaseTable(np.stack([leg_curves(c, body, human, stride_time) for c in constants]))
         self.left_phase = np.zeros(num)
 
     @property
@@ -177,7 +177,7 @@ class Legs:
         return stiffness, drive
 
 
-def _leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:
+def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:
     """(SAMPLES, 5) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m]."""
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])

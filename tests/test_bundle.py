@@ -10,7 +10,8 @@ from safetensors.numpy import load, save
 
 from springfoot.agents.bundle import Policy, fingerprint, load_policy, save_policy, write_atomically
 from springfoot.envs.biped import Biped
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.legs import leg_constants
+from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait.errors import SpringfootError
 
 SETTINGS = BipedSettings(speed=1.1, ankle_stiffness_range=(30.0, 700.0), reward_weights={"stiffness": -0.2})
@@ -90,6 +91,16 @@ def test_the_fingerprint_knows_body_and_action_map():
     assert stiffer["action"] != base["action"] and stiffer["model"] == base["model"]
 
 
+def test_the_fingerprint_knows_the_legs_and_what_the_feet_follow():
+    base = fingerprint(Biped(BipedSettings(), 1))
+    for settings in ({"equilibrium": "angle"}, {"equilibrium": "neutral"}, {"speed": 1.1}):
+        other = fingerprint(Biped(settings_from(**settings), 1))
+        assert other["legs"] != base["legs"] and other["model"] == base["model"]
+    tuned = leg_constants("planned", "people")
+    retuned = fingerprint(Biped(BipedSettings(), 1, legs=[replace(tuned, trunk_damping=1.001 * tuned.trunk_damping)]))
+    assert [part for part in base if retuned[part] != base[part]] == ["legs"]
+
+
 def changed(policy, path, header=None, tensors=None):
     """The policy's file with parts of its header or tensors changed."""
     save_policy(path, policy)
@@ -108,7 +119,11 @@ def changed(policy, path, header=None, tensors=None):
         ({"settings": [1]}, {}, "header is not valid"),
         ({"network": {}}, {}, "header has no 'observation_clip'"),
         ({"network": {"observation_clip": 10, "layer_sizes": [3, 4], "activation": "relu"}}, {}, "network"),
-        ({"fingerprint": {}}, {}, "another version of this environment: other observation and action and model"),
+        (
+            {"fingerprint": {}},
+            {},
+            "another version of this environment: other observation and action and model and legs",
+        ),
         ({}, {"layer.0.bias": np.full(64, np.nan, np.float32)}, "layer.0.bias must be finite"),
         ({}, {"layer.0.bias": np.zeros(64, np.int32)}, "layer.0.bias must be finite float"),
         ({}, {"layer.0.bias": np.zeros(63, np.float32)}, r"layer.0.bias must be \(64,\), is \(63,\)"),
