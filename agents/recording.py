@@ -5,37 +5,31 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.envs.model import ANKLE, CONTACTS, JOINTS, SIDES
+from springfoot.envs.actuation import FEET
+from springfoot.envs.biped import WINDOWS, Biped, Tick
+from springfoot.envs.model import CONTACTS, JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
+from springfoot.gait.plan import WalkPlan
 
 from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
-if TYPE_CHECKING:
-    from springfoot.envs.biped import Tick
-
-CONDITIONS = {
-    "height": REFERENCE_HEIGHT,
-    "mass": REFERENCE_MASS,
-    "speed": 1.2,
-    "push_newton": 0.0,
-    "start_noise": 0.0,
-}
-"""What every evaluation has unless told otherwise, whatever the policy was trained on."""
-TICK = 0.01
+CONDITIONS = {name: getattr(BipedSettings, name) for name in ("height", "mass", "speed", "push_newton", "start_noise")}
+"""The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
+TICK = Biped.tick_dt
 """Time between two samples [s]."""
 BATCH = 32
 """Episodes simulated side by side."""
 
-SERIES: dict[str, Callable[["Tick"], NDArray]] = {
+SERIES: dict[str, Callable[[Tick], NDArray]] = {
     "root": lambda tick: tick.measurement.root,  # (3,) hip x [m], hip z [m], trunk pitch [rad]
     "angle": lambda tick: tick.measurement.angle,  # (side, joint) [rad]
     "velocity": lambda tick: tick.measurement.velocity,  # (side, joint) [rad/s]
@@ -48,8 +42,8 @@ SERIES: dict[str, Callable[["Tick"], NDArray]] = {
     "contact": lambda tick: tick.measurement.contact,  # (side, contact, (x, z)) lowest points [m]
     "force": lambda tick: tick.measurement.force,  # (side, contact, (forward, up)) mean of the tick [N]
     "phase": lambda tick: tick.phase,  # (side,) of the leg controller [0, 1)
-    "stiffness": lambda tick: tick.stiffness[..., ANKLE:],  # (side, (ankle, toe)) [N m/rad]
-    "equilibrium": lambda tick: tick.equilibrium[..., ANKLE:],  # (side, (ankle, toe)) [rad]
+    "stiffness": lambda tick: tick.stiffness[..., FEET],  # (side, (ankle, toe)) [N m/rad]
+    "equilibrium": lambda tick: tick.equilibrium[..., FEET],  # (side, (ankle, toe)) [rad]
 }
 """Name -> what is taken of a tick. Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.model`."""
 
@@ -112,14 +106,16 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, Bi
 def load_recording(path: Path) -> Recording:
     """The recording in a `strides.npz`; raises `SpringfootError` for any other file."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(path) as file:
             arrays = dict(file)
         header: dict[str, Any] = json.loads(str(arrays.pop("header")))
         series = {name: arrays.pop(name) for name in SERIES}
         settings = settings_from(**header["settings"])
         return Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py: {error}") from None
+    except SpringfootError as error:
+        raise SpringfootError(f"{path}: {error}") from None
+    except (OSError, EOFError, BadZipFile, ValueError, KeyError, TypeError, AttributeError):
+        raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py") from None
 
 
 def record(
@@ -143,10 +139,7 @@ def record(
         threads: of the physics; any number gives the same bits.
         progress: told the simulated time [s] of all episodes together after every step.
     """
-    from springfoot.envs.biped import Biped  # compiles MuJoCo models: not needed to read a recording
-
-    length = ceil(round(settings.episode_seconds / TICK, 6))
-    length += length % 2  # an action lasts two ticks
+    length = WINDOWS * ceil(round(settings.episode_seconds / Biped.dt, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
     reason = np.full(episodes, "", dtype="U64")
     series: dict[str, NDArray] = {}
@@ -158,7 +151,7 @@ def record(
         biped.reset(np.arange(count), [seed + first + i for i in range(count)])
         plan_com = planned_com(biped.plan)
 
-        def keep(tick: "Tick", rows: slice = rows) -> None:
+        def keep(tick: Tick, rows: slice = rows) -> None:
             index = int(ticks[rows].max())
             for key, take in SERIES.items():
                 value = take(tick)
@@ -190,7 +183,7 @@ def record(
     )
 
 
-def planned_com(plan: Any) -> NDArray:
+def planned_com(plan: WalkPlan) -> NDArray:
     """(101, 2) CoM of a `WalkPlan` over percent of the step: x from the stance ankle, z [m]."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)

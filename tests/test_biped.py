@@ -152,7 +152,8 @@ def test_a_fall_ends_the_episode_with_its_reason():
     assert reasons <= {"fell: hip too low", "fell: trunk too tilted"}
 
 
-def test_a_diverged_simulation_ends_its_episode_alone():
+def test_a_diverged_simulation_ends_its_episode_alone(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
     biped = Biped(BipedSettings(), 2)
     biped.reset(np.arange(2), range(2))
     biped._simulation._qvel[1, 0] = 1e20

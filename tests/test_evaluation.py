@@ -190,9 +190,10 @@ def test_numbers_can_be_recomputed_from_the_saved_series(tmp_path):
     assert measure(load_recording(tmp_path / "strides.npz")).metrics == measure(recording).metrics
 
 
-def test_a_foreign_file_is_refused_with_one_line(tmp_path):
+@pytest.mark.parametrize("content", [b"", b"not an archive", b"PK\x03\x04 half an archive", b"\x80\x04K\x01."])
+def test_a_foreign_file_is_refused_with_one_line(tmp_path, content):
     foreign = tmp_path / "foreign.npz"
-    foreign.write_bytes(b"not an archive")
+    foreign.write_bytes(content)
     with pytest.raises(SpringfootError, match=r"strides\.npz") as caught:
         load_recording(foreign)
     assert "\n" not in str(caught.value)

@@ -117,7 +117,8 @@ def test_a_batch_gives_the_bits_of_its_members_alone(threads):
                 np.testing.assert_array_equal(getattr(m, name)[index], getattr(one, name)[0], err_msg=name)
 
 
-def test_divergence_is_named():
+def test_divergence_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
     simulation, _ = started(3)
     root, rate = np.zeros((2, 1, 3))
     root[:, 1], rate[:, 0] = 1.0, 1e20
