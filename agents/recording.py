@@ -106,7 +106,7 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, Bi
 def load_recording(path: Path) -> Recording:
     """The recording in a `strides.npz`; raises `SpringfootError` for any other file."""
     try:
-        with np.load(path) as file:
+        with path.open("rb") as opened, np.load(opened) as file:
             arrays = dict(file)
         header: dict[str, Any] = json.loads(str(arrays.pop("header")))
         series = {name: arrays.pop(name) for name in SERIES}
