@@ -2,8 +2,10 @@
 
 import csv
 import io
+import itertools
 import json
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -214,3 +216,35 @@ def test_an_existing_folder_is_refused_before_anything_runs(command, tmp_path):
 def test_a_foreign_policy_name_lists_what_is_allowed():
     with pytest.raises(SpringfootError, match=r"run folder.*pretrained.*thesis"):
         prepare("nonsense", {})
+
+
+# docs/metrics.md says what all of it means ----------------------------------------------------------------------
+
+DOCUMENT = (Path(__file__).parents[1] / "docs" / "metrics.md").read_text(encoding="utf-8")
+
+
+def documented(heading):
+    """Names in the first column of the table under `heading`, {a,b} written out."""
+    lines = DOCUMENT.split(f"{heading}")[1].split("\n#")[0].splitlines()
+    cells = [line.split("|")[1] for line in lines if line.startswith("| `")]
+    names = [name for cell in cells for name in re.findall(r"`([^`]+)`", cell)]
+    parts = [[part.strip("{}").split(",") for part in re.split(r"\.(?![^{]*})", name)] for name in names]
+    return [".".join(name) for part in parts for name in itertools.product(*part)]
+
+
+def keys_of(value, at=""):
+    if not isinstance(value, dict) or at in ("environment.", "fall_reasons."):
+        return [at.removesuffix(".")]
+    return [key for name, inner in value.items() for key in keys_of(inner, f"{at}{name}.")]
+
+
+def test_every_number_is_documented_and_nothing_else(folder):
+    metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert sorted(documented("## `metrics.json`")) == sorted(keys_of(metrics))
+
+
+def test_every_column_and_array_is_documented_and_nothing_else(folder):
+    columns = rows_of(folder / "gait_cycle.csv")[0]
+    assert sorted(documented("### `gait_cycle.csv`")) == sorted(set(columns) - {f"{curve}_sd" for curve in CURVES})
+    with np.load(folder / "strides.npz") as file:
+        assert sorted(documented("### `strides.npz`")) == sorted(file)
