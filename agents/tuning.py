@@ -20,13 +20,16 @@ from numpy.typing import NDArray
 
 from springfoot.envs.actuation import action_of
 from springfoot.envs.biped import Biped, Tick
+from springfoot.envs.equilibrium import foot_curves
 from springfoot.envs.legs import LegConstants, constants_from, constants_name
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
 from springfoot.envs.settings import BipedSettings, Cadence, Equilibrium
-from springfoot.gait.body import GRAVITY
+from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+from springfoot.gait.human import human_gait
+from springfoot.gait.plan import plan_walk
 
-SECONDS = 7.0
+SECONDS = 8.0
 """Length of each walk [s]."""
 SETTLED = 2.5
 """Strides that begin later [s] are measured."""
@@ -50,7 +53,7 @@ TOLERANCE = {
 }
 """Error that costs one unit (squared)."""
 FALL_COST = 30.0
-"""Cost of falling at once; a fall later costs proportionally less, down to a third."""
+"""Cost of falling at once; one that comes further costs proportionally less, down to a third."""
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
 """One unit of the search: degrees of a knot, relative change of a gain."""
 ADDITIVE_STEP = {"trunk_pitch_deg": 1.0, "swing_speed_gain": 0.05, "speed_torque": 15.0, "period_speed_gain": 0.03}
@@ -73,6 +76,8 @@ class TuningFlags:
     """Candidates in each."""
     sigma: float = 0.5
     """First spread, in units of the search."""
+    ease: int = 0
+    """Generations over which the foot's equilibrium goes from the planned one to its own: 0, at once."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
@@ -104,51 +109,52 @@ class Search:
         return constants_from(values)
 
 
-def cost(settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int) -> NDArray:
-    """(C,) what each candidate pays."""
+def cost(
+    settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int, ease: float = 0.0
+) -> NDArray:
+    """(C,) what each candidate pays; `ease` as in `_walk`."""
     walks = SCHEDULED + len(CONSTANT)
     total = np.zeros(len(candidates))
-    fallen, records, biped = _walk(settings, candidates, walks, seed, threads)
+    missing, records, biped = _walk(settings, candidates, walks, seed, threads, ease)
     scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
     speed = _speed(records)
     for index in range(walks * len(candidates)):
-        share = (FALL_COST if scheduled[index] else FALL_COST / 3) / walks
         candidate = index // walks
-        if fallen[index] < SECONDS:
-            total[candidate] += share * _lateness(fallen[index])
+        if missing[index] > 0:
+            total[candidate] += FALL_COST / walks * missing[index]
         elif scheduled[index]:
             total[candidate] += _distance(records, index, biped, speed[index]) / SCHEDULED
         else:
             total[candidate] += min(((speed[index] - settings.speed) / TOLERANCE["constant_speed"]) ** 2, 3.0)
-    pushed, _, _ = _walk(
-        replace(settings, push_newton=PUSH_NEWTON, push_interval=2.5), candidates, PUSHED, seed, threads
-    )
-    falls = np.where(pushed < SECONDS, FALL_COST / 2 * _lateness(pushed), 0.0)
-    return total + falls.reshape(len(candidates), PUSHED).mean(1)
+    pushed = replace(settings, push_newton=PUSH_NEWTON, push_interval=2.5)
+    missing, _, _ = _walk(pushed, candidates, PUSHED, seed, threads, ease)
+    return total + FALL_COST * missing.reshape(len(candidates), PUSHED).mean(1)
 
 
-def _lateness(time: NDArray) -> NDArray:
-    return 1.0 - 2.0 / 3.0 * time / SECONDS
+def _walk(settings, candidates, walks, seed, threads, ease=0.0) -> tuple[NDArray, dict[str, NDArray], Biped]:
+    """Walk every candidate `walks` times, at an equilibrium that is the share `ease` planned.
 
-
-def _walk(settings, candidates, walks, seed, threads) -> tuple[NDArray, dict[str, NDArray], Biped]:
-    """Walk every candidate `walks` times; returns the times of the falls (C * walks,), the 100 Hz record, the core."""
+    Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end; the 100 Hz
+    record; and the core.
+    """
     num = len(candidates) * walks
     variant = np.repeat(np.arange(len(candidates)), walks)
-    biped = Biped(settings, num, threads, legs=candidates, variant=variant)
+    rest = _eased(settings, candidates, ease) if ease else None
+    biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest)
     biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
     fixed = action_of(np.array(CONSTANT), settings, biped.body)
     role = np.tile(np.arange(walks), len(candidates)) - SCHEDULED
     ticks: list[Tick] = []
     biped.on_tick = ticks.append
-    active, fallen = np.ones(num, bool), np.full(num, SECONDS)
+    active, missing = np.ones(num, bool), np.zeros(num)
     for _ in range(round(SECONDS / biped.dt)):
         action = action_of(biped.scheduled_stiffness(), settings, biped.body)
         for index in range(len(CONSTANT) if walks > PUSHED else 0):
             action[role == index] = fixed[index]
         outcome = biped.step(action.reshape(num, -1), active)
         ended = active & outcome.terminated
-        fallen[ended] = outcome.info["time"][ended]
+        walked = ticks[-1].measurement.com[ended, 0] / (settings.speed * SECONDS)
+        missing[ended] = 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0)
         active &= ~outcome.terminated
         if not active.any():
             break
@@ -160,7 +166,19 @@ def _walk(settings, candidates, walks, seed, threads) -> tuple[NDArray, dict[str
         "moment": np.stack([m.torque + tick.passive_torque for m, tick in zip(measured, ticks, strict=True)]),
         "force": np.stack([m.force.sum(2) for m in measured]),
     }
-    return fallen, record, biped
+    return missing, record, biped
+
+
+def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
+    """(C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
+    body, human = Body(settings.height, settings.mass), human_gait(settings.speed, settings.height)
+    stride_time = plan_walk(body, settings.speed, settings.cadence).stride_time
+    curves = [
+        [foot_curves(kind, c, body, human, stride_time)[0] for c in candidates]
+        for kind in (settings, replace(settings, equilibrium="planned"))
+    ]
+    own, planned = np.array(curves)
+    return own + ease * (planned - own)
 
 
 def _speed(record: dict[str, NDArray]) -> NDArray:
@@ -209,7 +227,9 @@ def tune(flags: TuningFlags) -> None:
     strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), flags.sigma, options)
     for generation in range(flags.generations):
         vectors = strategy.ask()
-        paid = cost(settings, [search.constants(v) for v in vectors], flags.seed + 1000 * generation, flags.threads)
+        ease = max(0.0, 1.0 - generation / flags.ease) if flags.ease else 0.0
+        candidates = [search.constants(v) for v in vectors]
+        paid = cost(settings, candidates, flags.seed + 1000 * generation, flags.threads, ease)
         strategy.tell(vectors, list(paid))
         if generation % 10 == 9 or generation == flags.generations - 1:
             mean = search.constants(strategy.mean)

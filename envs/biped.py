@@ -79,6 +79,7 @@ class Biped:
         num_threads: of the physics; any number gives the same bits.
         legs: leg constants in place of the committed ones, one set or several told apart by `variant`.
         variant: (N,) which of `legs` each body has.
+        rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], for each of `legs`.
     """
 
     dt = STEP_SECONDS
@@ -92,6 +93,7 @@ class Biped:
         num_threads: int = 1,
         legs: Sequence[LegConstants] | None = None,
         variant: NDArray | None = None,
+        rest: NDArray | None = None,
     ):
         self.settings = settings
         self.num_envs = num_envs
@@ -104,7 +106,8 @@ class Biped:
         stride_time = self.plan.stride_time
         self._legs = Legs(self.constants, self.body, self.human, stride_time, settings.speed, num_envs, variant)
         curves = [foot_curves(settings, c, self.body, self.human, stride_time) for c in self.constants]
-        rest, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
+        planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
+        rest = planned if rest is None else rest
         self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
         self._ankle = PhaseTable(self.human.mean("ankle", GRID)[:, None])
         self._start = self._start_curves(self.constants[0].period_factor * stride_time)

@@ -99,9 +99,9 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | com_x          | 0.15   | exp(-(e/0.1)^2), e CoM minus plan, forward [m]                                  |
     | com_z          | 0.1    | exp(-(e/0.03)^2), e CoM minus plan, up [m]                                      |
     | pose           | 0.35   | exp(-E/0.02), E squared distance [rad^2] from people's joint angles             |
+    | grf            | 0.35   | exp(-D/0.15), D body weights by which the feet's forces leave people's range    |
     | stiffness_rate | -0.05  | squared change of the action                                                    |
-    | stiffness      | -0.1   | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
-    | grf            | -0.3   | body weights by which ground reaction forces leave people's range               |
+    | stiffness      | -0.05  | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
 
     ## Starting state
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at

@@ -27,9 +27,9 @@ DEFAULT_WEIGHTS = {
     "com_x": 0.15,
     "com_z": 0.10,
     "pose": 0.35,
+    "grf": 0.35,
     "stiffness_rate": -0.05,
-    "stiffness": -0.10,
-    "grf": -0.30,
+    "stiffness": -0.05,
 }
 """Weight of each reward term (`springfoot.envs.task`); a positive one rewards, a negative one is a cost."""
 

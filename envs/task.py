@@ -41,6 +41,8 @@ TOE_SHARE = 0.25
 """Weight of the toe against the ankle in the cost of stiffness (design study)."""
 MAX_FORCE = 1.2
 """Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.14."""
+FORCE_TOLERANCE = 0.15
+"""Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
 
 
 class Entry(NamedTuple):
@@ -206,9 +208,10 @@ class Task:
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (0.5, 0.5, 2, 0.1) x squared distance
         [rad^2] of thigh (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
+        `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
+        beyond 1.2, both components beyond mean +- SD at the leg's phase.
         Costs >= 0: `stiffness_rate`, squared change of the action; `stiffness`, mean over legs of
-        [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg; `grf`, body weights by which
-        the feet's forces leave people's range: vertical beyond 1.2, both components beyond mean +- SD.
+        [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
 
         `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
         (W, N, 2, 3, 2) on the body [N] in the W control windows of the step.
@@ -222,7 +225,7 @@ class Task:
             "pose": np.exp(-self._pose_error(m, leg_phase) / POSE_TOLERANCE),
             "stiffness_rate": np.square(action - last_action).sum(-1),
             "stiffness": self._stiffness_cost(stiffness),
-            "grf": self._force_cost(leg_phase, force_windows),
+            "grf": np.exp(-self._force_distance(leg_phase, force_windows) / FORCE_TOLERANCE),
         }
 
     def reward(self, terms: dict[str, NDArray]) -> NDArray:
@@ -252,14 +255,14 @@ class Task:
         cost = (self._stiffness_share * np.square(stiffness / self._stiffness_unit)).sum(-1)
         return 0.5 * (cost[:, LEFT] + cost[:, RIGHT])
 
-    def _force_cost(self, leg_phase: NDArray, force_windows: NDArray) -> NDArray:
+    def _force_distance(self, leg_phase: NDArray, force_windows: NDArray) -> NDArray:
         foot = force_windows.sum(3) / self._weight  # (W, N, side, forward/up) in body weights
         excess = np.maximum(foot[..., 1] - MAX_FORCE, 0.0).sum(0) / len(foot)
         # the mean over the step belongs to its middle
         people = self._force.at((leg_phase - self._half_step) % 1.0)
         distance = np.abs(foot.sum(0) / len(foot) - people[..., :2]) - people[..., 2:]
-        cost = excess + np.maximum(distance, 0.0).sum(-1)
-        return cost[:, LEFT] + cost[:, RIGHT]
+        away = excess + np.maximum(distance, 0.0).sum(-1)
+        return away[:, LEFT] + away[:, RIGHT]
 
 
 def _com_curves(plan: WalkPlan) -> NDArray:

@@ -6,7 +6,7 @@ import pytest
 from springfoot.envs.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
 from springfoot.envs.simulation import Measurement
-from springfoot.envs.task import OBSERVATION, TOO_LOW, TOO_TILTED, Task
+from springfoot.envs.task import FORCE_TOLERANCE, OBSERVATION, TOO_LOW, TOO_TILTED, Task
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
@@ -80,11 +80,10 @@ PHASES = np.linspace(0.005, 0.995, 37)
 
 def test_a_body_on_plan_that_moves_like_people_gets_full_marks(thesis_body):
     terms = thesis_body.terms(thesis_body.measurement(PHASES), PHASES)
-    for name in ("alive", "com_x", "com_z", "pose"):
-        np.testing.assert_allclose(terms[name], 1.0, atol=1e-4, err_msg=name)
+    for name in ("alive", "com_x", "com_z", "pose", "grf"):
+        np.testing.assert_allclose(terms[name], 1.0, atol=2e-2 if name == "grf" else 1e-4, err_msg=name)
     np.testing.assert_allclose(terms["stiffness"], 1.0, rtol=1e-12)
     np.testing.assert_array_equal(terms["stiffness_rate"], 0.0)
-    np.testing.assert_allclose(terms["grf"], 0.0, atol=2e-3)
 
 
 def test_planned_speed_is_the_derivative_of_the_planned_com(thesis_body):
@@ -149,21 +148,21 @@ def test_costs_count_what_they_say(thesis_body):
     np.testing.assert_allclose(terms["stiffness"], 0.5 * ((4 + 0.25) + (1 + 1)) / 1.25)
 
 
-def test_force_costs_nothing_within_people_and_body_weights_beyond(thesis_body):
+def test_force_is_rewarded_within_people_and_less_with_each_body_weight_beyond(thesis_body):
     phase = np.array([0.15])
     measured, force = thesis_body.measurement(phase), thesis_body.people_force(phase)
     weight = thesis_body.body.mass * GRAVITY
     middle = phase - 0.01 / thesis_body.plan.stride_time
     mean, sd = (getattr(thesis_body.human, kind)("grf_vertical", middle) for kind in ("mean", "sd"))
 
-    def cost(vertical_bw):
+    def away(vertical_bw):
         pushed = force.copy()
         pushed[:, :, LEFT, 1, 1] = vertical_bw * weight
-        return thesis_body.terms(measured, phase, force_windows=pushed)["grf"]
+        return -FORCE_TOLERANCE * np.log(thesis_body.terms(measured, phase, force_windows=pushed)["grf"])
 
-    np.testing.assert_allclose(cost(mean + 0.99 * sd), 0.0, atol=2e-3)
-    np.testing.assert_allclose(cost(mean - sd - 0.1), 0.1, atol=2e-3)
-    np.testing.assert_allclose(cost(1.5), (1.5 - mean - sd) + 0.3, atol=2e-3)
+    np.testing.assert_allclose(away(mean + 0.99 * sd), 0.0, atol=2e-3)
+    np.testing.assert_allclose(away(mean - sd - 0.1), 0.1, atol=2e-3)
+    np.testing.assert_allclose(away(1.5), (1.5 - mean - sd) + 0.3, atol=2e-3)
 
 
 def test_the_excess_of_a_single_window_is_not_averaged_away(thesis_body):
@@ -171,7 +170,7 @@ def test_the_excess_of_a_single_window_is_not_averaged_away(thesis_body):
     force = thesis_body.people_force(phase)
     force[0, :, LEFT, 1, 1] += 0.8 * thesis_body.body.mass * GRAVITY
     force[1, :, LEFT, 1, 1] -= 0.8 * thesis_body.body.mass * GRAVITY
-    assert thesis_body.terms(thesis_body.measurement(phase), phase, force_windows=force)["grf"] > 0.2
+    assert thesis_body.terms(thesis_body.measurement(phase), phase, force_windows=force)["grf"] < 0.3
 
 
 def test_terms_do_not_depend_on_body_size_at_equal_froude_speed():
@@ -189,13 +188,13 @@ def test_terms_do_not_depend_on_body_size_at_equal_froude_speed():
             terms.append(setup.terms(measured, [left], stiffness=stiffness, force_windows=force))
         for name in DEFAULT_WEIGHTS:
             # 20 ms, not scaled with the body, are another share of the stride for the forces' middle
-            tolerance = 3e-3 if name == "grf" else 1e-6
+            tolerance = 1e-2 if name == "grf" else 1e-6
             np.testing.assert_allclose(terms[0][name], terms[1][name], atol=tolerance, err_msg=name)
 
 
 def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
-    setup = Setup(reward_weights={"pose": 2.0, "grf": -1.0})
-    weights = DEFAULT_WEIGHTS | {"pose": 2.0, "grf": -1.0}
+    setup = Setup(reward_weights={"pose": 2.0, "grf": 0.5})
+    weights = DEFAULT_WEIGHTS | {"pose": 2.0, "grf": 0.5}
     measured = setup.measurement(PHASES)
     measured.angle[:] += 0.03
     measured.root[0, 1] = 0.5

@@ -89,14 +89,14 @@ def test_what_is_no_flag_is_refused(monkeypatch, capsys, tmp_path, words):
 
 
 def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, capsys, tmp_path):
-    (tmp_path / "weights.json").write_text('{"grf": -0.1}')
+    (tmp_path / "weights.json").write_text('{"grf": 0.1}')
     weights = tmp_path / "weights.json"
     words = ["--out", tmp_path / "run", "--timesteps", "1024", *SHORT, "--reward-weights", weights]
     assert main(monkeypatch, *words) == 0
     out = capsys.readouterr().out
     assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
     assert f"python evaluate.py {tmp_path / 'run'}" in out
-    assert load_policy(tmp_path / "run").settings.reward_weights == {"grf": -0.1}
+    assert load_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

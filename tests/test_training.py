@@ -24,7 +24,7 @@ SHORT = TrainingConfig(
     update_steps=1024,
     eval_interval=1024,
     eval_episodes=2,
-    environment=BipedSettings(episode_seconds=1.0, push_newton=50.0, reward_weights={"grf": -0.2}),
+    environment=BipedSettings(episode_seconds=1.0, push_newton=50.0, reward_weights={"grf": 0.2}),
 )
 
 
