@@ -201,8 +201,11 @@ def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float
             return FALL_COST / 2
         thigh = angle[:, HIP] - record["pitch"][:, index]
         series = np.column_stack(
-            [thigh, angle[:, KNEE], angle[:, ANKLE], angle[:, TOE], force[:, 1] / weight, force[:, 0] / weight]
-            + [-moment[:, KNEE] / biped.body.mass, -moment[:, ANKLE] / biped.body.mass]
+            [
+                *(thigh, angle[:, KNEE], angle[:, ANKLE], angle[:, TOE]),
+                *(force[:, 1] / weight, force[:, 0] / weight),
+                *(-moment[:, joint] / biped.body.mass for joint in (KNEE, ANKLE)),
+            ]
         )
         curves.append(on_percent(series, strides[:, 0], strides[:, 2], tick))
         periods.append(strides[:, 2] - strides[:, 0])
