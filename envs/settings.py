@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.stiffness import StiffnessSchedule
+from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 Cadence = Literal["people", "thesis"]
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -51,9 +51,9 @@ class BipedSettings:
     angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     action_mode: ActionMode = "absolute"
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
-    ankle_stiffness_range: tuple[float, float] = (20.0, 800.0)
+    ankle_stiffness_range: tuple[float, float] = (LOWEST_STIFFNESS[0], 800.0)
     """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
-    toe_stiffness_range: tuple[float, float] = (5.0, 200.0)
+    toe_stiffness_range: tuple[float, float] = (LOWEST_STIFFNESS[1], 200.0)
     """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     schedule: dict[str, Any] | None = None
     """Stiffness over the stride, JSON form of `springfoot.gait.stiffness.StiffnessSchedule`; needed by
