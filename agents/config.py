@@ -21,7 +21,7 @@ from springfoot.gait.errors import SpringfootError
 class TrainingConfig:
     """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
 
-    timesteps: int = 400_000
+    timesteps: int = 600_000
     """Environment steps of 20 ms to learn from, rounded up to whole updates."""
     seed: int = 0
     """Seed of weights, action noise and environments."""
@@ -31,7 +31,7 @@ class TrainingConfig:
     """Threads of the physics, 0 for one per available processor; results are the same with any number."""
     update_steps: int = 8192
     """Environment steps collected for each update of the policy, all environments together."""
-    minibatches: int = 4
+    minibatches: int = 8
     """Parts of an update's samples, each good for one gradient step."""
     epochs: int = 8
     """Passes over the samples in each update."""
@@ -53,7 +53,7 @@ class TrainingConfig:
     """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
     eval_episodes: int = 16
     """Episodes of each periodic evaluation, on the same fixed seeds every time."""
-    environment: BipedSettings = field(default_factory=lambda: BipedSettings(episode_seconds=10.0, push_newton=120.0))
+    environment: BipedSettings = field(default_factory=lambda: BipedSettings(episode_seconds=10.0, push_newton=150.0))
     """Settings of the walking task that is trained on."""
 
     def __post_init__(self) -> None:
