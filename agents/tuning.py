@@ -33,7 +33,6 @@ SECONDS = 8.0
 """Length of each walk [s]."""
 SETTLED = 2.5
 """Strides that begin later [s] are measured."""
-PUSH_NEWTON = 150.0
 SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 3
 """Walks of each candidate: with the schedule; with constant ankle and toe stiffness [N m/rad]; pushed."""
 TOLERANCE = {
@@ -78,6 +77,8 @@ class TuningFlags:
     """First spread, in units of the search."""
     ease: int = 0
     """Generations over which the foot's equilibrium goes from the planned one to its own: 0, at once."""
+    push_newton: float = 150.0
+    """Size of the pushes of the pushed walks [N]."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
@@ -110,9 +111,9 @@ class Search:
 
 
 def cost(
-    settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int, ease: float = 0.0
+    settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int, push: float, ease: float
 ) -> NDArray:
-    """(C,) what each candidate pays; `ease` as in `_walk`."""
+    """(C,) what each candidate pays; `push` [N], `ease` as in `_walk`."""
     walks = SCHEDULED + len(CONSTANT)
     total = np.zeros(len(candidates))
     missing, records, biped = _walk(settings, candidates, walks, seed, threads, ease)
@@ -126,7 +127,7 @@ def cost(
             total[candidate] += _distance(records, index, biped, speed[index]) / SCHEDULED
         else:
             total[candidate] += min(((speed[index] - settings.speed) / TOLERANCE["constant_speed"]) ** 2, 3.0)
-    pushed = replace(settings, push_newton=PUSH_NEWTON, push_interval=2.5)
+    pushed = replace(settings, push_newton=push, push_interval=2.5)
     missing, _, _ = _walk(pushed, candidates, PUSHED, seed, threads, ease)
     return total + FALL_COST * missing.reshape(len(candidates), PUSHED).mean(1)
 
@@ -134,8 +135,8 @@ def cost(
 def _walk(settings, candidates, walks, seed, threads, ease=0.0) -> tuple[NDArray, dict[str, NDArray], Biped]:
     """Walk every candidate `walks` times, at an equilibrium that is the share `ease` planned.
 
-    Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end; the 100 Hz
-    record; and the core.
+    Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end, and standing
+    still counts as one; the 100 Hz record; and the core.
     """
     num = len(candidates) * walks
     variant = np.repeat(np.arange(len(candidates)), walks)
@@ -146,18 +147,17 @@ def _walk(settings, candidates, walks, seed, threads, ease=0.0) -> tuple[NDArray
     role = np.tile(np.arange(walks), len(candidates)) - SCHEDULED
     ticks: list[Tick] = []
     biped.on_tick = ticks.append
-    active, missing = np.ones(num, bool), np.zeros(num)
+    active, walked = np.ones(num, bool), np.zeros(num)
     for _ in range(round(SECONDS / biped.dt)):
         action = action_of(biped.scheduled_stiffness(), settings, biped.body)
         for index in range(len(CONSTANT) if walks > PUSHED else 0):
             action[role == index] = fixed[index]
         outcome = biped.step(action.reshape(num, -1), active)
-        ended = active & outcome.terminated
-        walked = ticks[-1].measurement.com[ended, 0] / (settings.speed * SECONDS)
-        missing[ended] = 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0)
+        walked = np.where(active, ticks[-1].measurement.com[:, 0] / (settings.speed * SECONDS), walked)
         active &= ~outcome.terminated
         if not active.any():
             break
+    missing = np.where(active & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0))
     measured = [tick.measurement for tick in ticks]
     record = {
         "com_x": np.stack([m.com[:, 0] for m in measured]),
@@ -232,7 +232,7 @@ def tune(flags: TuningFlags) -> None:
         vectors = strategy.ask()
         ease = max(0.0, 1.0 - generation / flags.ease) if flags.ease else 0.0
         candidates = [search.constants(v) for v in vectors]
-        paid = cost(settings, candidates, flags.seed + 1000 * generation, flags.threads, ease)
+        paid = cost(settings, candidates, flags.seed + 1000 * generation, flags.threads, flags.push_newton, ease)
         strategy.tell(vectors, list(paid))
         if generation % 10 == 9 or generation == flags.generations - 1:
             mean = search.constants(strategy.mean)
