@@ -50,7 +50,7 @@ TOLERANCE = {
     "unsteady": 0.06,  # SD of the vertical force over strides [body weights]
     "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
 }
-"""Error that costs one unit (squared)."""
+"""Error e at which log(1 + (e / tolerance)^2) costs 0.7."""
 FALL_COST = 30.0
 """Cost of falling at once; one that comes further costs proportionally less, down to a third."""
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
@@ -190,7 +190,7 @@ def _speed(record: dict[str, NDArray]) -> NDArray:
 
 
 def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float) -> float:
-    """Squared distance of one walk from people, in tolerances."""
+    """Distance of one walk from people; the logarithm keeps a poor walk better than a fall."""
     human, weight, tick = biped.human, biped.body.mass * GRAVITY, Biped.tick_dt
     phase = PERCENT / 100
     curves, periods = [], []
@@ -217,7 +217,7 @@ def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float
     errors["period"] = np.mean(np.concatenate(periods)) / (2 * biped.plan.step_time) - 1
     errors["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
     errors["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - 1.25, 0.0))
-    return float(sum((error / TOLERANCE[name]) ** 2 for name, error in errors.items()))
+    return float(sum(np.log1p((error / TOLERANCE[name]) ** 2) for name, error in errors.items()))
 
 
 def tune(flags: TuningFlags) -> None:
