@@ -26,7 +26,7 @@ DEFAULT_WEIGHTS = {
     "speed": 0.25,
     "com_x": 0.15,
     "com_z": 0.10,
-    "pose": 0.35,
+    "pose": 0.60,
     "grf": 0.35,
     "stiffness_rate": -0.05,
     "stiffness": -0.05,
