@@ -52,7 +52,8 @@ TOLERANCE = {
 }
 """Error e at which log(1 + (e / tolerance)^2) costs 0.7."""
 FALL_COST = 30.0
-"""Cost of falling at once; one that comes further costs proportionally less, down to a third."""
+"""Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
+further costs proportionally less, down to a third."""
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
 """One unit of the search: degrees of a knot, relative change of a gain."""
 ADDITIVE_STEP = {"trunk_pitch_deg": 1.0, "swing_speed_gain": 0.05, "speed_torque": 15.0, "period_speed_gain": 0.03}
@@ -122,7 +123,7 @@ def cost(
     for index in range(walks * len(candidates)):
         candidate = index // walks
         if missing[index] > 0:
-            total[candidate] += FALL_COST / walks * missing[index]
+            total[candidate] += missing[index] * (3 * FALL_COST / SCHEDULED if scheduled[index] else FALL_COST / walks)
         elif scheduled[index]:
             total[candidate] += _distance(records, index, biped, speed[index]) / SCHEDULED
         else:
