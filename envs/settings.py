@@ -27,7 +27,7 @@ DEFAULT_WEIGHTS = {
     "com_x": 0.15,
     "com_z": 0.10,
     "pose": 0.60,
-    "grf": 0.35,
+    "grf": 0.60,
     "stiffness_rate": -0.05,
     "stiffness": -0.05,
 }

@@ -34,13 +34,15 @@ SPEED_TOLERANCE = 0.15
 POSE_WEIGHTS = {HIP: 2.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
 """Share of each joint in the pose error E; the toe counts little, its curve is of other people."""
 POSE_TOLERANCE = 0.02
-"""Pose error E at which its reward is 1/e [rad^2]: about 5 deg at every joint (design study)."""
+"""Pose error E at which its reward is 1/e [rad^2]: 3.8 deg at every joint (design study)."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
 """Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height] (design study)."""
 TOE_SHARE = 0.25
 """Weight of the toe against the ankle in the cost of stiffness (design study)."""
 MAX_FORCE = 1.2
 """Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.14."""
+EXCESS_SHARE = 4.0
+"""Weight of that excess against the distance from people's range: a peak is short, and is what hurts."""
 FORCE_TOLERANCE = 0.15
 """Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
 
@@ -209,7 +211,7 @@ class Task:
         the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (2, 0.5, 2, 0.1) x squared distance
         [rad^2] of thigh (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
-        beyond 1.2, both components beyond mean +- SD at the leg's phase.
+        beyond 1.2 (fourfold), both components beyond mean +- SD at the leg's phase.
         Costs >= 0: `stiffness_rate`, squared change of the action; `stiffness`, mean over legs of
         [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
 
@@ -257,7 +259,7 @@ class Task:
 
     def _force_distance(self, leg_phase: NDArray, force_windows: NDArray) -> NDArray:
         foot = force_windows.sum(3) / self._weight  # (W, N, side, forward/up) in body weights
-        excess = np.maximum(foot[..., 1] - MAX_FORCE, 0.0).sum(0) / len(foot)
+        excess = EXCESS_SHARE / len(foot) * np.maximum(foot[..., 1] - MAX_FORCE, 0.0).sum(0)
         # the mean over the step belongs to its middle
         people = self._force.at((leg_phase - self._half_step) % 1.0)
         distance = np.abs(foot.sum(0) / len(foot) - people[..., :2]) - people[..., 2:]

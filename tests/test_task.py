@@ -6,7 +6,7 @@ import pytest
 from springfoot.envs.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
 from springfoot.envs.simulation import Measurement
-from springfoot.envs.task import FORCE_TOLERANCE, OBSERVATION, TOO_LOW, TOO_TILTED, Task
+from springfoot.envs.task import EXCESS_SHARE, FORCE_TOLERANCE, OBSERVATION, TOO_LOW, TOO_TILTED, Task
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
@@ -162,7 +162,7 @@ def test_force_is_rewarded_within_people_and_less_with_each_body_weight_beyond(t
 
     np.testing.assert_allclose(away(mean + 0.99 * sd), 0.0, atol=2e-3)
     np.testing.assert_allclose(away(mean - sd - 0.1), 0.1, atol=2e-3)
-    np.testing.assert_allclose(away(1.5), (1.5 - mean - sd) + 0.3, atol=2e-3)
+    np.testing.assert_allclose(away(1.5), (1.5 - mean - sd) + EXCESS_SHARE * 0.3, atol=2e-3)
 
 
 def test_the_excess_of_a_single_window_is_not_averaged_away(thesis_body):
