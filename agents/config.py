@@ -21,7 +21,7 @@ from springfoot.gait.errors import SpringfootError
 class TrainingConfig:
     """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
 
-    timesteps: int = 600_000
+    timesteps: int = 1_000_000
     """Environment steps of 20 ms to learn from, rounded up to whole updates."""
     seed: int = 0
     """Seed of weights, action noise and environments."""

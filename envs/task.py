@@ -31,10 +31,10 @@ COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.1, 0.03
 """Error of the CoM at which its reward is 1/e [m at 1.70 m, scaled with height] (design study)."""
 SPEED_TOLERANCE = 0.15
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]."""
-POSE_WEIGHTS = {HIP: 2.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
+POSE_WEIGHTS = {HIP: 3.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
 """Share of each joint in the pose error E; the toe counts little, its curve is of other people."""
 POSE_TOLERANCE = 0.02
-"""Pose error E at which its reward is 1/e [rad^2]: 3.8 deg at every joint (design study)."""
+"""Pose error E at which its reward is 1/e [rad^2]: 3.4 deg at every joint (design study)."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
 """Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height] (design study)."""
 TOE_SHARE = 0.25
@@ -208,7 +208,7 @@ class Task:
         """The reward's terms, unweighted and dimensionless, each (N,).
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
-        the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (2, 0.5, 2, 0.1) x squared distance
+        the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance
         [rad^2] of thigh (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
         beyond 1.2 (fourfold), both components beyond mean +- SD at the leg's phase.
