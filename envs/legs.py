@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
+from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import HumanGait
 
 from .model import HIP, KNEE, damping_times
@@ -84,8 +85,14 @@ def constants_name(equilibrium: str, cadence: str) -> str:
 
 
 def leg_constants(equilibrium: str, cadence: str) -> LegConstants:
-    """The committed constants for a setting."""
-    return constants_from(_committed()[constants_name(equilibrium, cadence)])
+    """The committed constants for a setting; `SpringfootError` where none were found that walk."""
+    name, table = constants_name(equilibrium, cadence), _committed()
+    if name not in table:
+        raise SpringfootError(
+            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r}; "
+            "equilibrium 'neutral' needs cadence 'people'"
+        )
+    return constants_from(table[name])
 
 
 def constants_from(values: dict[str, Any]) -> LegConstants:

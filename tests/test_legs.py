@@ -1,0 +1,83 @@
+"""The leg constants and the phase."""
+
+import json
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from springfoot.envs import legs
+from springfoot.envs.biped import Biped
+from springfoot.envs.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
+from springfoot.envs.legs import constants_name, knot_curve, leg_constants
+from springfoot.envs.phase import GRID
+from springfoot.envs.settings import BipedSettings
+from springfoot.gait.body import Body
+from springfoot.gait.errors import SpringfootError
+from springfoot.gait.human import human_gait
+
+
+def test_every_set_of_constants_says_what_found_it():
+    table = json.loads(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
+    assert set(table["found_by"]) == set(table["constants"])
+    for equilibrium, cadence in (("planned", "people"), ("planned", "thesis"), ("neutral", "people")):
+        name = constants_name(equilibrium, cadence)
+        assert table["found_by"][name].startswith("python -m springfoot.agents.tuning")
+
+
+def test_angle_and_phase_share_the_planned_constants():
+    assert leg_constants("angle", "people") == leg_constants("phase", "people") == leg_constants("planned", "people")
+    assert leg_constants("neutral", "people") != leg_constants("planned", "people")
+
+
+def test_a_setting_without_constants_is_refused():
+    with pytest.raises(SpringfootError) as error:
+        Biped(BipedSettings(equilibrium="neutral", cadence="thesis"), 1)
+    assert str(error.value) == (
+        "no leg constants walk with equilibrium 'neutral' at cadence 'thesis'; "
+        "equilibrium 'neutral' needs cadence 'people'"
+    )
+
+
+def test_knots_are_met_and_periodic():
+    knots = np.arange(10.0) ** 2 / 10
+    curve = np.rad2deg(knot_curve(tuple(knots)))
+    np.testing.assert_allclose(curve[:: len(GRID) // 10], knots, atol=1e-9)
+    assert abs(curve[-1] - curve[0]) < abs(curve[1] - curve[0]) + 0.2
+
+
+def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
+    body, human = Body(), human_gait(1.2)
+    plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
+    constants = legs.constants_from({**vars(leg_constants("planned", "people")), **plain})
+    rest = planned(constants, body, human, human.stride_time)[:, 0]
+    rate = human.rate("ankle", GRID) / (constants.period_factor * human.stride_time)
+    torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - human.mean("ankle", GRID) - 0.02 * rate)
+    np.testing.assert_allclose(torque, -63.0 * human.mean("ankle_moment", GRID), atol=1e-9)
+
+
+def test_the_neutral_equilibrium_is_constant():
+    rest = neutral(leg_constants("neutral", "people"))
+    np.testing.assert_array_equal(rest, np.broadcast_to(rest[0], rest.shape))
+
+
+def test_plateaus_are_flat():
+    curve = plateau_curve((10.0, 20.0, 30.0, 40.0, 50.0))
+    for value, start, end in zip((10, 20, 30, 40, 50), PLATEAUS[::2], PLATEAUS[1::2], strict=True):
+        inside = (start <= GRID) & (end >= GRID)
+        np.testing.assert_allclose(curve[inside], value)
+
+
+def test_the_phase_waits_for_a_late_foot_and_starts_anew_with_it():
+    biped = Biped(BipedSettings(), 1)
+    biped.reset(np.array([0]), [0], start=0.3)
+    phases, landed = [], []
+    for _ in range(150):
+        biped.step(np.array([[0.6, 0.2, 0.6, 0.2]]))
+        phases.append(biped._legs.left_phase[0])
+        landed.append(biped._now.force[0, :, :, 1].sum(1) > 31.0)
+    step = np.diff(phases)
+    assert max(phases) <= 1.0 - legs.HOLD
+    assert (step > -1e-12).sum() >= 145  # it runs forward but where a stride ends
+    for index in np.flatnonzero(step < -0.5):
+        assert landed[index + 1][0]  # the left foot is down where its stride begins
