@@ -23,11 +23,11 @@ from springfoot.envs.biped import Biped, Tick
 from springfoot.envs.equilibrium import foot_curves
 from springfoot.envs.legs import LegConstants, constants_from, constants_name
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
-from springfoot.envs.settings import BipedSettings, Cadence, Equilibrium
+from springfoot.envs.settings import BipedSettings, Equilibrium
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
 from springfoot.gait.human import human_gait
-from springfoot.gait.plan import plan_walk
+from springfoot.gait.plan import Cadence, plan_walk
 
 SECONDS = 8.0
 """Length of each walk [s]."""

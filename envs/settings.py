@@ -9,17 +9,15 @@ from numbers import Real
 from typing import Any, Literal, get_args
 
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_within
+from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
-Cadence = Literal["people", "thesis"]
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 ActionMode = Literal["absolute", "residual"]
 
 STEP_SECONDS = 0.02
 """Time between two actions [s]: stiffness is decided at 50 Hz (design study; a 40 ms lag on K falls)."""
-MAX_FROUDE = 1.0
-"""Largest speed / sqrt(g leg_length): an inverted pendulum that is faster leaves the ground."""
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
@@ -74,11 +72,8 @@ class BipedSettings:
     """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
 
     def __post_init__(self) -> None:
-        body = Body(self.height, self.mass)
-        fastest = (
-            MAX_FROUDE * self.speed / body.froude_speed(self.speed) if _is_number(self.speed) and self.speed else inf
-        )
-        _check_number("speed", self.speed, 0.0, fastest, "m/s", above=True)
+        Body(self.height, self.mass)  # refuses impossible ones
+        require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
         for name, choices in (
             ("cadence", Cadence),
             ("equilibrium", Equilibrium),
