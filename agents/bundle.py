@@ -179,7 +179,8 @@ def load_policy(name: str | Path) -> Policy:
         )
     try:
         network, values = header["network"], header["settings"]
-        clip, sizes, stored = float(network["observation_clip"]), list(network["layer_sizes"]), header["fingerprint"]
+        clip, sizes = float(network["observation_clip"]), list(network["layer_sizes"])
+        stored = dict(header["fingerprint"])
         settings = settings_from(**values)
         biped = Biped(settings, 1)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -187,9 +188,11 @@ def load_policy(name: str | Path) -> Policy:
         raise SpringfootError(f"{name}: its header {what}") from None
     if network.get("activation") != "tanh" or network.get("variance_floor") != VARIANCE_FLOOR or not clip > 0:
         raise SpringfootError(f"{name}: its header asks for a network this version does not have: {network}")
+    if len(sizes) < 2 or (sizes[0], sizes[-1]) != (len(biped.observation_names), len(biped.action_names)):
+        raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to action")
     _check_tensors(name, tensors, sizes)
     current = fingerprint(biped)
-    if different := [part for part in current if current[part] != dict(stored).get(part)]:
+    if different := [part for part in current if current[part] != stored.get(part)]:
         raise SpringfootError(
             f"{name} was trained on another version of this environment: other {' and '.join(different)}; "
             "train it again, or use the version of springfoot it came from"

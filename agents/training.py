@@ -36,7 +36,8 @@ from .sb3 import SegmentedFootBipedVecEnv
 RUN, STATE = "run.json", "state.safetensors"
 EVALUATION_SEED = 2**30
 """Seed of the first episode of every periodic evaluation, the next ones following."""
-PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "torch", "stable-baselines3")
+PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
+"""Whose versions decide what a training comes to."""
 
 
 def train(config: TrainingConfig, out: str | Path) -> dict[str, Any]:
@@ -75,8 +76,10 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
     header, arrays = read_tensors(out / STATE, "springfoot-training", "training state")
+    done = header.get("timesteps")
+    if type(done) is not int or done < 0:
+        raise SpringfootError(f"{out / STATE} does not say how many timesteps it has behind it")
     load_policy(out / LAST)  # refuses what was trained on another version of the environment
-    done = int(header["timesteps"])
     total = config.timesteps if timesteps is None else done + timesteps
     if total <= done:
         raise SpringfootError(f"{out} has done its {done:,} timesteps; give --timesteps N to train N more")

@@ -15,6 +15,7 @@ from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait.errors import SpringfootError
 
 SETTINGS = BipedSettings(speed=1.1, ankle_stiffness_range=(30.0, 700.0), reward_weights={"stiffness": -0.2})
+NETWORK = {"observation_clip": 10, "activation": "tanh", "variance_floor": 1e-8}
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +120,10 @@ def changed(policy, path, header=None, tensors=None):
         ({"settings": [1]}, {}, "header is not valid"),
         ({"network": {}}, {}, "header has no 'observation_clip'"),
         ({"network": {"observation_clip": 10, "layer_sizes": [3, 4], "activation": "relu"}}, {}, "network"),
+        ({"network": NETWORK | {"layer_sizes": []}}, {}, r"layers \[\] do not lead from observation to action"),
+        ({"network": NETWORK | {"layer_sizes": [3, 4]}}, {}, r"layers \[3, 4\] do not lead"),
+        ({"fingerprint": None}, {}, "header is not valid"),
+        ({"fingerprint": [1]}, {}, "header is not valid"),
         (
             {"fingerprint": {}},
             {},
