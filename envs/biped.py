@@ -133,6 +133,11 @@ class Biped:
         """The compiled model, the same for all N."""
         return self._simulation.model
 
+    @property
+    def measurement(self) -> Measurement:
+        """What is known of the bodies at present."""
+        return self._now
+
     def data(self, index: int) -> mujoco.MjData:
         """A copy of environment `index`'s state, to render or to inspect."""
         return self._simulation.data(index)

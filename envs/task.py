@@ -40,7 +40,7 @@ ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
 TOE_SHARE = 0.25
 """Weight of the toe against the ankle in the cost of stiffness (design study)."""
 MAX_FORCE = 1.2
-"""Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.14."""
+"""Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
 """Weight of that excess against the distance from people's range: a peak is short, and is what hurts."""
 FORCE_TOLERANCE = 0.15

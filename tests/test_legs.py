@@ -73,9 +73,8 @@ def test_the_phase_waits_for_a_late_foot_and_starts_anew_with_it():
     biped.reset(np.array([0]), [0], start=0.3)
     phases, landed = [], []
     for _ in range(150):
-        biped.step(np.array([[0.6, 0.2, 0.6, 0.2]]))
-        phases.append(biped._legs.left_phase[0])
-        landed.append(biped._now.force[0, :, :, 1].sum(1) > 31.0)
+        phases.append(biped.step(np.array([[0.6, 0.2, 0.6, 0.2]])).info["phase/left"][0])
+        landed.append(biped.measurement.force[0, :, :, 1].sum(1) > 31.0)
     step = np.diff(phases)
     assert max(phases) <= 1.0 - legs.HOLD
     assert (step > -1e-12).sum() >= 145  # it runs forward but where a stride ends
