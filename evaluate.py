@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
+from springfoot.agents.command import exit_code
 from springfoot.agents.config import SettingsFlags, given
 from springfoot.gait.errors import SpringfootError
 
@@ -43,16 +44,7 @@ class Flags:
 def main() -> int:
     """Exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C."""
     flags = tyro.cli(Flags)
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
-    try:
-        run(flags)
-    except (SpringfootError, OSError) as error:
-        print(f"evaluate.py: error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    return exit_code("evaluate.py", lambda: run(flags))
 
 
 def run(flags: Flags) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from springfoot.agents.command import exit_code
 from springfoot.agents.config import PRESETS, TrainingConfig, given, optional_flags
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
@@ -41,13 +42,7 @@ class Flags:
 def main() -> int:
     """Exit code: 0 trained, 2 bad input, 130 ended by Ctrl-C."""
     flags = tyro.cli(Flags)
-    try:
-        return run(flags)
-    except SpringfootError as error:
-        print(f"train.py: error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    return exit_code("train.py", lambda: run(flags))
 
 
 def run(flags: Flags) -> int:
@@ -58,9 +53,7 @@ def run(flags: Flags) -> int:
     if flags.resume and (fixed := sorted(set(settings) - {"timesteps"})):
         raise SpringfootError(f"--resume goes on with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
-        from springfoot.agents import (
-            training,
-        )  # here and below: torch takes seconds, bad flags are told at once
+        from springfoot.agents import training  # torch takes seconds; bad flags are told without waiting for it
 
         folder, record = flags.resume, training.resume(flags.resume, settings.get("timesteps"))
     else:

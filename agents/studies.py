@@ -25,6 +25,7 @@ from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 
+from .command import exit_code
 from .config import SettingsFlags, given, optional_flags
 from .evaluation import measure
 from .recording import prepare, record
@@ -333,16 +334,7 @@ def _what_ran(study: _Study, row: Row) -> str:
 def main() -> int:
     """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
     flags = tyro.cli(BestConstant | Compare | Seeds, prog="springfoot.agents.studies")
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
-    try:
-        flags.run()
-    except (SpringfootError, OSError) as error:
-        print(f"studies: error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    return exit_code("studies", flags.run)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,9 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from math import inf
 from pathlib import Path
+from typing import Any, Literal
 
 import cma
 import numpy as np
@@ -23,11 +25,14 @@ from springfoot.envs.biped import Biped, Tick
 from springfoot.envs.equilibrium import foot_curves
 from springfoot.envs.legs import LegConstants, constants_from, constants_name
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
-from springfoot.envs.settings import BipedSettings, Equilibrium
+from springfoot.envs.settings import BipedSettings
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
 from springfoot.gait.plan import Cadence, plan_walk
+
+from .command import exit_code
 
 SECONDS = 8.0
 """Length of each walk [s]."""
@@ -64,8 +69,8 @@ ADDITIVE_STEP = {"trunk_pitch_deg": 1.0, "swing_speed_gain": 0.05, "speed_torque
 class TuningFlags:
     """Find leg constants by CMA-ES and write them into a file of constants."""
 
-    equilibrium: Equilibrium = "planned"
-    """Which equilibrium the constants are for: planned or neutral."""
+    equilibrium: Literal["planned", "neutral"] = "planned"
+    """Which equilibrium the constants are for; angle and phase walk on those of planned."""
     cadence: Cadence = "people"
     """Which cadence they are for."""
     start: str = ""
@@ -222,10 +227,21 @@ def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float
 
 
 def tune(flags: TuningFlags) -> None:
-    """Run the search and write the best mean of the search into the file of constants."""
-    table = json.loads(flags.out.read_text(encoding="utf-8"))
+    """Run the search and write its mean into the file of constants, every ten generations and at the end.
+
+    Raises `SpringfootError`, with nothing written, for counts out of range, constants to start from that are not in
+    the file, or another kind of file.
+    """
+    for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0), ("ease", 0)):
+        if getattr(flags, count) < least:
+            raise SpringfootError(f"{count} must be a whole number >= {least}, got {getattr(flags, count)}")
+    if not 0 < flags.sigma < inf:
+        raise SpringfootError(f"sigma must be a finite number > 0, got {flags.sigma}")
     name = constants_name(flags.equilibrium, flags.cadence)
-    search = Search(constants_from(table["constants"][flags.start or name]))
+    constants = _read(flags.out)["constants"]
+    if (start := flags.start or name) not in constants:
+        raise SpringfootError(f"no constants {start!r} to start from in {flags.out}; --start: {', '.join(constants)}")
+    search = Search(constants_from(constants[start]))
     settings = BipedSettings(equilibrium=flags.equilibrium, cadence=flags.cadence, episode_seconds=SECONDS + 1)
     options = {"popsize": flags.population, "seed": flags.seed + 1, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), flags.sigma, options)
@@ -238,11 +254,28 @@ def tune(flags: TuningFlags) -> None:
         if generation % 10 == 9 or generation == flags.generations - 1:
             mean = search.constants(strategy.mean)
             print(f"generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}", flush=True)
-            table = json.loads(flags.out.read_text(encoding="utf-8"))
+            table = _read(flags.out)  # anew: another search may have written its own
             table["constants"][name] = asdict(mean)
             table.setdefault("found_by", {})[name] = " ".join(["python -m springfoot.agents.tuning", *sys.argv[1:]])
             flags.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
+def _read(path: Path) -> dict[str, Any]:
+    """A file of constants."""
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        table = None
+    if not isinstance(table, dict) or not isinstance(table.get("constants"), dict):
+        raise SpringfootError(f"{path} is not a file of leg constants")
+    return table
+
+
+def main() -> int:
+    """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
+    flags = tyro.cli(TuningFlags, description=__doc__)
+    return exit_code("tuning", lambda: tune(flags))
+
+
 if __name__ == "__main__":
-    tune(tyro.cli(TuningFlags, description=__doc__))
+    sys.exit(main())

@@ -191,6 +191,7 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
         ["constant", "--mass", "-3"],
         ["constant", "--episodes", "0"],
         ["constant", "--seconds", "0"],
+        ["constant", "--episodes", "1", "--seconds", "1e12", "--out", "large"],
         ["constant", "--seed", "-1"],
         ["constant", "--ankle-stiffness-range", "800", "20"],
         ["constant", "--equilibrium", "phase"],
