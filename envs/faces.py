@@ -142,7 +142,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     and `render_mode`: `"human"`, `"rgb_array"` or None.
 
     ## Version history
-    * v0: first version; may change until springfoot 1.0.
+    * v0: first version; may change until springfoot's first release, 0.1.0.
     """
 
     metadata = dict(METADATA)

@@ -1,6 +1,6 @@
 """Training by hand: stable-baselines3's PPO on the batched environment, without train.py.
 
-python examples/train_with_sb3.py --timesteps 400000
+python examples/train_with_sb3.py --timesteps 1000000
 """
 
 import argparse
@@ -16,19 +16,19 @@ from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
 def main() -> None:
     """Train, then walk one episode with the mean action."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--timesteps", type=int, default=400_000)
+    parser.add_argument("--timesteps", type=int, default=1_000_000)
     parser.add_argument("--num-envs", type=int, default=64)
     parser.add_argument("--steps", type=int, default=128, help="of each environment between two updates")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of the episodes")
     args = parser.parse_args()
 
-    batch = SegmentedFootBipedVecEnv(args.num_envs, num_threads=2, episode_seconds=args.seconds, push_newton=120.0)
+    batch = SegmentedFootBipedVecEnv(args.num_envs, num_threads=2, episode_seconds=args.seconds, push_newton=150.0)
     envs = VecNormalize(batch, norm_reward=True, gamma=0.98)
     ppo = PPO(
         "MlpPolicy",
         envs,
         n_steps=args.steps,
-        batch_size=args.num_envs * args.steps // 4,
+        batch_size=args.num_envs * args.steps // 8,
         n_epochs=8,
         gamma=0.98,
         policy_kwargs={"log_std_init": -0.7},  # gentle noise: a walker that falls at once learns little

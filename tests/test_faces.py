@@ -220,6 +220,11 @@ def test_a_spec_holds_its_settings_as_json_and_makes_the_same_environment():
     assert again.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 
 
+def test_the_bare_id_is_known_after_the_import():
+    env: Any = gym.make("SegmentedFootBiped-v0", speed=1.1)
+    assert isinstance(env.unwrapped, SegmentedFootBiped) and env.unwrapped.settings.speed == 1.1
+
+
 def test_every_setting_is_an_argument_of_make():
     values = settings_to_json(settings_from(height=1.6, mass=55.0, equilibrium="neutral", start=0.3))
     assert settings_to_json(make(**values).unwrapped.settings) == values
