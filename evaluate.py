@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from springfoot.agents.command import exit_code
 from springfoot.agents.config import SettingsFlags, given
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +50,7 @@ def main() -> int:
 def run(flags: Flags) -> None:
     """Evaluates, prints the table and says where the results lie."""
     for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
-        if getattr(flags, name) < least:
-            raise SpringfootError(f"{name} must be a whole number >= {least}, got {getattr(flags, name)}")
+        require_count(name, getattr(flags, name), least)
     label = policy_label(flags.policy)
     out = flags.out or next_free(Path("runs"), f"eval-{label}")
     if out.exists():

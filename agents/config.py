@@ -7,14 +7,14 @@ import json
 import textwrap
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import isfinite
+from numbers import Integral
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import tyro
 
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count, require_number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,26 +58,18 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         for name in ("timesteps", "num_envs", "minibatches", "epochs", "eval_interval", "eval_episodes"):
-            self._check(name, int, 1)
-        self._check("seed", int, 0, 2**31 - 1)
-        self._check("threads", int, 0)
-        self._check("update_steps", int, max(self.num_envs, 2 * self.minibatches))
+            require_count(name, getattr(self, name))
+        require_count("seed", self.seed, 0, 2**31 - 1)
+        require_count("threads", self.threads, 0)
+        require_count("update_steps", self.update_steps, max(self.num_envs, 2 * self.minibatches))
         for name in ("learning_rate", "clip_range"):
-            self._check(name, float, 0, above=True)
-        self._check("gamma", float, 0, 1, above=True)
+            require_number(name, getattr(self, name), 0, above=True)
+        require_number("gamma", self.gamma, 0, 1, above=True)
         for name in ("gae_lambda", "learning_rate_end"):
-            self._check(name, float, 0, 1)
-        self._check("log_std", float, -5, 2)
+            require_number(name, getattr(self, name), 0, 1)
+        require_number("log_std", self.log_std, -5, 2)
         if not self.hidden or any(type(width) is not int or width < 1 for width in self.hidden):
             raise SpringfootError(f"hidden must be one or more positive whole numbers, got {self.hidden!r}")
-
-    def _check(self, name: str, kind: type, low: float, high: float = float("inf"), above: bool = False) -> None:
-        value = getattr(self, name)
-        right_kind = type(value) is int or (kind is float and isinstance(value, float) and isfinite(value))
-        if not right_kind or not low <= value <= high or (above and value == low):
-            what = "a whole number" if kind is int else "a finite number"
-            bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == float("inf") else f" and <= {high:g}")
-            raise SpringfootError(f"{name} must be {what} {bounds}, got {value!r}")
 
 
 PRESETS: dict[str, TrainingConfig] = {"walk": TrainingConfig()}
@@ -87,6 +79,7 @@ PRESETS: dict[str, TrainingConfig] = {"walk": TrainingConfig()}
 def config_to_json(config: TrainingConfig) -> dict[str, Any]:
     """A configuration as a dictionary of plain JSON values; `config_from_json` is its inverse."""
     values = {item.name: getattr(config, item.name) for item in dataclasses.fields(config)}
+    values = {name: int(value) if isinstance(value, Integral) else value for name, value in values.items()}
     return values | {"hidden": list(config.hidden), "environment": settings_to_json(config.environment)}
 
 

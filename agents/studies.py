@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from springfoot.envs.settings import BipedSettings, settings_to_json
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 
 from .command import exit_code
@@ -242,8 +242,7 @@ class _Study:
         """Arguments of `recording.record`; refuses what cannot be counted."""
         counts = {"episodes": self.episodes, "seed": self.seed, "threads": self.threads}
         for name, count in counts.items():
-            if count < (least := 0 if name == "seed" else 1):
-                raise SpringfootError(f"{name} must be a whole number >= {least}, got {count}")
+            require_count(name, count, 0 if name == "seed" else 1)
         return counts
 
     def conditions(self, environment: Any, push_newton: float = 0.0) -> dict[str, Any]:

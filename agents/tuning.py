@@ -11,7 +11,6 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,7 +27,7 @@ from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.human import human_gait
 from springfoot.gait.plan import Cadence, plan_walk
 
@@ -233,10 +232,8 @@ def tune(flags: TuningFlags) -> None:
     the file, or another kind of file.
     """
     for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0), ("ease", 0)):
-        if getattr(flags, count) < least:
-            raise SpringfootError(f"{count} must be a whole number >= {least}, got {getattr(flags, count)}")
-    if not 0 < flags.sigma < inf:
-        raise SpringfootError(f"sigma must be a finite number > 0, got {flags.sigma}")
+        require_count(count, getattr(flags, count), least)
+    require_number("sigma", flags.sigma, 0, above=True)
     name = constants_name(flags.equilibrium, flags.cadence)
     constants = _read(flags.out)["constants"]
     if (start := flags.start or name) not in constants:

@@ -4,12 +4,12 @@ import json
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields
 from difflib import get_close_matches
-from math import inf, isfinite
+from math import isfinite
 from numbers import Real
 from typing import Any, Literal, get_args
 
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
-from springfoot.gait.errors import SpringfootError, require_within
+from springfoot.gait.errors import SpringfootError, require_number, require_within
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
@@ -83,12 +83,12 @@ class BipedSettings:
         _check_range("ankle_stiffness_range", self.ankle_stiffness_range)
         _check_range("toe_stiffness_range", self.toe_stiffness_range)
         self._check_schedule()
-        _check_number("episode_seconds", self.episode_seconds, STEP_SECONDS, inf, "s")
+        require_number("episode_seconds", self.episode_seconds, STEP_SECONDS, unit="s")
         check_start(self.start)
-        _check_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
-        _check_number("push_newton", self.push_newton, 0.0, inf, "N")
-        _check_number("push_interval", self.push_interval, 0.0, inf, "s", above=True)
-        _check_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
+        require_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
+        require_number("push_newton", self.push_newton, 0.0, unit="N")
+        require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
+        require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         _check_weights(self.reward_weights)
 
     def _check_schedule(self) -> None:
@@ -136,14 +136,6 @@ def _plain(value: Any) -> Any:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
-
-
-def _check_number(name: str, value: Any, low: float, high: float, unit: str, above: bool = False) -> None:
-    """Refuses what is not a finite number in [low, high], or in (low, high] with `above`."""
-    if _is_number(value) and low <= value <= high and not (above and value == low):
-        return
-    bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == inf else f" and <= {high:.4g}")
-    raise SpringfootError(f"{name} must be a finite number {bounds} {unit}, got {value!r}")
 
 
 def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 
 from .biped import Biped
 from .faces import METADATA, check_can_render, check_options, check_render_mode, spaces_of
@@ -48,7 +47,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         **settings: Any,
     ) -> None:
         for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
-            _check_count(name, count)
+            require_count(name, count)
         self.settings = _limit_steps(settings_from(**settings), max_episode_steps)
         self.num_envs = num_envs
         self.render_mode = check_render_mode(render_mode)
@@ -186,11 +185,6 @@ def _final(observation: NDArray, info: dict[str, NDArray], ended: NDArray) -> di
     }
 
 
-def _check_count(name: str, value: Any) -> None:
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
-        raise SpringfootError(f"{name} must be an integer >= 1, got {value!r}")
-
-
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
     try:
         return AutoresetMode(mode)
@@ -203,5 +197,5 @@ def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> Bipe
     """Gymnasium puts no TimeLimit around a vector entry point: the limit goes into the settings."""
     if max_episode_steps is None:
         return settings
-    _check_count("max_episode_steps", max_episode_steps)
-    return replace(settings, episode_seconds=min(settings.episode_seconds, max_episode_steps * STEP_SECONDS))
+    limit = require_count("max_episode_steps", max_episode_steps) * STEP_SECONDS
+    return replace(settings, episode_seconds=min(settings.episode_seconds, limit))

@@ -1,6 +1,7 @@
-"""The one exception of springfoot, and the check that raises it most."""
+"""The one exception of springfoot, and the checks that raise it most."""
 
-from numbers import Real
+from math import inf, isfinite, nan
+from numbers import Integral, Real
 
 
 class SpringfootError(ValueError):
@@ -15,3 +16,23 @@ def require_within(name: str, value: object, allowed: tuple[float, float], unit:
         given = repr(value) if number is None else f"{number:.4g}"
         raise SpringfootError(f"{name} must be in [{low:g}, {high:g}] {unit}".rstrip() + f", got {given}")
     return number
+
+
+def require_number(
+    name: str, value: object, low: float, high: float = inf, unit: str = "", *, above: bool = False
+) -> float:
+    """`value`, or `SpringfootError` if it is not a finite number in [low, high], or in (low, high] with `above`."""
+    number = value if isinstance(value, (int, float)) and not isinstance(value, bool) else nan
+    if not (isfinite(number) and low <= number <= high) or (above and number == low):
+        bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == inf else f" and <= {high:.4g}")
+        raise SpringfootError(f"{name} must be a finite number {bounds} {unit}".rstrip() + f", got {value!r}")
+    return number
+
+
+def require_count(name: str, value: object, least: int = 1, most: float = inf) -> int:
+    """`value` as an int, or `SpringfootError` if it is not a whole number in [least, most]."""
+    count = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if count is None or not least <= count <= most:
+        bounds = f">= {least}" + ("" if most == inf else f" and <= {most}")
+        raise SpringfootError(f"{name} must be a whole number {bounds}, got {value!r}")
+    return count

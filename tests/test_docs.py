@@ -30,7 +30,9 @@ def test_links_lead_somewhere(page):
 
 def test_readme_examples_run_in_their_order():
     code = (
-        "\n".join(BLOCKS).replace("1_000_000", "64").replace("SegmentedFootBipedVecEnv(64", "SegmentedFootBipedVecEnv(2")
+        "\n".join(BLOCKS)
+        .replace("1_000_000", "64")
+        .replace("SegmentedFootBipedVecEnv(64", "SegmentedFootBipedVecEnv(2")
     )
     code = code.replace("n_steps=128, batch_size=1024", "n_steps=8, batch_size=16").replace("range(500)", "range(50)")
     assert len(BLOCKS) == 4
