@@ -93,7 +93,8 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
     weights = tmp_path / "weights.json"
     words = ["--out", tmp_path / "run", "--timesteps", "1024", *SHORT, "--reward-weights", weights]
     assert main(monkeypatch, *words) == 0
-    out = capsys.readouterr().out
+    out, progress = capsys.readouterr()
+    assert "0 of 1,024 steps · return " in progress and "1,024 of 1,024 steps · return " in progress
     assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
     assert f"python evaluate.py {tmp_path / 'run'}" in out
     assert load_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
