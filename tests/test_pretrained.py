@@ -1,4 +1,4 @@
-"""The policy that is shipped, and the committed legs: short walks held to the limits that the README's long ones keep."""
+"""The shipped policy and the committed legs: short walks held to the limits that the README's long ones keep."""
 
 import numpy as np
 import pytest
