@@ -103,6 +103,15 @@ def build_spec(body: Body) -> mujoco.MjSpec:
         width=256,
         height=256,
     )
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=(0.95, 0.97, 1.0),
+        rgb2=(0.75, 0.83, 0.92),
+        width=64,
+        height=384,
+    )
     tiles = spec.add_material(name="tiles", texrepeat=(1.0, 1.0), texuniform=True)
     tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
 
@@ -123,7 +132,7 @@ def build_spec(body: Body) -> mujoco.MjSpec:
         trunk.add_joint(name=name, type=kind, axis=axis)
     trunk.add_camera(
         name="track",
-        pos=(0, -3.2 * length, 0),
+        pos=(0, -2.6 * length, -0.1 * length),
         xyaxes=(1, 0, 0, 0, 0, 1),
         mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
     )
