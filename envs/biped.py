@@ -26,7 +26,7 @@ from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
 from .phase import GRID, PhaseTable, leg_phases
 from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
-from .task import TERMS, Task
+from .task import ALIVE, TERMS, Task
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
 """Control windows in one step."""
@@ -133,7 +133,6 @@ class Biped:
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else rest
         self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
-        self._ankle = PhaseTable(self.human.mean("ankle", GRID)[:, None])
         self._start = self._start_curves(self.constants[0].period_factor * stride_time)
         self._trunk_pitch = np.deg2rad(self.constants[0].trunk_pitch_deg)
         self._passive_damping = passive_damping(self.body)
@@ -208,8 +207,7 @@ class Biped:
 
     def observe(self) -> NDArray:
         """(N, D) float32 observation of the present."""
-        phase = self._legs.phase
-        return self._task.observe(self._now, phase, self._last_action, self._ankle.at(phase)[..., 0], self._force)
+        return self._task.observe(self._now, self._legs.phase, self._last_action, self._force)
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
         """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
@@ -236,7 +234,7 @@ class Biped:
         self._steps += running
         time = self._steps * STEP_SECONDS
         terminated, truncated = np.empty((2, self.num_envs), bool)
-        _end(self._last_time, running, terms["alive"], time, reward, terminated, truncated)
+        _end(self._last_time, running, terms[ALIVE], time, reward, terminated, truncated)
         per_action = (springs.stiffness, m.torque[..., FEET], springs.equilibrium, work_stiffness, work_equilibrium)
         rows = [value.reshape(self.num_envs, -1).T for value in per_action]
         return Outcome(
@@ -244,7 +242,7 @@ class Biped:
             reward=reward,
             terminated=terminated,
             truncated=truncated,
-            values=np.concatenate((*rows, [*terms.values()], phase.T, [time, m.com_velocity[:, 0]])),
+            values=np.concatenate((*rows, terms, phase.T, [time, m.com_velocity[:, 0]])),
             termination=self._reasons(terminated) if terminated.any() else self._no_reason,
         )
 

@@ -123,9 +123,9 @@ class Simulation:
         else:
             self._sensors[:] = 0.0
             if len(ids):
-                self._record["sensordata"][ids] = self._batch.rollout(
-                    STEPS_PER_WINDOW, record=["sensordata"], ids=ids
-                )["sensordata"]
+                self._record["sensordata"][ids] = self._batch.rollout(STEPS_PER_WINDOW, record=["sensordata"], ids=ids)[
+                    "sensordata"
+                ]
         return self._measure(stiffness, drive)
 
     def measure(self) -> Measurement:
@@ -155,12 +155,10 @@ class Simulation:
             force=np.empty(feet),
             diverged=_names(self._warnings) if _any_raised(self._warnings) else self._no_warning,
         )
-        _read_state(self._qpos, self._qvel, m.root, m.root_velocity, m.angle, m.velocity)
-        _read_torque(self._segments, stiffness, drive, m.angle, m.velocity, m.torque)
-        _read_force(self._sensors, m.force)
-        _locate(
-            self._segments, m.root, m.root_velocity, m.angle, m.velocity, m.com, m.com_velocity, m.ankle, m.contact
-        )
+        _read_joints(self._segments, self._qpos, self._qvel, stiffness, drive, m.angle, m.velocity, m.torque)
+        _average(self._sensors, m.force)
+        state = self._qpos, self._qvel, m.root, m.root_velocity
+        _locate(self._segments, *state, m.com, m.com_velocity, m.ankle, m.contact)
         return m
 
 
@@ -185,29 +183,19 @@ def _any_raised(warnings):
 
 
 @kernel
-def _read_state(position, rate, root, root_velocity, angle, velocity):
-    for i in range(len(root)):
-        for k in range(3):
-            root[i, k], root_velocity[i, k] = position[i, k], rate[i, k]
-        for side in range(2):
-            for joint in range(4):
-                k = 3 + 4 * side + joint
-                angle[i, side, joint], velocity[i, side, joint] = position[i, k], rate[i, k]
-
-
-@kernel
-def _read_torque(segments, stiffness, drive, angle, velocity, torque):
+def _read_joints(segments, position, rate, stiffness, drive, angle, velocity, torque):
     beta, limit = segments[0].beta, segments[0].limit
     for i in range(len(torque)):
         for side in range(2):
             for joint in range(4):
-                moved = angle[i, side, joint] + beta[joint] * velocity[i, side, joint]
-                spring = drive[i, side, joint] - stiffness[i, side, joint] * moved
+                theta, theta_rate = position[i, 3 + 4 * side + joint], rate[i, 3 + 4 * side + joint]
+                spring = drive[i, side, joint] - stiffness[i, side, joint] * (theta + beta[joint] * theta_rate)
+                angle[i, side, joint], velocity[i, side, joint] = theta, theta_rate
                 torque[i, side, joint] = min(max(spring, -limit[joint]), limit[joint])
 
 
 @kernel
-def _read_force(sensors, force):
+def _average(sensors, force):
     steps = sensors.shape[1]
     for i in range(len(force)):
         for side in range(2):
@@ -265,7 +253,7 @@ def _segments(body: Body) -> NDArray:
 
 
 @kernel
-def _locate(segments, root, root_velocity, angle, velocity, com, com_velocity, ankle, contact):
+def _locate(segments, position, rate, root, root_velocity, com, com_velocity, ankle, contact):
     """Planar forward kinematics.
 
     A segment turned up-forward by s (a thigh's flexion, a foot's toes-up pitch) carries the offset (u, w) in its frame
@@ -273,21 +261,22 @@ def _locate(segments, root, root_velocity, angle, velocity, com, com_velocity, a
     """
     body = segments[0]
     for i in range(len(root)):
-        upright, spin = -root[i, 2], -root_velocity[i, 2]
-        x, z = _turned(body.trunk, cos(upright), sin(upright))
-        com[i, 0], com[i, 1] = root[i, 0] + x, root[i, 1] + z
-        com_velocity[i, 0], com_velocity[i, 1] = root_velocity[i, 0] - z * spin, root_velocity[i, 1] + x * spin
+        for k in range(3):
+            root[i, k], root_velocity[i, k] = position[i, k], rate[i, k]
+        hip_x, hip_z, pitch = position[i, 0], position[i, 1], position[i, 2]
+        x, z = _turned(body.trunk, cos(-pitch), sin(-pitch))
+        com_x, com_z = hip_x + x, hip_z + z
+        com_rate_x, com_rate_z = rate[i, 0] + z * rate[i, 2], rate[i, 1] - x * rate[i, 2]
         for side in range(2):
-            turn, spin = -root[i, 2], -root_velocity[i, 2]
-            joint_x, joint_z = root[i, 0], root[i, 1]
+            joint_x, joint_z, turn, spin = hip_x, hip_z, -pitch, -rate[i, 2]
             for joint in range(4):
                 sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
-                turn += sign * angle[i, side, joint]
-                spin += sign * velocity[i, side, joint]
+                turn += sign * position[i, 3 + 4 * side + joint]
+                spin += sign * rate[i, 3 + 4 * side + joint]
                 c, s = cos(turn), sin(turn)
                 x, z = _turned(body.part[joint], c, s)
-                com[i, 0], com[i, 1] = com[i, 0] + x, com[i, 1] + z
-                com_velocity[i, 0], com_velocity[i, 1] = com_velocity[i, 0] - z * spin, com_velocity[i, 1] + x * spin
+                com_x, com_z = com_x + x, com_z + z
+                com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
                 if joint == ANKLE:
                     ankle[i, side, 0], ankle[i, side, 1] = joint_x, joint_z
                 for k in range(3):
@@ -296,6 +285,7 @@ def _locate(segments, root, root_velocity, angle, velocity, com, com_velocity, a
                         contact[i, side, k, 0], contact[i, side, k, 1] = joint_x + x, joint_z + z - body.radius[k]
                 x, z = _turned(body.end[joint], c, s)
                 joint_x, joint_z = joint_x + x, joint_z + z
+        com[i, 0], com[i, 1], com_velocity[i, 0], com_velocity[i, 1] = com_x, com_z, com_rate_x, com_rate_z
 
 
 @kernel

@@ -118,25 +118,36 @@ SEEN = np.dtype(
         ("command", float, 3),
     ]
 )
-"""The observation of one body before it is made dimensionless: the entries of `OBSERVATION`, in order [SI]."""
-TERMS = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
-"""The reward's terms, in the order in which they are summed."""
-ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
-JUDGED = np.dtype(
+"""The entries of `OBSERVATION`, in order, before they are made dimensionless [SI]."""
+CURVES = np.dtype(
+    [
+        ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
+        ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
+        ("force_sd", float, 2),  # its standard deviation
+        ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
+        ("speed", float),  # the plan's forward speed of the CoM [m/s]
+    ]
+)
+"""What people and the plan do at a phase of one leg's stride; `com` and `speed` where its stance began last."""
+SCALES = np.dtype(
     [
         ("min_hip_height", float),  # [m]
-        ("tolerance", float, 3),  # of CoM x, z [m] and forward speed [m/s]
+        ("stride_length", float),  # of the plan [m]
+        ("tolerance", float, 3),  # of the CoM's x, z [m] and forward speed [m/s]
         ("pose_share", float, len(JOINTS)),
-        ("stiffness_unit", float, 2),  # [N m/rad]
+        ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
         ("stiffness_share", float, 2),
         ("weight", float),  # of the body [N]
     ]
 )
-"""What the terms of one body are measured by."""
+"""What one body in one task is measured by."""
+TERMS = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
+"""The reward's terms, in the order in which they are summed."""
+ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
 
 
 class Task:
-    """What is seen, what is rewarded and what counts as a fall, for one body and plan; holds no state."""
+    """What is seen, what is rewarded and what counts as a fall, for one body and plan."""
 
     def __init__(self, settings: BipedSettings, body: Body, plan: WalkPlan, human: HumanGait) -> None:
         length, leg = body.length_scale, body.leg_length
@@ -154,65 +165,42 @@ class Task:
             "body weight": body.mass * GRAVITY,
         }
         self._units = np.array([unit[entry.unit] for entry in OBSERVATION])
-        self._command = np.array([settings.speed, length, body.mass_scale])
+        self._row = np.zeros(1, SEEN)  # the body that is being looked at
+        self._row["command"] = settings.speed, length, body.mass_scale
+        self._entries = self._row.view(float)
         self._weights = np.array([self.weights[name] for name in TERMS])
-        self._half_step = 0.5 * STEP_SECONDS / plan.stride_time
-        self._judged = np.zeros(1, JUDGED)
-        self._judged["min_hip_height"] = MIN_HIP_HEIGHT * length
-        self._judged["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
-        self._judged["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
-        self._judged["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
-        self._judged["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
-        self._judged["weight"] = body.mass * GRAVITY
+        self._curves = PhaseTable(_curves(plan, human).view(float).reshape(len(GRID), -1))
+        self._scales = np.zeros(1, SCALES)
+        self._scales["min_hip_height"] = MIN_HIP_HEIGHT * length
+        self._scales["stride_length"] = 2 * plan.step_length
+        self._scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
+        self._scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
+        self._scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
+        self._scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
+        self._scales["weight"] = body.mass * GRAVITY
 
-        self._step_length = plan.step_length
-        self._plan = PhaseTable(_com_curves(plan))
-        self._pose = PhaseTable(np.stack([human.mean(name, GRID) for name in ANGLES], -1))
-        force = ("grf_forward", "grf_vertical")
-        mean, sd = [human.mean(name, GRID) for name in force], [human.sd(name, GRID) for name in force]
-        self._force = PhaseTable(np.stack(mean + sd, -1))
-
-    def observe(
-        self,
-        m: "Measurement",
-        leg_phase: NDArray,
-        last_action: NDArray,
-        planned_ankle: NDArray,
-        force: NDArray,
-    ) -> NDArray:
+    def observe(self, m: "Measurement", leg_phase: NDArray, last_action: NDArray, force: NDArray) -> NDArray:
         """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
 
-        `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `planned_ankle` (N, 2) [rad]; `force`
-        (N, 2, 3, 2) on the body [N], mean over the step. What is not a number reads as the upper bound.
+        `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean
+        over the step. What is not a number reads as the upper bound.
         """
-        error = self.tracking(m, leg_phase)
-        seen = np.empty(len(leg_phase), SEEN)
-        scaled = np.empty((len(leg_phase), len(OBSERVATION)), np.float32)
-        _see_body(m.root, m.root_velocity, m.angle, m.velocity, force, seen)
-        _see_task(leg_phase, error, last_action, planned_ankle, self._command, seen)
-        _scale(seen.view(float).reshape(scaled.shape), self._units, self.low, self.high, scaled)
-        return scaled
+        observation = np.empty((len(leg_phase), len(OBSERVATION)), np.float32)
+        state = m.root, m.root_velocity, m.angle, m.velocity, m.com, m.com_velocity, m.ankle, force
+        bounds = self._units, self.low, self.high
+        curves = self._at(leg_phase)
+        _observe(self._scales, curves, *state, leg_phase, last_action, self._row, self._entries, *bounds, observation)
+        return observation
 
     def planned_com(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """The plan's CoM (x in the world, z) [m], shape (N, 2)."""
-        return self._reference(m, leg_phase)[:, :2]
+        return m.com - self.tracking(m, leg_phase)[:, :2]
 
     def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3)."""
         error = np.empty((len(leg_phase), 3))
-        _subtract(m.com, m.com_velocity, self._reference(m, leg_phase), error)
+        _track(self._scales, self._at(leg_phase), m.com, m.com_velocity, m.ankle, leg_phase, error)
         return error
-
-    def _reference(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
-        """The plan's CoM x (in the world) [m], z [m] and forward speed [m/s], shape (N, 3).
-
-        The plan counts x from the ankle of the leg whose stance began last, the one with a phase in [0, 0.5).
-        """
-        step_phase, origin = np.empty((2, len(leg_phase)))
-        _lead(leg_phase, m.ankle, step_phase, origin)
-        planned = self._plan.at(step_phase)
-        planned[:, 0] += self._step_length * step_phase + origin
-        return planned
 
     def terms(
         self,
@@ -222,8 +210,8 @@ class Task:
         last_action: NDArray,
         stiffness: NDArray,
         force_windows: NDArray,
-    ) -> dict[str, NDArray]:
-        """The reward's terms, unweighted and dimensionless, each (N,).
+    ) -> NDArray:
+        """The reward's terms, unweighted and dimensionless, (len(TERMS), N) in the order of `TERMS`.
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance
@@ -236,150 +224,175 @@ class Task:
         `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
         (W, N, 2, 3, 2) on the body [N] in the W control windows of the step.
         """
-        error, well = self.tracking(m, leg_phase), m.diverged == ""
-        people = self._force.at((leg_phase - self._half_step) % 1.0)  # the mean over the step belongs to its middle
         terms = np.empty((len(TERMS), len(leg_phase)))
-        _judge_com(self._judged, m.root, well, error, terms)
-        _judge_pose(self._judged, m.root, m.angle, self._pose.at(leg_phase), terms)
-        _judge_force(self._judged, force_windows, people, terms)
-        _judge_stiffness(self._judged, action, last_action, stiffness, terms)
-        return dict(zip(TERMS, terms, strict=True))
+        state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged == ""
+        curves = self._at(leg_phase)
+        _judge(self._scales, curves, *state, leg_phase, action, last_action, stiffness, force_windows, terms)
+        return terms
 
-    def reward(self, terms: dict[str, NDArray]) -> NDArray:
+    def reward(self, terms: NDArray) -> NDArray:
         """Weighted sum of the terms, (N,); 0 where `alive` is 0."""
-        values = np.array([terms[name] for name in TERMS])
-        total = np.empty(values.shape[1])
-        _weigh(self._weights, values, total)
+        total = np.empty(terms.shape[1])
+        _sum(self._weights, terms, total)
         return total
 
     def fallen(self, m: "Measurement") -> NDArray:
         """Why each environment has fallen, a string array (N,): empty while it has not."""
         tilted = np.where(np.abs(m.root[:, 2]) <= MAX_PITCH, "", TOO_TILTED)
-        return np.where(m.root[:, 1] >= self._judged["min_hip_height"], tilted, TOO_LOW)
+        return np.where(m.root[:, 1] >= self._scales["min_hip_height"], tilted, TOO_LOW)
+
+    def _at(self, leg_phase: NDArray) -> NDArray:
+        """(N, side) of `CURVES`."""
+        return self._curves.at(leg_phase).view(CURVES)[..., 0]
+
+
+def _curves(plan: WalkPlan, human: HumanGait) -> NDArray:
+    """(SAMPLES,) of `CURVES`."""
+    curves = np.zeros(len(GRID), CURVES)
+    curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
+    middle = (GRID - 0.5 * STEP_SECONDS / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
+    for axis, name in enumerate(("grf_forward", "grf_vertical")):
+        curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
+    step = (2 * GRID) % 1.0
+    x, z = plan.com(step)
+    curves["com"] = np.stack((x - plan.step_length * step, z), -1)
+    curves["speed"], _ = plan.com_velocity(step)
+    return curves
 
 
 @kernel
-def _see_body(root, root_velocity, angle, velocity, force, seen):
-    for i in range(len(seen)):
-        row = seen[i]
+def _observe(
+    scales,
+    curves,
+    root,
+    root_velocity,
+    angle,
+    velocity,
+    com,
+    com_velocity,
+    ankle,
+    force,
+    leg_phase,
+    last_action,
+    seen,
+    entries,
+    units,
+    low,
+    high,
+    observation,
+):
+    """`entries` are the numbers of the one body `seen`, in order."""
+    row = seen[0]
+    for i in range(len(observation)):
+        left = leg_phase[i, LEFT]
+        s, c = sin(2 * pi * left), cos(2 * pi * left)
+        row.cycle[0], row.cycle[1], row.cycle[2], row.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
+        row.leading_leg = 1.0 if left < 0.5 else -1.0
         row.root[0], row.root[1] = root[i, 1], root[i, 2]
+        x, z, speed = _error(scales[0], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        row.error[0], row.error[1], row.error[2] = x, z, speed
         for k in range(3):
             row.root_velocity[k] = root_velocity[i, k]
+        for k in range(4):
+            row.last_action[k] = last_action[i, k]
         for side in range(2):
+            row.planned_ankle[side] = curves[i, side].pose[ANKLE]
             for joint in range(4):
                 row.angle[side, joint], row.velocity[side, joint] = angle[i, side, joint], velocity[i, side, joint]
             for contact in range(3):
                 row.load[side, contact] = force[i, side, contact, 1]
-
-
-@kernel
-def _see_task(leg_phase, error, last_action, planned_ankle, command, seen):
-    for i in range(len(seen)):
-        row, left = seen[i], leg_phase[i, LEFT]
-        s, c = sin(2 * pi * left), cos(2 * pi * left)
-        row.cycle[0], row.cycle[1], row.cycle[2], row.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
-        row.leading_leg = 1.0 if left < 0.5 else -1.0
-        for k in range(3):
-            row.error[k], row.command[k] = error[i, k], command[k]
-        for k in range(4):
-            row.last_action[k] = last_action[i, k]
-        for side in range(2):
-            row.planned_ankle[side] = planned_ankle[i, side]
-
-
-@kernel
-def _scale(seen, units, low, high, scaled):
-    for i in range(seen.shape[0]):
-        for k in range(seen.shape[1]):
-            value = seen[i, k] / units[k]
+        for k in range(len(entries)):
+            value = entries[k] / units[k]
             if not value <= high[k]:  # nor is what is not a number
                 value = high[k]
-            scaled[i, k] = max(value, low[k])
+            observation[i, k] = max(value, low[k])
 
 
 @kernel
-def _lead(leg_phase, ankle, step_phase, origin):
-    """Phase of the step, and x [m] of the ankle of the leg whose stance began last."""
-    for i in range(len(step_phase)):
-        leader = LEFT if leg_phase[i, LEFT] < 0.5 else RIGHT
-        step_phase[i] = 2 * (leg_phase[i, leader] % 0.5)
-        origin[i] = ankle[i, leader, 0]
-
-
-@kernel
-def _subtract(com, com_velocity, planned, error):
+def _track(scales, curves, com, com_velocity, ankle, leg_phase, error):
     for i in range(len(error)):
-        error[i, 0], error[i, 1] = com[i, 0] - planned[i, 0], com[i, 1] - planned[i, 1]
-        error[i, 2] = com_velocity[i, 0] - planned[i, 2]
+        x, z, speed = _error(scales[0], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        error[i, 0], error[i, 1], error[i, 2] = x, z, speed
 
 
 @kernel
-def _judge_com(judged, root, well, error, terms):
-    low, tolerance = judged[0].min_hip_height, judged[0].tolerance
+def _error(scale, curves, com, com_velocity, ankle, leg_phase):
+    """CoM minus plan: x, z, forward speed. The plan counts x from the ankle of the leg whose stance began last."""
+    leader = LEFT if leg_phase[LEFT] < 0.5 else RIGHT
+    planned = curves[leader]
+    planned_x = ankle[leader, 0] + scale.stride_length * leg_phase[leader] + planned.com[0]
+    return com[0] - planned_x, com[1] - planned.com[1], com_velocity[0] - planned.speed
+
+
+@kernel
+def _judge(
+    scales,
+    curves,
+    root,
+    angle,
+    com,
+    com_velocity,
+    ankle,
+    well,
+    leg_phase,
+    action,
+    last_action,
+    stiffness,
+    windows,
+    terms,
+):
+    scale = scales[0]
     for i in range(len(root)):
-        upright = root[i, 1] >= low and abs(root[i, 2]) <= MAX_PITCH  # what is not a number is not
+        upright = root[i, 1] >= scale.min_hip_height and abs(root[i, 2]) <= MAX_PITCH  # a NaN is not
         terms[ALIVE, i] = 1.0 if upright and well[i] else 0.0
-        terms[COM_X, i] = exp(-((error[i, 0] / tolerance[0]) ** 2))
-        terms[COM_Z, i] = exp(-((error[i, 1] / tolerance[1]) ** 2))
-        terms[SPEED, i] = exp(-((error[i, 2] / tolerance[2]) ** 2))
-
-
-@kernel
-def _judge_pose(judged, root, angle, people, terms):
-    share = judged[0].pose_share
-    for i in range(len(root)):
-        error = 0.0
+        x, z, speed = _error(scale, curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        terms[COM_X, i] = exp(-((x / scale.tolerance[0]) ** 2))
+        terms[COM_Z, i] = exp(-((z / scale.tolerance[1]) ** 2))
+        terms[SPEED, i] = exp(-((speed / scale.tolerance[2]) ** 2))
+        pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
         for side in range(2):
-            for joint in range(4):
-                lean = root[i, 2] if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
-                error += share[joint] * (angle[i, side, joint] - people[i, side, joint] - lean) ** 2
-        terms[POSE, i] = exp(-0.5 * error / POSE_TOLERANCE)
-
-
-@kernel
-def _judge_force(judged, windows, people, terms):
-    """Forces in body weights; `people` (N, side, 4) as mean forward, mean up, SD forward, SD up."""
-    count, weight = windows.shape[0], judged[0].weight
-    for i in range(windows.shape[1]):
-        away = 0.0
-        for side in range(2):
-            forward = up = excess = 0.0
-            for window in range(count):
-                foot = windows[window, i, side]
-                vertical = (foot[0, 1] + foot[1, 1] + foot[2, 1]) / weight
-                forward += (foot[0, 0] + foot[1, 0] + foot[2, 0]) / weight
-                up += vertical
-                excess += max(vertical - MAX_FORCE, 0.0)
-            away += EXCESS_SHARE / count * excess
-            away += max(abs(forward / count - people[i, side, 0]) - people[i, side, 2], 0.0)
-            away += max(abs(up / count - people[i, side, 1]) - people[i, side, 3], 0.0)
-        terms[GRF, i] = exp(-away / FORCE_TOLERANCE)
-
-
-@kernel
-def _judge_stiffness(judged, action, last_action, stiffness, terms):
-    unit, share = judged[0].stiffness_unit, judged[0].stiffness_share
-    for i in range(len(action)):
-        rate = cost = 0.0
-        for k in range(4):
-            rate += (action[i, k] - last_action[i, k]) ** 2
-        for side in range(2):
+            people = curves[i, side]
+            pose_error += 0.5 * _pose_error(scale, root[i, 2], angle[i, side], people)
+            force_distance += _force_distance(scale, windows[:, i, side], people)
             for joint in range(2):
-                cost += share[joint] * (stiffness[i, side, joint] / unit[joint]) ** 2
-        terms[STIFFNESS_RATE, i], terms[STIFFNESS, i] = rate, 0.5 * cost
+                k = stiffness[i, side, joint] / scale.stiffness_unit[joint]
+                stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
+        for k in range(4):
+            stiffness_rate += (action[i, k] - last_action[i, k]) ** 2
+        terms[POSE, i] = exp(-pose_error / POSE_TOLERANCE)
+        terms[GRF, i] = exp(-force_distance / FORCE_TOLERANCE)
+        terms[STIFFNESS, i], terms[STIFFNESS_RATE, i] = stiffness_cost, stiffness_rate
 
 
 @kernel
-def _weigh(weights, terms, total):
+def _pose_error(scale, pitch, angle, people):
+    error = 0.0
+    for joint in range(4):
+        lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
+        error += scale.pose_share[joint] * (angle[joint] - people.pose[joint] - lean) ** 2
+    return error
+
+
+@kernel
+def _force_distance(scale, windows, people):
+    """Body weights by which one foot's forces in the windows of a step leave people's range."""
+    count = len(windows)
+    forward = up = excess = 0.0
+    for window in range(count):
+        contacts = windows[window]
+        vertical = (contacts[0, 1] + contacts[1, 1] + contacts[2, 1]) / scale.weight
+        forward += (contacts[0, 0] + contacts[1, 0] + contacts[2, 0]) / scale.weight / count
+        up += vertical / count
+        excess += max(vertical - MAX_FORCE, 0.0) / count
+    beyond_forward = max(abs(forward - people.force[0]) - people.force_sd[0], 0.0)
+    beyond_up = max(abs(up - people.force[1]) - people.force_sd[1], 0.0)
+    return EXCESS_SHARE * excess + beyond_forward + beyond_up
+
+
+@kernel
+def _sum(weights, terms, total):
     for i in range(len(total)):
         total[i] = 0.0
         for term in range(len(weights)):
             total[i] += weights[term] * terms[term, i]
         total[i] *= terms[ALIVE, i]
-
-
-def _com_curves(plan: WalkPlan) -> NDArray:
-    """The plan's CoM over one step: x [m] less its mean advance, z [m], forward speed [m/s]; all periodic."""
-    x, z = plan.com(GRID)
-    speed, _ = plan.com_velocity(GRID)
-    return np.stack((x - plan.step_length * GRID, z, speed), -1)
