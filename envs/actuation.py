@@ -25,12 +25,14 @@ def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDAr
 
 def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
     """Absolute mode: actions in [-1, 1], (..., 2) for ankle and toe, on a log scale to N m/rad."""
+    middle, factor = _log_scale(settings, body)
+    return middle * factor**action
+
+
+def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
+    """Stiffness at action 0 [N m/rad], and by what one action more multiplies it."""
     low, high = stiffness_ranges(settings, body)
-    return _log_scale(action, low, high / low)
-
-
-def _log_scale(action: NDArray, low: NDArray, ratio: NDArray) -> NDArray:
-    return low * ratio ** ((action + 1.0) / 2.0)
+    return np.sqrt(low * high), np.sqrt(high / low)
 
 
 def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDArray:
@@ -61,8 +63,7 @@ class FootSprings:
         variant: NDArray | None = None,
     ):
         self._residual = settings.action_mode == "residual"
-        self._low, high = stiffness_ranges(settings, body)
-        self._ratio = high / self._low
+        self._middle, self._factor = _log_scale(settings, body)
         self._equilibrium = PhaseTable(equilibrium, variant)
         self._schedule = PhaseTable(schedule, variant)
         self.stiffness = np.zeros((num, 2, 2))
@@ -91,7 +92,7 @@ class FootSprings:
         if self._residual:
             stiffness = self.scheduled(leg_phase) * np.exp(action)
         else:
-            stiffness = _log_scale(action, self._low, self._ratio)
+            stiffness = self._middle * self._factor**action
         running = self._everyone if running is None else running
         work = np.empty_like(stiffness)
         _stiffen(stiffness, self.equilibrium, angle, self._fresh, running, self.stiffness, work)

@@ -23,10 +23,11 @@ from .equilibrium import foot_curves
 from .kernel import kernel
 from .legs import LegConstants, Legs, leg_constants
 from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
+from .outcome import Outcome, report
 from .phase import GRID, PhaseTable, leg_phases
 from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
-from .task import ALIVE, TERMS, Task
+from .task import ALIVE, Task
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
 """Control windows in one step."""
@@ -53,45 +54,6 @@ class Tick:
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray
     """(N,) which environments ran."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
-    """What one step returns; every array has N rows."""
-
-    observation: NDArray
-    """(N, D) float32."""
-    reward: NDArray
-    """(N,)."""
-    terminated: NDArray
-    """(N,) fallen or diverged."""
-    truncated: NDArray
-    """(N,) out of time."""
-    values: NDArray
-    """(len(INFO), N) what there is to know besides, in the order of `INFO`."""
-    termination: NDArray
-    """(N,) why an episode was terminated, "" where it was not; read only."""
-
-    @property
-    def info(self) -> dict[str, NDArray]:
-        """`values` by their names in `INFO`, and `termination`: name -> (N,)."""
-        return dict(zip(INFO, self.values, strict=True)) | {"termination": self.termination}
-
-
-INFO = (
-    *(
-        f"{name}/{action}"
-        for name in ("stiffness", "torque", "equilibrium", "work/stiffness", "work/equilibrium")
-        for action in ACTIONS
-    ),
-    *(f"reward/{term}" for term in TERMS),
-    *(f"phase/{side}" for side in SIDES),
-    "time",
-    "speed",
-)
-"""Names of `Outcome.values`: `stiffness/` [N m/rad], `torque/` [N m], `equilibrium/` [rad] at the step's end, and
-`work/stiffness/`, `work/equilibrium/` [J] of the step, + action name; `reward/` + term, unweighted; `phase/left`,
-`phase/right` [0, 1), `time` [s], `speed` [m/s]."""
 
 
 class Biped:
@@ -143,7 +105,6 @@ class Biped:
         self.observation_low, self.observation_high = self._task.low, self._task.high
 
         self._random: list[np.random.Generator | None] = [None] * num_envs
-        self._last_time = settings.episode_seconds - STEP_SECONDS / 2  # times are sums of steps
         self._everyone = np.ones(num_envs, bool)
         self._no_reason = np.full(num_envs, "")
         self._no_reason.flags.writeable = False
@@ -225,26 +186,30 @@ class Biped:
             work_equilibrium += self._window(running, ids)
             self._windows[window] = self._now.force
         m = self._now
-        force = self._windows.sum(axis=0) / WINDOWS
-        self._force = force if ids is None else np.where(running[:, None, None, None], force, self._force)
-
         terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, self._windows)
         reward = self._task.reward(terms)
+        terminated, truncated = self._end(running, terms, reward)
+        values = report(
+            *(springs.stiffness, m.torque[..., FEET], springs.equilibrium, work_stiffness, work_equilibrium),
+            *(terms, phase, self._steps * STEP_SECONDS, m.com_velocity[:, 0]),
+        )
+        _average(self._windows, running, self._force)
         self._last_action = action
-        self._steps += running
-        time = self._steps * STEP_SECONDS
-        terminated, truncated = np.empty((2, self.num_envs), bool)
-        _end(self._last_time, running, terms[ALIVE], time, reward, terminated, truncated)
-        per_action = (springs.stiffness, m.torque[..., FEET], springs.equilibrium, work_stiffness, work_equilibrium)
-        rows = [value.reshape(self.num_envs, -1).T for value in per_action]
         return Outcome(
             observation=self.observe(),
             reward=reward,
             terminated=terminated,
             truncated=truncated,
-            values=np.concatenate((*rows, terms, phase.T, [time, m.com_velocity[:, 0]])),
+            values=values,
             termination=self._reasons(terminated) if terminated.any() else self._no_reason,
         )
+
+    def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray]:
+        """Count the step; which episodes it terminates and truncates. Who did not take it gets no reward."""
+        terminated, truncated = np.empty((2, self.num_envs), bool)
+        limit = self.settings.episode_seconds / STEP_SECONDS - 0.5  # times are sums of steps
+        _end(limit, running, terms[:, ALIVE], self._steps, reward, terminated, truncated)
+        return terminated, truncated
 
     def _reasons(self, terminated: NDArray) -> NDArray:
         """Why those `terminated` (N,) are, "" for the others."""
@@ -346,9 +311,23 @@ def _clip(action):
 
 
 @kernel
-def _end(limit, running, alive, time, reward, terminated, truncated):
+def _average(windows, running, force):
+    for i in range(len(force)):
+        if running[i]:
+            for side in range(2):
+                for contact in range(3):
+                    for axis in range(2):
+                        total = 0.0
+                        for window in range(len(windows)):
+                            total += windows[window, i, side, contact, axis]
+                        force[i, side, contact, axis] = total / len(windows)
+
+
+@kernel
+def _end(limit, running, alive, steps, reward, terminated, truncated):
     for i in range(len(running)):
         terminated[i] = running[i] and alive[i] == 0.0
-        truncated[i] = running[i] and not terminated[i] and time[i] >= limit
+        steps[i] += running[i]
+        truncated[i] = running[i] and not terminated[i] and steps[i] >= limit
         if not running[i]:
             reward[i] = 0.0

@@ -35,7 +35,7 @@ WINDOW = 0.01
 STEPS_PER_WINDOW = round(WINDOW / TIMESTEP)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(kw_only=True, eq=False)  # making it frozen takes longer than measuring
 class Measurement:
     """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
 

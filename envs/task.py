@@ -211,7 +211,7 @@ class Task:
         stiffness: NDArray,
         force_windows: NDArray,
     ) -> NDArray:
-        """The reward's terms, unweighted and dimensionless, (len(TERMS), N) in the order of `TERMS`.
+        """The reward's terms, unweighted and dimensionless, (N, len(TERMS)) in the order of `TERMS`.
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance
@@ -224,7 +224,7 @@ class Task:
         `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
         (W, N, 2, 3, 2) on the body [N] in the W control windows of the step.
         """
-        terms = np.empty((len(TERMS), len(leg_phase)))
+        terms = np.empty((len(leg_phase), len(TERMS)))
         state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged == ""
         curves = self._at(leg_phase)
         _judge(self._scales, curves, *state, leg_phase, action, last_action, stiffness, force_windows, terms)
@@ -232,7 +232,7 @@ class Task:
 
     def reward(self, terms: NDArray) -> NDArray:
         """Weighted sum of the terms, (N,); 0 where `alive` is 0."""
-        total = np.empty(terms.shape[1])
+        total = np.empty(len(terms))
         _sum(self._weights, terms, total)
         return total
 
@@ -344,11 +344,11 @@ def _judge(
     scale = scales[0]
     for i in range(len(root)):
         upright = root[i, 1] >= scale.min_hip_height and abs(root[i, 2]) <= MAX_PITCH  # a NaN is not
-        terms[ALIVE, i] = 1.0 if upright and well[i] else 0.0
+        terms[i, ALIVE] = 1.0 if upright and well[i] else 0.0
         x, z, speed = _error(scale, curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
-        terms[COM_X, i] = exp(-((x / scale.tolerance[0]) ** 2))
-        terms[COM_Z, i] = exp(-((z / scale.tolerance[1]) ** 2))
-        terms[SPEED, i] = exp(-((speed / scale.tolerance[2]) ** 2))
+        terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
+        terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
+        terms[i, SPEED] = exp(-((speed / scale.tolerance[2]) ** 2))
         pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
         for side in range(2):
             people = curves[i, side]
@@ -359,9 +359,9 @@ def _judge(
                 stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
         for k in range(4):
             stiffness_rate += (action[i, k] - last_action[i, k]) ** 2
-        terms[POSE, i] = exp(-pose_error / POSE_TOLERANCE)
-        terms[GRF, i] = exp(-force_distance / FORCE_TOLERANCE)
-        terms[STIFFNESS, i], terms[STIFFNESS_RATE, i] = stiffness_cost, stiffness_rate
+        terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
+        terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
+        terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
 
 
 @kernel
@@ -394,5 +394,5 @@ def _sum(weights, terms, total):
     for i in range(len(total)):
         total[i] = 0.0
         for term in range(len(weights)):
-            total[i] += weights[term] * terms[term, i]
-        total[i] *= terms[ALIVE, i]
+            total[i] += weights[term] * terms[i, term]
+        total[i] *= terms[i, ALIVE]

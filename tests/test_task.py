@@ -63,7 +63,7 @@ class Setup:
             "force_windows": self.people_force(left_phase),
         }
         terms = self.task.terms(measurement, leg_phases(np.atleast_1d(left_phase)), **(values | other))
-        return dict(zip(TERMS, terms, strict=True))
+        return dict(zip(TERMS, terms.T, strict=True))
 
 
 def leg_phases(left):
@@ -204,7 +204,7 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     assert set(terms) == set(weights)
     expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
     expected[0] = 0.0
-    np.testing.assert_allclose(setup.task.reward(np.array([*terms.values()])), expected, rtol=1e-12)
+    np.testing.assert_allclose(setup.task.reward(np.stack([*terms.values()], -1)), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("height", [1.7, 1.2])
@@ -326,7 +326,7 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
         legs = leg_phases(left[rows])
         seen = setup.task.observe(measured, legs, last[rows], force[0, rows])
         terms = setup.task.terms(measured, legs, action[rows], last[rows], stiffness[rows], force[:, rows])
-        return np.column_stack([seen, setup.task.reward(terms), *terms])
+        return np.column_stack([seen, setup.task.reward(terms), terms])
 
     together = results(slice(None))
     alone = np.concatenate([results(slice(i, i + 1)) for i in range(n)])
