@@ -4,8 +4,8 @@ Row i of every result depends on row i of the arguments alone, by the same opera
 gives the same bits as N batches of one.
 """
 
-from math import cos, exp, pi, sin, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from math import exp, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from springfoot.gait.human import ANGLES, HumanGait
 from springfoot.gait.plan import WalkPlan
 
 from .kernel import kernel
-from .model import ACTIONS, ANKLE, CONTACTS, HIP, JOINTS, KNEE, LEFT, RIGHT, SIDES, TOE
+from .model import ANKLE, HIP, JOINTS, KNEE, LEFT, RIGHT, TOE
+from .observation import OBSERVATION, Observer
 from .phase import GRID, PhaseTable
 from .settings import DEFAULT_WEIGHTS, STEP_SECONDS, BipedSettings
 
@@ -48,77 +49,6 @@ FORCE_TOLERANCE = 0.15
 """Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
 
 
-class Entry(NamedTuple):
-    """One entry of the observation: name, unit it is divided by, bounds it is clipped to, and its meaning."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    meaning: str
-
-
-def _entries() -> tuple[Entry, ...]:
-    legs = [(side, joint) for side in SIDES for joint in JOINTS]
-    sign: dict[str, str] = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
-    return (
-        Entry("hip_height", "leg length", 0.0, 2.0, "height of the hip"),
-        Entry("pitch", "rad", -3.2, 3.2, "pitch of the trunk, forward positive"),
-        *(Entry(f"{joint}_{side}", "rad", -3.2, 3.2, f"angle, {sign[joint]} positive") for side, joint in legs),
-        Entry("hip_velocity_x", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, forward positive"),
-        Entry("hip_velocity_z", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, up positive"),
-        Entry("pitch_rate", "sqrt(g/l)", -15.0, 15.0, "rate of the pitch, forward positive"),
-        *(
-            Entry(f"{joint}_rate_{side}", "sqrt(g/l)", -15.0, 15.0, f"angular rate, {sign[joint]} positive")
-            for side, joint in legs
-        ),
-        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase"),
-        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase"),
-        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase"),
-        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase"),
-        *(
-            Entry(
-                f"load_{contact}_{side}",
-                "body weight",
-                0.0,
-                5.0,
-                "vertical force, mean of the step",
-            )
-            for side in SIDES
-            for contact in CONTACTS
-        ),
-        Entry("com_x_error", "leg length", -2.0, 2.0, "CoM minus plan, forward positive"),
-        Entry("com_z_error", "leg length", -2.0, 2.0, "CoM minus plan, up positive"),
-        Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
-        *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before") for name in ACTIONS),
-        *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive") for side in SIDES),
-        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right"),
-        Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)"),
-        Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m"),
-        Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg"),
-    )
-
-
-OBSERVATION = _entries()
-"""Every entry of the observation, in order; l is the leg length (hip to floor when standing)."""
-
-
-SEEN = np.dtype(
-    [
-        ("root", float, 2),
-        ("angle", float, (len(SIDES), len(JOINTS))),
-        ("root_velocity", float, 3),
-        ("velocity", float, (len(SIDES), len(JOINTS))),
-        ("cycle", float, 4),
-        ("load", float, (len(SIDES), len(CONTACTS))),
-        ("error", float, 3),
-        ("last_action", float, len(ACTIONS)),
-        ("planned_ankle", float, len(SIDES)),
-        ("leading_leg", float),
-        ("command", float, 3),
-    ]
-)
-"""The entries of `OBSERVATION`, in order, before they are made dimensionless [SI]."""
 CURVES = np.dtype(
     [
         ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
@@ -150,24 +80,12 @@ class Task:
     """What is seen, what is rewarded and what counts as a fall, for one body and plan."""
 
     def __init__(self, settings: BipedSettings, body: Body, plan: WalkPlan, human: HumanGait) -> None:
-        length, leg = body.length_scale, body.leg_length
+        length = body.length_scale
         self.names = tuple(entry.name for entry in OBSERVATION)
-        self.low = np.array([entry.low for entry in OBSERVATION], np.float32)
-        self.high = np.array([entry.high for entry in OBSERVATION], np.float32)
+        self._observer = Observer(body, settings.speed)
+        self.low, self.high = self._observer.low, self._observer.high
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
 
-        unit = {
-            "1": 1.0,
-            "rad": 1.0,
-            "leg length": leg,
-            "sqrt(g l)": sqrt(GRAVITY * leg),
-            "sqrt(g/l)": sqrt(GRAVITY / leg),
-            "body weight": body.mass * GRAVITY,
-        }
-        self._units = np.array([unit[entry.unit] for entry in OBSERVATION])
-        self._row = np.zeros(1, SEEN)  # the body that is being looked at
-        self._row["command"] = settings.speed, length, body.mass_scale
-        self._entries = self._row.view(float)
         self._weights = np.array([self.weights[name] for name in TERMS])
         self._curves = PhaseTable(_curves(plan, human).view(float).reshape(len(GRID), -1))
         self._scales = np.zeros(1, SCALES)
@@ -185,12 +103,9 @@ class Task:
         `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean
         over the step. What is not a number reads as the upper bound.
         """
-        observation = np.empty((len(leg_phase), len(OBSERVATION)), np.float32)
-        state = m.root, m.root_velocity, m.angle, m.velocity, m.com, m.com_velocity, m.ankle, force
-        bounds = self._units, self.low, self.high
         curves = self._at(leg_phase)
-        _observe(self._scales, curves, *state, leg_phase, last_action, self._row, self._entries, *bounds, observation)
-        return observation
+        error, planned_ankle = self._error(m, leg_phase, curves), curves["pose"][..., ANKLE]
+        return self._observer.observe(m, leg_phase, error, planned_ankle, last_action, force)
 
     def planned_com(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """The plan's CoM (x in the world, z) [m], shape (N, 2)."""
@@ -198,9 +113,7 @@ class Task:
 
     def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3)."""
-        error = np.empty((len(leg_phase), 3))
-        _track(self._scales, self._at(leg_phase), m.com, m.com_velocity, m.ankle, leg_phase, error)
-        return error
+        return self._error(m, leg_phase, self._at(leg_phase))
 
     def terms(
         self,
@@ -241,6 +154,11 @@ class Task:
         tilted = np.where(np.abs(m.root[:, 2]) <= MAX_PITCH, "", TOO_TILTED)
         return np.where(m.root[:, 1] >= self._scales["min_hip_height"], tilted, TOO_LOW)
 
+    def _error(self, m: "Measurement", leg_phase: NDArray, curves: NDArray) -> NDArray:
+        error = np.empty((len(leg_phase), 3))
+        _track(self._scales, curves, m.com, m.com_velocity, m.ankle, leg_phase, error)
+        return error
+
     def _at(self, leg_phase: NDArray) -> NDArray:
         """(N, side) of `CURVES`."""
         return self._curves.at(leg_phase).view(CURVES)[..., 0]
@@ -258,54 +176,6 @@ def _curves(plan: WalkPlan, human: HumanGait) -> NDArray:
     curves["com"] = np.stack((x - plan.step_length * step, z), -1)
     curves["speed"], _ = plan.com_velocity(step)
     return curves
-
-
-@kernel
-def _observe(
-    scales,
-    curves,
-    root,
-    root_velocity,
-    angle,
-    velocity,
-    com,
-    com_velocity,
-    ankle,
-    force,
-    leg_phase,
-    last_action,
-    seen,
-    entries,
-    units,
-    low,
-    high,
-    observation,
-):
-    """`entries` are the numbers of the one body `seen`, in order."""
-    row = seen[0]
-    for i in range(len(observation)):
-        left = leg_phase[i, LEFT]
-        s, c = sin(2 * pi * left), cos(2 * pi * left)
-        row.cycle[0], row.cycle[1], row.cycle[2], row.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
-        row.leading_leg = 1.0 if left < 0.5 else -1.0
-        row.root[0], row.root[1] = root[i, 1], root[i, 2]
-        x, z, speed = _error(scales[0], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
-        row.error[0], row.error[1], row.error[2] = x, z, speed
-        for k in range(3):
-            row.root_velocity[k] = root_velocity[i, k]
-        for k in range(4):
-            row.last_action[k] = last_action[i, k]
-        for side in range(2):
-            row.planned_ankle[side] = curves[i, side].pose[ANKLE]
-            for joint in range(4):
-                row.angle[side, joint], row.velocity[side, joint] = angle[i, side, joint], velocity[i, side, joint]
-            for contact in range(3):
-                row.load[side, contact] = force[i, side, contact, 1]
-        for k in range(len(entries)):
-            value = entries[k] / units[k]
-            if not value <= high[k]:  # nor is what is not a number
-                value = high[k]
-            observation[i, k] = max(value, low[k])
 
 
 @kernel
