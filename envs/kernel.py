@@ -17,8 +17,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """Compile `function` with numba at its first call; dividing by zero gives infinity, as in NumPy."""
-    options: dict[str, Any] = {"error_model": "numpy"}
+    compiled: Any
     try:
-        return njit(cache=True, **options)(function)
+        compiled = njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # neither the package's folder nor the user's cache can be written
-        return njit(**options)(function)
+        compiled = njit(error_model="numpy")(function)
+    return compiled

@@ -71,7 +71,7 @@ SCALES = np.dtype(
     ]
 )
 """What one body in one task is measured by."""
-TERMS = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
+TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
 """The reward's terms, in the order in which they are summed."""
 ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
 
