@@ -94,7 +94,7 @@ class FootSprings:
         else:
             stiffness = self._middle * self._factor**action
         running = self._everyone if running is None else running
-        work = np.empty_like(stiffness)
+        work = np.empty(self.stiffness.shape)
         _stiffen(stiffness, self.equilibrium, angle, self._fresh, running, self.stiffness, work)
         return work
 
@@ -102,14 +102,13 @@ class FootSprings:
         """Take the rest angles of the legs' phases; returns the work put in, 1/2 K (x'^2 - x^2) [J]."""
         equilibrium = self._equilibrium.at(leg_phase)
         running = self._everyone if running is None else running
-        work = np.empty_like(equilibrium)
+        work = np.empty(self.stiffness.shape)
         _move(equilibrium, self.stiffness, angle, self._fresh, running, self.equilibrium, work)
         return work
 
     def command(self, stiffness: NDArray, drive: NDArray) -> None:
         """Put K [N m/rad] and the drive torque K theta_eq [N m] into their places in two arrays (N, side, joint)."""
-        stiffness[..., FEET] = self.stiffness
-        np.multiply(self.stiffness, self.equilibrium, out=drive[..., FEET])
+        _command(self.stiffness, self.equilibrium, stiffness, drive)
 
 
 @kernel
@@ -139,3 +138,13 @@ def _move(wanted, stiffness, angle, fresh, running, equilibrium, work):
                     if not fresh[i]:
                         work[i, side, joint] = 0.5 * stiffness[i, side, joint] * (after * after - before * before)
         fresh[i] = fresh[i] and not running[i]
+
+
+@kernel
+def _command(spring_stiffness, equilibrium, stiffness, drive):
+    for i in range(len(stiffness)):
+        for side in range(2):
+            for joint in range(2):
+                k = spring_stiffness[i, side, joint]
+                stiffness[i, side, ANKLE + joint] = k
+                drive[i, side, ANKLE + joint] = k * equilibrium[i, side, joint]

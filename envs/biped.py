@@ -179,7 +179,7 @@ class Biped:
             action = np.where(running[:, None], action, self._last_action)
         springs, phase = self._springs, self._legs.phase
         work_stiffness = springs.set_stiffness(action, phase, self._now.angle[..., FEET], running)
-        work_equilibrium = np.zeros_like(work_stiffness)
+        work_equilibrium = np.zeros(work_stiffness.shape)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
         for window in range(WINDOWS):
