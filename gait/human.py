@@ -40,7 +40,7 @@ class HumanGait:
     speed: float
     """Speed of these curves for this body [m/s]; differs from the one asked for only if `clamped`."""
     condition: str
-    """Nearest measured condition: very_slow, slow, natural, medium or fast."""
+    """Nearest measured condition: very_slow, slow, natural, medium or fast; of own data the file's name."""
     clamped: bool
     """True if the speed asked for lies outside the measured ones and the end of the range is given."""
     stride_time: float
@@ -53,6 +53,8 @@ class HumanGait:
     """Name -> coefficients: complex Fourier (periodic curves) or real sine over stance (forces)."""
     sd_series: Curves
     """As `mean_series`, of the standard deviation."""
+    borrowed: tuple[str, ...] = ()
+    """Of someone's own data (`own_data`): what was not in them and is people's instead."""
 
     def mean(self, name: str, phase: ArrayLike) -> NDArray:
         """Mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""
