@@ -125,9 +125,9 @@ def periodic_com(
 def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.0) -> HyperbolicPath:
     """The CoM path at constant `height` [m] over a ZMP of any degree and number of pieces, repeating with it.
 
-    `zmp` [m] over the time of one step [s] starts again `step_length` further on; it may jump. With
-    w^2 = g cos a / height, the polynomial p + p''/w^2 + p''''/w^4 + ... + height tan a solves x'' = w^2 (x - p) - g sin a;
-    one exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
+    `zmp` [m] over the time of one step [s] starts again `step_length` further on; it may jump. The polynomial
+    p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
+    exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
     """
     back, down = _gravity(slope)
     rate = sqrt(down / height)

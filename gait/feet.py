@@ -161,7 +161,7 @@ def feet_under_zmp(
 
     The ZMP runs straight between three points [m from the stance ankle] at three times [s]: heel strike, the other
     foot's toe-off, the next heel strike. `clearance` [m]: as in `plan_walk`. Raises `SpringfootError` for a ZMP off the
-    feet, a step shorter than its travel, and a swing foot in the ground.
+    feet and for a step shorter than its travel.
     """
     margin = ROCKER_MARGIN * body.length_scale
     heel, ball, toe_tip = -body.heel_to_ankle, body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
@@ -197,11 +197,11 @@ def feet_under_zmp(
         # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
         gain = replace(feet, lift=1.0)._heights(MID_SWING) - flattest
         feet = replace(feet, lift=float(((clearance - flattest) / gain).max()))
-    _refuse_swing_in_ground(feet)
     return feet
 
 
-def _refuse_swing_in_ground(feet: FootPath) -> None:
+def refuse_swing_in_ground(feet: FootPath) -> None:
+    """Raises `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`."""
     lowest = float(feet._heights((0.005, 0.995)).min())
     if lowest < -FLOOR_TOLERANCE:
         raise SpringfootError(

@@ -18,7 +18,7 @@ from scipy.interpolate import PchipInterpolator
 from .body import GRAVITY, Body
 from .cart_table import ComMotion, periodic_com
 from .errors import SpringfootError, require_within
-from .feet import FootPath, feet_under_zmp
+from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
 from .human import ANGLES, HumanGait, human_gait
 from .posture import GRID, Legs, highest_legs, legs_under_com, refuse_impossible_legs
 
@@ -213,6 +213,7 @@ def plan_walk(
         joint_table=_periodic(table),
         hip_table=_periodic(legs.hip, shift=np.array([2 * step_length, 0.0])),
     )
+    refuse_swing_in_ground(feet)
     _refuse_zmp_outside(plan)
     return plan
 

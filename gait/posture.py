@@ -85,7 +85,9 @@ def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGa
         if moved < 1e-12:
             break
     reach = np.hypot(forward, down)
-    return Legs(hip=hip.T, thigh=thigh + motion.slope, knee=knee, ankle=pitch - thigh + knee, toe=toe, reach=reach)
+    return Legs(
+        hip=hip.T, thigh=np.asarray(thigh + motion.slope), knee=knee, ankle=pitch - thigh + knee, toe=toe, reach=reach
+    )
 
 
 def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
