@@ -20,7 +20,7 @@ from springfoot.agents.evaluation import CURVES, measure
 from springfoot.agents.recording import load_recording, prepare, record
 from springfoot.agents.report import people_metrics, print_table, write_report
 from springfoot.envs import Biped, BipedSettings
-from springfoot.gait import SpringfootError
+from springfoot.gait import SpringfootError, human_gait
 
 FILES = {
     "metrics.json",
@@ -113,7 +113,7 @@ def test_the_table_is_plain_text_within_80_columns(recording):
 
 
 def test_people_beside_the_model_are_those_of_the_reference():
-    people = people_metrics(1.2, 1.70)
+    people = people_metrics(human_gait(1.2, 1.70))
     assert people["step_length_m"] == pytest.approx(0.655, abs=0.005)
     assert people["toe_off_percent"] == pytest.approx(63.3, abs=0.2)
     assert people["moments"]["ankle"] == pytest.approx(1.31, abs=0.02)
