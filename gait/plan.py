@@ -161,8 +161,8 @@ def plan_walk(
     fall; 0 keeps the height constant, solved in closed form) and `zmp_travel` (start, end of single support, from the
     stance ankle) [m] replace the defaults above; the default height is the greatest that leaves the knees
     `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
-    (`FootPath.clearance`; 17 mm unless given). `slope` [rad] is uphill positive; step, rockers and swing stay those of
-    level ground unless given.
+    (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
+    rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
     is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's.
     Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
