@@ -66,19 +66,20 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
 
     `force` (..., 2) [N] acts through the CoM `com` (..., 2) [m], so that it meets the ground at the ZMP p. Each foot's
     force points from its centre of pressure, p1 and p2 [m], through the CoM; its upward part is (p2 - p)/(p2 - p1) of
-    the total for the rear foot, the rest for the front one. Both together are then `force` at p exactly. Raises
-    `SpringfootError` where a foot would have to pull: a ZMP outside [p1, p2], a force that does not point up.
+    the total for the rear foot, the rest for the front one. Both together are then `force` at p exactly. In steps
+    shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` where a foot would have to pull: a ZMP that is
+    not between p1 and p2, a force that does not point up.
     """
     if not np.all(force[..., 1] > 0):
         raise SpringfootError("the ground can only push: the upward force must be > 0 N")
     zmp = com[..., 0] - com[..., 1] * force[..., 0] / force[..., 1]
     rear, front = np.asarray(rear_cop), np.asarray(front_cop)
-    outside = float(np.max(np.maximum(rear - zmp, zmp - front), initial=0.0))
+    outside = float(np.max(np.maximum(np.minimum(rear, front) - zmp, zmp - np.maximum(rear, front)), initial=0.0))
     if not outside <= ZMP_TOLERANCE:
         raise SpringfootError(
             f"ZMP must lie between the centres of pressure of the feet, is outside by {outside:.4f} m"
         )
-    apart = np.maximum(front - rear, ZMP_TOLERANCE)
+    apart = np.where(front == rear, ZMP_TOLERANCE, front - rear)
     on_front = np.clip((zmp - rear) / apart, 0.0, 1.0) * force[..., 1]
 
     def towards_com(up: NDArray, cop: NDArray) -> NDArray:
@@ -94,22 +95,33 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     centre of pressure waits at the heel until the foot is flat and is where the ZMP starts along the foot as the other
     one leaves; the rear foot's goes on from where the ZMP left it to the tip of the toe. Each foot's force so starts
     and ends at zero. In swing the force is 0, and the centre of pressure stays at the tip of the toe.
+    In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat: there the rear foot
+    bears it all until then, and both centres of pressure stand still while the load passes over.
     """
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
-    feet, body, both = plan.feet, plan.body, plan.feet.toe_off - 0.5
     second = phase >= 0.5
     step_phase = 2 * (phase - 0.5 * second)
     com = np.stack(plan.com(step_phase), -1)
-    force = ground_reaction(body.mass, *plan.com_acceleration(step_phase), plan.slope)
-    heel, tip = -body.heel_to_ankle, body.ankle_to_toe_joint + body.toe_length
-    zmp, shared = plan.zmp(step_phase), step_phase <= 2 * both
-    front = np.interp(step_phase / 2, [feet.foot_flat, both], [heel, float(plan.zmp(2 * both))])
-    rear = np.interp(step_phase / 2, [0.0, both], [float(plan.zmp(0.0)), tip - plan.step_length])
+    force = ground_reaction(plan.body.mass, *plan.com_acceleration(step_phase), plan.slope)
+    zmp, shared = plan.zmp(step_phase), step_phase <= 2 * plan.feet.toe_off - 1
+    rear, front = _double_support_cops(plan, step_phase)
     # In single support the stance foot bears all of it at the ZMP, as front foot.
     on_rear, on_front = share_forces(force, com, np.where(shared, rear, zmp - 1.0), np.where(shared, front, zmp))
     own = np.where(second[..., None], np.where(shared[..., None], on_rear, 0.0), on_front)
+    tip = plan.body.ankle_to_toe_joint + plan.body.toe_length
     on_foot = np.where(shared, front, zmp)
     return own, np.where(second, np.where(shared, rear + plan.step_length, tip), on_foot)
+
+
+def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
+    """Centres of pressure [m] of the rear and the front foot in double support, in the front foot's frame."""
+    body, flat, end = plan.body, 2 * plan.feet.foot_flat, 2 * plan.feet.toe_off - 1
+    heel, tip = -body.heel_to_ankle, body.ankle_to_toe_joint + body.toe_length - plan.step_length
+    at_start, at_flat, at_end = (float(plan.zmp(each)) for each in (0.0, flat, end))
+    if at_flat > heel or tip >= at_end:
+        return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
+    rear = np.interp(step_phase, [0.0, end], [at_start, tip])
+    return rear, np.interp(step_phase, [flat, end], [heel, at_end])
 
 
 def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
