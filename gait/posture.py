@@ -107,6 +107,9 @@ def _toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     # The toe is back in people's posture a third of swing after toe-off.
     left = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
     swinging = people + left**2 * (feet.toe_off_pitch - human.mean("toe", feet.toe_off))
+    # Its tip no deeper than the floor: early in swing people's posture would be under it.
+    level = np.arcsin(np.clip(feet.ball_clearance(phase) / feet.body.toe_length, 0.0, 1.0))
+    swinging = np.maximum(swinging, -feet.pitch(phase) - level)
     return np.select(
         [phase < feet.foot_flat, phase <= feet.heel_off, phase <= feet.toe_off], [landing, 0.0, rolling], swinging
     )

@@ -103,6 +103,8 @@ def assert_rebuilt(plan: WalkPlan) -> None:
     np.testing.assert_allclose(ankle, plan.ankle_position(phase), atol=1e-9)
     np.testing.assert_allclose(angles["thigh"] - angles["knee"] + angles["ankle"] - plan.slope, pitch, atol=1e-9)
     joint = ankle + foot(pitch, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
+    tip = (joint + foot(pitch + angles["toe"], body.toe_length, -body.toe_joint_height))[1]
+    assert tip.min() > -0.01 * body.length_scale, "toe tip in the floor"
     leg = (
         body.thigh_mass * (hip + body.thigh_com * thigh)
         + body.shank_mass * (knee + body.shank_com * shank)
