@@ -183,7 +183,7 @@ Draw = Callable[[Axes, Walk], None]
 
 
 def save_figures(folder: Path, walks: Sequence[Walk]) -> None:
-    """Write figure-6.png ... figure-10.png into `folder`: a column for each walk, a row for each quantity, one scale a row."""
+    """Write figure-6.png ... figure-10.png into `folder`: a column a walk, a row a quantity, one scale a row."""
     figures: dict[int, list[tuple[str, Draw]]] = {
         6: [
             ("CoM x against\nmean motion (cm)", lambda ax, walk: _line(ax, walk, 100 * walk.com_wave[0])),
