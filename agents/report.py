@@ -77,7 +77,7 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         f"{environment['speed']:g} m/s, equilibrium {environment['equilibrium']}{pushes}",
         soft_wrap=True,
     )
-    who = "people" if environment["human"] is None else "own data"
+    who = "people" if environment["human"] is None else "own"
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     for name in ("", "", "model", who, "r", "in ±SD"):
         table.add_column(
@@ -91,7 +91,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     for reason, count in metrics["fall_reasons"].items():
         console.print(f"{count} × {reason}")
     if environment["human"] is not None:
-        console.print(f"own data: {people['condition']}; people's are: {', '.join(people['borrowed']) or 'none'}")
+        borrowed = ", ".join(people["borrowed"]) or "nothing"
+        console.print(f"own: {people['condition']}; people's instead: {borrowed}", soft_wrap=True)
     console.print(
         f"{who} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean curves,\n"
         "the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing",

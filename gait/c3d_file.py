@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from .cycle import Contacts
 from .errors import SpringfootError
-from .motion_files import FORCES, SIDES, Curves, Trial, existing, not_empty
+from .human import FORCES
+from .motion_files import SIDES, Curves, Trial, existing, not_empty
 
 PLATE_LOAD = 20.0
 """A plate bears a foot above this force [N]."""
@@ -130,9 +131,10 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
 
 
 def _per_frame(samples: NDArray, frames: int) -> NDArray:
-    """Analog samples (3, R x T) as their mean in each frame (3, T)."""
+    """Analog samples (3, R x T) as their mean around each frame (3, T)."""
     ratio = max(samples.shape[1] // max(frames, 1), 1)
-    cut = np.nan_to_num(samples[:, : ratio * frames])
+    centred = np.pad(np.nan_to_num(samples), ((0, 0), (ratio // 2, 0)), mode="edge")
+    cut = centred[:, : ratio * frames]
     return cut.reshape(3, -1, ratio).mean(axis=2)
 
 

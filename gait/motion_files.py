@@ -18,26 +18,10 @@ from numpy.typing import NDArray
 
 from .cycle import Contacts
 from .errors import SpringfootError
+from .human import COLUMNS, FORCES
 
-COLUMNS = {
-    "thigh": "thigh_flexion_deg",
-    "hip": "hip_flexion_deg",
-    "knee": "knee_flexion_deg",
-    "ankle": "ankle_dorsiflexion_deg",
-    "toe": "mtp_dorsiflexion_deg",
-    "hip_moment": "hip_moment_Nm_per_kg",
-    "knee_moment": "knee_moment_Nm_per_kg",
-    "ankle_moment": "ankle_moment_Nm_per_kg",
-    "hip_power": "hip_power_W_per_kg",
-    "knee_power": "knee_power_W_per_kg",
-    "ankle_power": "ankle_power_W_per_kg",
-    "grf_vertical": "grf_vertical_bw",
-    "grf_forward": "grf_forward_bw",
-}
-"""Curve of `HumanGait` -> its column in our CSV files, signs alike; `_deg` in degrees."""
 PELVIS = "pelvis_anterior_tilt_deg"
 """Column (forward positive) that makes a thigh of a hip where there is no thigh."""
-FORCES = ("grf_vertical", "grf_forward")
 TIME = ("time_s", "time")
 SIDES = ("left", "right")
 WALKING_SPEED = 0.3

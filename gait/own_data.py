@@ -16,9 +16,8 @@ from .body import MASS_RANGE
 from .c3d_file import c3d_trial
 from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
-from .fit_human import _fourier, _stance_sine
-from .human import HumanGait, human_gait
-from .motion_files import COLUMNS, FORCES, Curves, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
+from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series
+from .motion_files import Curves, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
 from .strides import Walk, cut_strides, together
 
 ACCEPTED = {
@@ -210,7 +209,7 @@ def _fitted(own: OwnGait, mean: Curves, sd: Curves) -> OwnGait:
     def fit(curves: Curves) -> dict[str, list]:
         rows = {}
         for name, curve in curves.items():
-            rows[name] = _stance_sine(curve, own.toe_off or 1.0) if name in FORCES else _fourier(curve)
+            rows[name] = stance_series(curve, own.toe_off or 1.0) if name in FORCES else fourier_series(curve)
         return rows
 
     own = _checked(own)

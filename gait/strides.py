@@ -10,7 +10,8 @@ from scipy.signal import butter, find_peaks, sosfiltfilt
 from .body import GRAVITY, Body
 from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .errors import SpringfootError
-from .motion_files import COLUMNS, FORCES, Curves, Trial, refuse_absurd
+from .human import COLUMNS, FORCES
+from .motion_files import Curves, Trial, refuse_absurd
 
 FEWEST_STRIDES = 2
 """Strides, of both feet together, that a mean and its spread need."""

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -9,19 +10,13 @@ import numpy as np
 import pytest
 
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
-from springfoot.gait.motion_files import COLUMNS, SIDES
+from springfoot.gait.human import COLUMNS, FORCES
+from springfoot.gait.motion_files import SIDES
 from springfoot.gait.own_data import OwnGait, read_gait
 
 HUMAN = human_gait(1.3)
 MASS = 71.0
-ANGLES, MOMENTS, FORCES = (
-    ("thigh", "hip", "knee", "ankle", "toe"),
-    ("hip_moment", "knee_moment", "ankle_moment"),
-    (
-        "grf_vertical",
-        "grf_forward",
-    ),
-)
+ANGLES, MOMENTS = ("thigh", "hip", "knee", "ankle", "toe"), ("hip_moment", "knee_moment", "ankle_moment")
 NOISE = {name: 0.005 if name in FORCES else 0.009 for name in COLUMNS}
 """Standard deviation of the noise of a sample: 0.005 body weights, 0.5 deg, 0.009 N m/kg."""
 PERCENT = np.arange(101)
@@ -94,7 +89,7 @@ def assert_like_people(own, names, events=0.02):
     assert gait.toe_off == pytest.approx(HUMAN.toe_off, abs=events)
     for name in names:
         error = np.sqrt(np.mean((gait.mean(name, PHASE) - HUMAN.mean(name, PHASE)) ** 2))
-        limit = np.radians(1.5) if name in ANGLES else 0.05
+        limit = np.radians(0.8) if name in ANGLES else 0.03
         assert error < limit, (name, error)
         assert name not in gait.borrowed and f"{name} sd" not in gait.borrowed
 
@@ -261,103 +256,7 @@ def test_interchanged_legs_and_wrong_units_are_noticed(tmp_path):
         read_gait(path)
 
 
-# C3D ----------------------------------------------------------------------------------------------------------
-
-
-def c3d(path, plates=True, events=False, external=1.0, gap=None, reported=1.0):
-    """A laboratory's file: Plug-in Gait output at 100 Hz, two belts of a treadmill at 1000 Hz; walking along -y."""
-    import ezc3d
-
-    time, legs = walk()
-    file = ezc3d.c3d()
-    points = {}
-
-    def vector(x):
-        return np.stack([x, np.zeros_like(x), np.zeros_like(x)])
-
-    for side, curves in legs.items():
-        letter = side[0].upper()
-        for name, label in {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles", "toe": "HXFFA"}.items():
-            points[letter + label] = vector(np.degrees(curves[name]))
-        points[f"{letter}PelvisAngles"] = vector(np.degrees(curves["hip"] - curves["thigh"]))
-        for joint in ("hip", "knee", "ankle"):
-            points[f"{letter}{joint.capitalize()}Moment"] = vector(external * 1000 * curves[f"{joint}_moment"])
-        x = np.full(len(time), 100.0 if side == "left" else 500.0)
-        points[f"{letter}HEE"] = np.stack([x, np.full(len(time), 300.0), 0 * x])
-        points[f"{letter}TOE"] = np.stack([x, np.full(len(time), 100.0), 0 * x])
-    data = np.stack(list(points.values()), axis=1)
-    if gap is not None:
-        data[:, list(points).index("LKneeAngles"), gap] = np.nan
-    parameters = file["parameters"]
-    parameters["POINT"]["RATE"]["value"] = [100]
-    parameters["POINT"]["LABELS"]["value"] = [f"Subject:{label}" for label in points]
-    file["data"]["points"] = np.concatenate([data, np.ones((1, *data.shape[1:]))])
-    if plates:
-        channels = []
-        for curves in legs.values():
-            weight = np.repeat(MASS * GRAVITY * np.stack([curves["grf_forward"], curves["grf_vertical"]]), 10, axis=1)
-            none = np.zeros(weight.shape[1])
-            # The corners say that the plate's y is the laboratory's, and its z down.
-            channels += [none, -reported * weight[0], -reported * weight[1], none, none, none]
-        parameters["ANALOG"]["RATE"]["value"] = [1000]
-        parameters["ANALOG"]["LABELS"]["value"] = [f"channel {k}" for k in range(12)]
-        file["data"]["analogs"] = np.stack(channels)[None]
-        file.add_parameter("POINT", "UNITS", ["mm"])
-        file.add_parameter("ANALOG", "UNITS", (["N"] * 3 + ["Nmm"] * 3) * 2)
-        left = np.array([[0, 400, 0], [200, 400, 0], [200, 0, 0], [0, 0, 0]], float)
-        file.add_parameter("FORCE_PLATFORM", "ORIGIN", np.zeros((3, 2)))
-        file.add_parameter("FORCE_PLATFORM", "CORNERS", np.stack([left.T, left.T + [[400], [0], [0]]], axis=-1))
-        whole = {"USED": [2], "TYPE": [2, 2], "CHANNEL": np.arange(1, 13).reshape(2, 6).T, "ZERO": [1, 0]}
-        for name, value in whole.items():
-            parameters["FORCE_PLATFORM"][name] = {
-                "type": 2, "description": "", "is_locked": False, "value": np.array(value)
-            }  # fmt: skip
-    if events:
-        strides = np.arange(0, 12 / HUMAN.stride_time + 1)
-        marks = []
-        for context, offset in (("Left", 0.2), ("Right", 0.7)):
-            for label, phase in (("Foot Strike", 0.0), ("Foot Off", HUMAN.toe_off)):
-                # The file's time begins with its first frame, half a second into the walk.
-                marks += [(context, label, t) for t in (strides + phase - offset) * HUMAN.stride_time - 0.5 if t > 0]
-        file.add_parameter("EVENT", "USED", len(marks))
-        file.add_parameter("EVENT", "CONTEXTS", [mark[0] for mark in marks])
-        file.add_parameter("EVENT", "LABELS", [mark[1] for mark in marks])
-        file.add_parameter("EVENT", "TIMES", np.array([[0.0, mark[2]] for mark in marks]).T)
-    file.write(str(path))
-    return path
-
-
-@pytest.mark.parametrize("reported", [1.0, -1.0], ids=["reaction", "push on the plate"])
-def test_c3d_with_force_plates(tmp_path, reported):
-    own = read_gait(c3d(tmp_path / "lab.c3d", reported=reported), mass=MASS)
-    assert_like_people(own, (*ANGLES, *MOMENTS, *FORCES))
-
-
-@pytest.mark.parametrize("events", [True, False])
-def test_c3d_without_plates(tmp_path, events):
-    own = read_gait(c3d(tmp_path / "lab.c3d", plates=False, events=events, external=-1.0))
-    assert_like_people(own, (*ANGLES, *MOMENTS), events=0.005 if events else 0.02)
-    assert {"grf_vertical", "grf_forward"} <= set(people_of(own).borrowed)
-
-
-def test_c3d_gaps_at_the_ends_are_left_out_and_others_named(tmp_path):
-    whole = read_gait(c3d(tmp_path / "lab.c3d", plates=False))
-    ends = read_gait(c3d(tmp_path / "ends.c3d", plates=False, gap=slice(0, 150)))
-    assert ends.strides and whole.strides and 2 < ends.strides < whole.strides
-    with pytest.raises(SpringfootError, match=r"mid\.c3d, frame 501, left knee: a gap"):
-        read_gait(c3d(tmp_path / "mid.c3d", plates=False, gap=slice(500, 510)))
-
-
-def test_c3d_without_its_library_names_the_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "ezc3d", None)
-    (tmp_path / "lab.c3d").write_bytes(b"")
-    with pytest.raises(SpringfootError, match=r"springfoot\[c3d\]"):
-        read_gait(tmp_path / "lab.c3d")
-
-
 def test_reading_text_needs_no_c3d_library():
-    import subprocess
-
     code = "import springfoot.gait.own_data, sys; print('ezc3d' in sys.modules, 'mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False False\n"
 
