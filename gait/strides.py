@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from .body import GRAVITY, Body
 from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
@@ -158,6 +157,8 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
     After Zeni, Richards, Higginson, Gait & Posture 27 (2008) 710-714, who take markers from the sacrum, with the time
     by which people's events come later.
     """
+    from scipy.signal import find_peaks  # as below
+
     body = Body()
     thigh, knee, ankle = (_smooth(angle, tick) for angle in (thigh, knee, ankle))
     shank = thigh - knee
@@ -179,6 +180,8 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
 
 def _smooth(angle: NDArray, tick: float) -> NDArray:
     """Low-passed without delay (fourth order in all)."""
+    from scipy.signal import butter, sosfiltfilt  # half a second to import, and only files need it
+
     return sosfiltfilt(
         butter(2, CUTOFF, fs=1 / tick, output="sos"), angle, padlen=min(len(angle) - 1, round(0.5 / tick))
     )
