@@ -5,6 +5,7 @@ pelvis. Should the ankle moment be negative on average, the moments are external
 """
 
 from collections.abc import Iterable, Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ def c3d_trial(path: Path) -> Trial:
         import ezc3d  # an extra: only C3D files need it
     except ImportError:
         raise SpringfootError(f"{path.name}: reading C3D needs ezc3d; install springfoot[c3d]") from None
-    existing(path)
+    _refuse_broken(path)
     try:
         try:
             file = ezc3d.c3d(str(path), extract_forceplat_data=True)
@@ -75,6 +76,47 @@ def c3d_trial(path: Path) -> Trial:
         contacts=_events(parameters.get("EVENT", {})),
         speed=None,
     )
+
+
+def _refuse_broken(path: Path) -> None:
+    """Raises `SpringfootError` for a file that is not whole: ezc3d would hang, crash or make up frames.
+
+    Layout as in the C3D User Guide (c3d.org): header, a chain of parameters, the data, in blocks of 512 bytes.
+    """
+    data = existing(path).read_bytes()
+    broken = SpringfootError(f"{path.name} is not a C3D file, or it is damaged")
+    try:
+        start = 512 * (data[0] - 1)
+        order = {84: "little", 85: "little", 86: "big"}[data[start + 3]]  # Intel, DEC, MIPS
+        sign_byte = {84: 15, 85: 13, 86: 12}[data[start + 3]]  # of the scale: negative for floating-point data
+
+        def word(at: int) -> int:
+            return int.from_bytes(data[at : at + 2], order)  # type: ignore[arg-type]
+
+        end = start + 512 * data[start + 2]
+        if data[1] != 80 or start < 512 or not start < end <= len(data):
+            raise broken
+        at = start + 4
+        while length := min(data[at], 256 - data[at]):  # negative for a locked one
+            link = at + 2 + length
+            content, following = link + 2, link + word(link)
+            if data[at + 1] < 128:  # a parameter: type, dimensions, values; groups have negative numbers
+                size, dimensions = data[content], data[content + 2 : content + 2 + data[content + 1]]
+                content += 2 + len(dimensions) + min(size, 256 - size) * prod(dimensions)
+            if following == link:
+                following = end
+            named = data[at + 1] != 0 and data[link - length : link].isascii()
+            if not named or content > following or following > end:
+                raise broken
+            at = following
+            if at == end:
+                break
+        frames = word(8) - word(6) + 1
+        whole = 512 * (word(16) - 1) + frames * (4 * word(2) + word(4)) * (4 if data[sign_byte] & 128 else 2)
+    except (IndexError, KeyError):
+        raise broken from None
+    if len(data) < whole and word(8) < 65535:  # the counter of frames ends there
+        raise SpringfootError(f"{path.name} is cut short: {len(data)} of {whole} bytes")
 
 
 def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:

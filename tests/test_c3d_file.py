@@ -135,3 +135,22 @@ def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
     (tmp_path / "lab.c3d").write_bytes(b"")
     with pytest.raises(SpringfootError, match=r"springfoot\[c3d\]"):
         read_gait(tmp_path / "lab.c3d")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda whole: whole[: len(whole) // 2], "cut short"),
+        (lambda whole: whole[:600], "damaged"),
+        (lambda whole: whole[:700] + whole[720:], "damaged"),
+        (lambda whole: whole[:2100] + whole[2120:], "damaged"),
+        (lambda whole: whole[:515] + b"\x00" + whole[516:], "damaged"),
+    ],
+    ids=["half of it", "its beginning", "bytes lost in the labels", "bytes lost in the events", "no processor"],
+)
+def test_a_damaged_file_is_refused_in_one_line(tmp_path, change, words):
+    path = laboratory(tmp_path / "lab.c3d", events=True)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(SpringfootError, match=rf"lab\.c3d .*{words}") as caught:
+        read_gait(path)
+    assert "\n" not in str(caught.value)
