@@ -140,17 +140,17 @@ def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda whole: whole[: len(whole) // 2], "cut short"),
-        (lambda whole: whole[:600], "damaged"),
-        (lambda whole: whole[:700] + whole[720:], "damaged"),
-        (lambda whole: whole[:2100] + whole[2120:], "damaged"),
-        (lambda whole: whole[:515] + b"\x00" + whole[516:], "damaged"),
+        (lambda whole: whole[: len(whole) // 2], "is cut short"),
+        (lambda whole: whole[:600], "is not a C3D file"),
+        (lambda whole: whole[:700] + whole[720:], "is not a C3D file"),
+        (lambda whole: whole[:2100] + whole[2120:], "is not a C3D file"),
+        (lambda whole: whole[:515] + b"\x00" + whole[516:], "is not a C3D file"),
     ],
     ids=["half of it", "its beginning", "bytes lost in the labels", "bytes lost in the events", "no processor"],
 )
 def test_a_damaged_file_is_refused_in_one_line(tmp_path, change, words):
     path = laboratory(tmp_path / "lab.c3d", events=True)
     path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(SpringfootError, match=rf"lab\.c3d .*{words}") as caught:
+    with pytest.raises(SpringfootError, match=rf"lab\.c3d {words}") as caught:
         read_gait(path)
     assert "\n" not in str(caught.value)
