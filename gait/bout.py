@@ -211,19 +211,23 @@ def _refuse_short_legs(body: Body, dips: NDArray, lacking: float) -> None:
 
 
 def _refuse_feet_off_plan(bout: Bout, samples: NDArray) -> None:
-    rear, front = bout.support(samples)
-    zmp = bout.zmp(samples)
+    # What is on the ground changes at the events: both sides of each are looked at.
+    events = np.concatenate([foot.events for foot in bout.feet.values()])
+    time = np.concatenate([samples, events - 1e-9, events + 1e-9])
+    rear, front = bout.support(time)
+    zmp = bout.zmp(time)
     beyond = np.maximum(rear - zmp, zmp - front)
     if beyond.max() > 1e-6:
         raise SpringfootError(
-            f"ZMP outside the feet by {beyond.max():.4f} m at {samples[beyond.argmax()]:.2f} s: walk slower"
+            f"ZMP outside the feet by {beyond.max():.6f} m at {time[beyond.argmax()]:.2f} s: a longer step or a longer "
+            "double support helps"
         )
     ball = bout.plan.body.toe_joint_height
     for side in get_args(Side):
-        heights = bout.heel_position(side, samples)[1], bout.toe_joint_position(side, samples)[1] - ball
+        heights = bout.heel_position(side, time)[1], bout.toe_joint_position(side, time)[1] - ball
         deep = -np.minimum(*heights)
-        if deep.max() > FLOOR_TOLERANCE:
+        if deep.max() > FLOOR_TOLERANCE + 1e-5:
             raise SpringfootError(
-                f"{side} foot {deep.max():.3f} m in the ground at {samples[deep.argmax()]:.2f} s, "
+                f"{side} foot {deep.max():.3f} m in the ground at {time[deep.argmax()]:.2f} s, "
                 f"{deep.max() - FLOOR_TOLERANCE:.4f} m more than allowed: more clearance helps"
             )

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
-from .feet import HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
+from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
 from .plan import WalkPlan
 from .posture import STRAIGHTEST_KNEE, Legs, _foot_moment, _toe_angle, full_reach, leg_angles
 
@@ -28,6 +28,12 @@ class BoutFoot:
     """(strides,) heel strike that ends its swing [s]."""
     stride_time: float
     """Unit of the strides' phases [s]."""
+
+    @property
+    def events(self) -> NDArray:
+        """Heel-offs, toe-offs, heel strikes and foot flats [s]."""
+        after_landing = [(f.heel_off - 1, f.toe_off - 1, 0.0, f.foot_flat) for f in self.strides]
+        return (self.landing[:, None] + self.stride_time * np.array(after_landing)).ravel()
 
     def at(self, time: NDArray) -> Iterator[tuple[NDArray, FootPath, NDArray, NDArray]]:
         """(mask of the times, stride, its phases, x [m] of its frame at each) for each stride that the times meet."""
@@ -71,7 +77,8 @@ class BoutFoot:
 def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) -> tuple[BoutFoot, BoutFoot]:
     """The foot that steps first, and the other one.
 
-    Each step is rolled onto and off as in a walk of steps as long; `clearance` [m] is that of `plan_walk`.
+    Each step is rolled onto and off as in a walk of steps as long; `clearance` [m] is that of `plan_walk`,
+    and more where a swing beside or past the other foot would be in the ground.
     """
     body, times, points = plan.body, *zmp_of_walk(plan)
     walks = [feet_under_zmp(body, s, times, np.array([points[2] - s, *points[1:]]), clearance) for s in step_lengths]
@@ -88,7 +95,7 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
             toe_off_pitch=TOE_OFF_PITCH * ratio**1.5 if k == 0 else leaves.toe_off_pitch,
             heel_strike_pitch=HEEL_STRIKE_PITCH * ratio**2 if k == len(walks) else lands.heel_strike_pitch,
         )
-        strides.append(stride)
+        strides.append(_out_of_ground(stride))
     landing = plan.step_time * (BEFORE + np.arange(len(strides)))
     first, other = (
         BoutFoot(
@@ -97,6 +104,16 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
         for i in (0, 1)
     )
     return first, other
+
+
+def _out_of_ground(stride: FootPath) -> FootPath:
+    """Its swing raised to where it is no deeper in the ground than `FLOOR_TOLERANCE`, if it is."""
+    before_landing = 0.005, 0.9
+    heights = stride._heights(before_landing)
+    # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
+    gain = replace(stride, lift=stride.lift + 1)._heights(before_landing) - heights
+    lacking = (-FLOOR_TOLERANCE - heights) / gain
+    return replace(stride, lift=stride.lift + max(0.0, float(lacking.max())))
 
 
 def foot_postures(plan: WalkPlan, feet: Collection[BoutFoot], time: NDArray) -> tuple[NDArray, NDArray, NDArray]:
