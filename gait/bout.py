@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from .body import Body
 from .bout_com import AFTER, BEFORE, com_from_rest_to_rest, quintics, step_lengths_of, zmp_knots
-from .bout_feet import BoutFoot, Point, bout_feet, foot_postures, legs_under, standing_height
+from .bout_feet import BoutFoot, Point, bout_feet, bout_legs, foot_postures, standing_height
 from .cart_table import zmp
 from .errors import SpringfootError, require_count
 from .feet import FLOOR_TOLERANCE
@@ -176,7 +176,7 @@ def plan_bout(
     standing, dips = standing_height(body), np.zeros(BEFORE + steps + AFTER + 1)
     for _ in range(MOST_TRIES):
         motion, shifts = com_from_rest_to_rest(plan, knots, time, standing, dips)
-        legs = legs_under(body, motion[0, sampled].T[:, None], *postures)
+        legs = bout_legs(body, motion[0, sampled].T, *postures)
         lacking = legs.reach.max(axis=0) - full_reach(body, STRAIGHTEST)
         if lacking.max() < CLOSE:
             break

@@ -11,7 +11,7 @@ from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
 from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
 from .plan import WalkPlan
-from .posture import STRAIGHTEST_KNEE, Legs, _foot_moment, _toe_angle, full_reach, leg_angles
+from .posture import STRAIGHTEST_KNEE, Legs, full_reach, legs_under, toe_angle
 
 Point = tuple[NDArray, NDArray]
 
@@ -123,37 +123,13 @@ def foot_postures(plan: WalkPlan, feet: Collection[BoutFoot], time: NDArray) -> 
     toe = np.zeros_like(pitch)
     for row, foot in zip(toe, feet, strict=True):
         for mask, stride, phase, _ in foot.at(time):
-            row[mask] = _toe_angle(stride, plan.human, phase)
+            row[mask] = toe_angle(stride, plan.human, phase)
     return ankle, pitch, toe
 
 
-def legs_under(body: Body, com: NDArray, ankle: NDArray, pitch: NDArray, toe: NDArray) -> Legs:
-    """The posture, trunk upright, whose whole-body CoM is `com` (2, 1, T) [m].
-
-    `ankle` (2, legs, T) [m], foot `pitch` and `toe` angle (legs, T) [rad] are given. The hip comes as (1, T, 2).
-    """
-    foot_and_toe = np.stack([_foot_moment(body, p, t) for p, t in zip(pitch, toe, strict=True)], 1)
-    hip = com - np.array([0.0, 0.1 * body.leg_length])[:, None, None]
-    # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
-    for _ in range(60):
-        forward, down = ankle[0] - hip[0], hip[1] - ankle[1]
-        thigh, knee = leg_angles(forward, down, body.thigh_length, body.shank_length)
-        knee_joint = body.thigh_length * np.stack([np.sin(thigh), -np.cos(thigh)])
-        shank = np.stack([np.sin(thigh - knee), -np.cos(thigh - knee)])
-        leg = (
-            body.thigh_mass * body.thigh_com / body.thigh_length * knee_joint
-            + body.shank_mass * (knee_joint + body.shank_com * shank)
-            + (body.foot_mass + body.toe_mass) * np.stack([forward, -down])
-            + foot_and_toe
-        )
-        com_from_hip = leg.sum(axis=1, keepdims=True) / body.mass
-        com_from_hip[1] += body.trunk_mass * body.trunk_com_above_hip / body.mass
-        moved = np.abs(com - com_from_hip - hip).max()
-        hip = com - com_from_hip
-        if moved < 1e-12:
-            break
-    reach = np.hypot(forward, down)
-    return Legs(hip=np.moveaxis(hip, 0, -1), thigh=thigh, knee=knee, ankle=pitch - thigh + knee, toe=toe, reach=reach)
+def bout_legs(body: Body, com: NDArray, ankle: NDArray, pitch: NDArray, toe: NDArray) -> Legs:
+    """The legs (2, T) under a `com` (2, T) [m] whose `foot_postures` are given; the hip is (1, T, 2)."""
+    return legs_under(body, com[:, None], ankle, pitch, toe, lambda leg: leg.sum(axis=1, keepdims=True))
 
 
 def standing_height(body: Body) -> float:
@@ -161,8 +137,8 @@ def standing_height(body: Body) -> float:
     ankle = np.array([0.0, body.ankle_height])[:, None, None] + np.zeros((2, 2, 1))
     flat, height = np.zeros((2, 1)), 1.08 * body.leg_length
     for _ in range(50):
-        com = np.array([STANDING_COM * body.length_scale, height])[:, None, None]
-        lacking = float(legs_under(body, com, ankle, flat, flat).reach.max()) - full_reach(body, STRAIGHTEST_KNEE)
+        com = np.array([STANDING_COM * body.length_scale, height])[:, None]
+        lacking = float(bout_legs(body, com, ankle, flat, flat).reach.max()) - full_reach(body, STRAIGHTEST_KNEE)
         height -= lacking
         if abs(lacking) < 1e-9:
             break

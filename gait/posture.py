@@ -61,11 +61,29 @@ def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGa
     com = np.stack([x + feet.step_length * (phase >= 0.5), z])
     ankle = np.stack(feet.ankle(phase))
     pitch = feet.pitch(phase)
-    toe = _toe_angle(feet, human, phase)
-    foot_and_toe = _foot_moment(body, pitch, toe)
-    upright = np.array([[sin(motion.slope)], [cos(motion.slope)]])
+    toe = toe_angle(feet, human, phase)
+    half = GRID // 2
+    return legs_under(body, com, ankle, pitch, toe, lambda leg: leg + np.roll(leg, half, axis=-1), motion.slope)
 
-    hip = com - np.array([[0.0], [0.1 * body.leg_length]])
+
+def legs_under(
+    body: Body,
+    com: NDArray,
+    ankle: NDArray,
+    pitch: NDArray,
+    toe: NDArray,
+    both: Callable[[NDArray], NDArray],
+    slope: float = 0.0,
+) -> Legs:
+    """The posture, trunk upright, whose whole-body CoM is `com` (2, ...) [m].
+
+    `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
+    length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2).
+    """
+    foot_and_toe = _foot_moment(body, pitch, toe)
+    hip = com.copy()
+    hip[1] -= 0.1 * body.leg_length
+    trunk = body.trunk_mass * body.trunk_com_above_hip / body.mass
     # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
     for _ in range(60):
         forward, down = ankle[0] - hip[0], hip[1] - ankle[1]
@@ -78,15 +96,20 @@ def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGa
             + (body.foot_mass + body.toe_mass) * np.stack([forward, -down])
             + foot_and_toe
         )
-        com_from_hip = (leg + np.roll(leg, GRID // 2, axis=-1)) / body.mass
-        com_from_hip += body.trunk_mass * body.trunk_com_above_hip / body.mass * upright
+        com_from_hip = both(leg) / body.mass
+        com_from_hip[0] += trunk * sin(slope)
+        com_from_hip[1] += trunk * cos(slope)
         moved = np.abs(com - com_from_hip - hip).max()
         hip = com - com_from_hip
         if moved < 1e-12:
             break
-    reach = np.hypot(forward, down)
     return Legs(
-        hip=hip.T, thigh=np.asarray(thigh + motion.slope), knee=knee, ankle=pitch - thigh + knee, toe=toe, reach=reach
+        hip=np.moveaxis(hip, 0, -1),
+        thigh=np.asarray(thigh + slope),
+        knee=knee,
+        ankle=pitch - thigh + knee,
+        toe=toe,
+        reach=np.hypot(forward, down),
     )
 
 
@@ -99,7 +122,7 @@ def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
     return body.foot_mass * foot_com + body.toe_mass * toe_com
 
 
-def _toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
+def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     """Toe joint [rad]: flat on the ground in stance, people's posture in swing, laid down with the foot."""
     people = human.mean("toe", phase)
     landing = people * feet.pitch(phase) / feet.heel_strike_pitch
