@@ -15,6 +15,7 @@ import tyro
 
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.gait.own_data import read_gait
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +124,25 @@ def _read_json(words: list[str]) -> dict[str, Any]:
     return value
 
 
+def read_own_gait(words: str) -> dict[str, Any]:
+    """The setting `human` from what `--human` is given.
+
+    A file of `read_gait`; FILE:CONDITION for one of several in a CSV; several files of one walk with commas between.
+    Raises `SpringfootError` for a file that cannot be read.
+    """
+    if Path(words).is_file():
+        return read_gait(words).to_json()
+    if "," in words:
+        return read_gait(*words.split(",")).to_json()
+    file, _, condition = words.rpartition(":")
+    if Path(file).is_file():
+        return read_gait(file, condition=condition).to_json()
+    return read_gait(words).to_json()
+
+
+FILE_FLAGS = {"human": read_own_gait}
+"""Settings whose flag is the name of a file, and what makes the setting of it."""
+
 _JSON_FLAG = tyro.constructors.PrimitiveConstructorSpec(
     nargs=1,
     metavar="JSON|FILE",
@@ -155,7 +175,11 @@ def optional_flags(name: str, settings: type, defaults: Any, leave_out: tuple[st
         shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
         hint = f"(default: {shown})"
         is_json = dict in (get_origin(kind), *map(get_origin, get_args(kind)))
-        if is_json:
+        if item_name in FILE_FLAGS:
+            annotation = Annotated[
+                str | None, tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint, metavar="FILE")
+            ]
+        elif is_json:
             annotation = Annotated[
                 dict | None, _JSON_FLAG, tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint)
             ]
@@ -175,8 +199,10 @@ def optional_flags(name: str, settings: type, defaults: Any, leave_out: tuple[st
 
 
 def given(flags: Any) -> dict[str, Any]:
-    """The flags that were given, by name."""
-    return {item.name: value for item in dataclasses.fields(flags) if (value := getattr(flags, item.name)) is not None}
+    """The flags that were given, by name, files read; raises `SpringfootError` for a bad file."""
+    values = {item.name: getattr(flags, item.name) for item in dataclasses.fields(flags)}
+    given_ones = {name: value for name, value in values.items() if value is not None}
+    return given_ones | {name: read(given_ones[name]) for name, read in FILE_FLAGS.items() if name in given_ones}
 
 
 SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings())

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.envs.model import ANKLE, CONTACTS, HIP, KNEE, SIDES, TOE
-from springfoot.envs.settings import settings_to_json
-from springfoot.gait import GRAVITY, Body, human_gait
+from springfoot.envs.settings import reference_gait, settings_to_json
+from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import (
     CONTACT_THRESHOLD_BW,
@@ -254,7 +254,7 @@ _ORDER = [(_STATES + _FORCES).index(name) for name in CURVES]
 
 def _metrics(recording: Recording, gait: Gait, tally: _Tally, body: Body) -> dict[str, Any]:
     settings, both = recording.settings, gait.both
-    human = human_gait(settings.speed, settings.height)
+    human = reference_gait(settings)
     phase = PERCENT / 100
     reasons = Counter(str(reason) for reason in recording.fall_reason if reason)
     features = score.force_features(both.mean("grf_vertical_bw"), both.mean("grf_forward_bw"))
@@ -286,7 +286,11 @@ def _metrics(recording: Recording, gait: Gait, tally: _Tally, body: Body) -> dic
     return {
         "policy": recording.policy,
         "environment": settings_to_json(settings),
-        "reference": {"condition": human.condition, "speed_m_s": human.speed},
+        "reference": {
+            "condition": human.condition,
+            "speed_m_s": human.speed,
+            "borrowed": list(human.borrowed),
+        },
         "seed": recording.seed,
         "episodes": len(recording.ticks),
         "falls": sum(reasons.values()),

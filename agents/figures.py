@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from springfoot.gait import HumanGait, human_gait
+from springfoot.envs.settings import reference_gait
+from springfoot.gait import HumanGait
 from springfoot.gait.cycle import PERCENT
 
 from .evaluation import JOINT_CURVES, MOMENT_CURVES, Curves, Gait
@@ -39,7 +40,7 @@ STYLE: dict[Any, Any] = {
 def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
     """Write the picture: angles, moments, forces, CoM and stiffness, people's mean ± SD behind each."""
     settings, metrics = recording.settings, gait.metrics
-    human = human_gait(settings.speed, settings.height)
+    human = reference_gait(settings)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(12.5, 10.2), layout="constrained")
         grid = figure.subplots(4, 4)
@@ -160,10 +161,11 @@ def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) 
         fontsize=12,
         fontweight="bold",
     )
+    who = "people" if settings.human is None else human.condition
     note = " (end of the measured range)" if human.clamped else ""
     handles = {
         "model, mean ± SD over strides": (Patch(color=MODEL, alpha=0.22, lw=0), Line2D([], [], color=MODEL, lw=1.8)),
-        f"people at {human.speed:.2f} m/s{note}, mean ± SD": (
+        f"{who} at {human.speed:.2f} m/s{note}, mean ± SD": (
             Patch(color=PEOPLE, alpha=0.25, lw=0),
             Line2D([], [], color=PEOPLE, lw=1.3),
         ),

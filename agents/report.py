@@ -16,7 +16,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from springfoot.gait import human_gait
+from springfoot.envs.settings import reference_gait, settings_from
+from springfoot.gait import HumanGait
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
 
@@ -76,8 +77,9 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         f"{environment['speed']:g} m/s, equilibrium {environment['equilibrium']}{pushes}",
         soft_wrap=True,
     )
+    who = "people" if environment["human"] is None else "own"
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    for name in ("", "", "model", "people", "r", "in ±SD"):
+    for name in ("", "", "model", who, "r", "in ±SD"):
         table.add_column(
             name, justify="right" if name else "left", style="bold" if name == "model" else "", no_wrap=True
         )
@@ -88,8 +90,11 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     console.print(table)
     for reason, count in metrics["fall_reasons"].items():
         console.print(f"{count} × {reason}")
+    if environment["human"] is not None:
+        borrowed = ", ".join(people["borrowed"]) or "nothing"
+        console.print(f"own: {people['condition']}; people's instead: {borrowed}", soft_wrap=True)
     console.print(
-        f"people at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean curves,\n"
+        f"{who} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean curves,\n"
         "the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing",
         soft_wrap=True,
     )
@@ -101,7 +106,7 @@ Row = tuple[str, str, str, str, str, str]
 
 def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
     """The table's rows, in groups."""
-    people = people_metrics(metrics["environment"]["speed"], metrics["environment"]["height"])
+    people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
     grf, their_grf, com = metrics["grf"], people["grf"], metrics["com"]
     works = metrics["ankle_work_J_kg"]
 
@@ -172,9 +177,8 @@ def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
     ]
 
 
-def people_metrics(speed: float, height: float) -> dict[str, Any]:
-    """People's own values at `speed` [m/s] for a body of `height` [m], from their mean curves; keys as in metrics."""
-    human = human_gait(speed, height)
+def people_metrics(human: HumanGait) -> dict[str, Any]:
+    """People's own values, or those of own data, from their mean curves; keys as in metrics."""
     phase = PERCENT / 100
     features = score.force_features(human.mean("grf_vertical", phase), human.mean("grf_forward", phase))
     positive, negative = score.stride_work(human.mean("ankle_power", phase)[None], np.array([human.stride_time]))

@@ -10,6 +10,8 @@ from typing import Any, Literal, get_args
 
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError, require_number, require_within
+from springfoot.gait.human import HumanGait, human_gait
+from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
@@ -56,6 +58,9 @@ class BipedSettings:
     schedule: dict[str, Any] | None = None
     """Stiffness over the stride, JSON form of `springfoot.gait.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
+    human: dict[str, Any] | None = None
+    """Someone's own walk in place of people's, JSON form of `springfoot.gait.own_data.OwnGait` (on the command line a
+    CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time follow it."""
     episode_seconds: float = 20.0
     """Time after which an episode is truncated [s]."""
     start: Literal["random"] | float = "random"
@@ -83,6 +88,8 @@ class BipedSettings:
         _check_range("ankle_stiffness_range", self.ankle_stiffness_range)
         _check_range("toe_stiffness_range", self.toe_stiffness_range)
         self._check_schedule()
+        if self.human is not None:
+            OwnGait.from_json(self.human)
         require_number("episode_seconds", self.episode_seconds, STEP_SECONDS, unit="s")
         check_start(self.start)
         require_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
@@ -111,12 +118,21 @@ def settings_from(**values: Any) -> BipedSettings:
     values = {name: _plain(value) for name, value in values.items()}
     if values.get("schedule") is not None:
         values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
+    if values.get("human") is not None:
+        values["human"] = OwnGait.from_json(values["human"]).to_json()
     return BipedSettings(**values)
 
 
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
     """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
     return json.loads(json.dumps(asdict(settings)))
+
+
+def reference_gait(settings: BipedSettings) -> HumanGait:
+    """Whose walk the settings hold the body to: people's at its speed and height, or that of `settings.human`."""
+    if settings.human is None:
+        return human_gait(settings.speed, settings.height)
+    return OwnGait.from_json(settings.human).gait(settings.speed, settings.height)
 
 
 def check_start(start: Any) -> None:

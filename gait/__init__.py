@@ -1,19 +1,42 @@
 """springfoot.gait: the science of walking. NumPy and SciPy only: no simulator, no learning."""
 
 from .body import GRAVITY, Body
+from .bout import Bout, plan_bout
 from .errors import SpringfootError
 from .human import HumanGait, human_gait
+from .identification import PhaseSpring, identify
+from .kinetics import foot_force, ground_reaction, planned_moments, projection_table
+from .leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
+from .own_data import OwnGait, read_gait
 from .plan import WalkPlan, plan_walk
-from .stiffness import StiffnessSchedule, thesis_schedule
+from .preview import preview_com
+from .stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
 
 __all__ = [
     "GRAVITY",
     "Body",
+    "Bout",
+    "FootLoad",
     "HumanGait",
+    "LegMotion",
+    "OwnGait",
+    "PhaseSpring",
     "SpringfootError",
     "StiffnessSchedule",
     "WalkPlan",
+    "foot_force",
+    "ground_reaction",
     "human_gait",
+    "identify",
+    "inverse_dynamics",
+    "leg_motion",
+    "plan_bout",
     "plan_walk",
+    "planned_moments",
+    "preview_com",
+    "projection_moments",
+    "projection_table",
+    "read_gait",
+    "schedule_from_curves",
     "thesis_schedule",
 ]

@@ -1,11 +1,13 @@
 """The cart-table model: the whole body as its CoM on a massless table standing on the ZMP (Kajita et al. 2003).
 
-Equation (1) of the thesis, its sign and its missing terms restored: p = x - z x'' / (z'' + g).
+Equation (1) of the thesis, its sign and its missing terms restored: p = x - z x'' / (z'' + g). On a slope a the frame
+leans with the ground, x along it and z at right angles to it, so that gravity has a part along it:
+p = x - z (x'' + g sin a) / (z'' + g cos a).
 """
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import pi
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +20,41 @@ SAMPLES = 240
 """Knots a step of the tabulated CoM path; quintics between them, so that its error stays that of the integration."""
 
 
-def zmp(x: ArrayLike, z: ArrayLike, x_acceleration: ArrayLike, z_acceleration: ArrayLike) -> NDArray:
-    """Equation (1): ZMP [m] of a CoM at `x`, `z` [m] above level ground with accelerations [m/s^2]; broadcasts."""
-    return np.asarray(x) - np.asarray(z) * x_acceleration / (np.asarray(z_acceleration) + GRAVITY)
+def zmp(
+    x: ArrayLike, z: ArrayLike, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0
+) -> NDArray:
+    """Equation (1): ZMP [m] of a CoM at `x`, `z` [m] with accelerations [m/s^2]; broadcasts.
+
+    On a `slope` [rad], uphill positive, x is along the ground and z at right angles to it.
+    """
+    back, down = _gravity(slope)
+    return np.asarray(x) - np.asarray(z) * (np.asarray(x_acceleration) + back) / (np.asarray(z_acceleration) + down)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HyperbolicPath:
+    """x(t) of a CoM at constant height over a piecewise polynomial ZMP, in closed form; made by `closed_form`.
+
+    In each piece a polynomial and a cosh and sinh, the latter two as exp(-rate (t - start)), exp(rate (t - end)), which
+    lose no digits in a long piece.
+    """
+
+    polynomial: PPoly
+    """The particular solution [m], which follows the ZMP."""
+    rate: float
+    """sqrt(g cos a / z) [1/s]."""
+    fading: NDArray
+    """(pieces,) of exp(-rate (t - start)) [m]."""
+    growing: NDArray
+    """(pieces,) of exp(rate (t - end)) [m]."""
+
+    def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
+        """Position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
+        time, knots = np.asarray(time, float), self.polynomial.x
+        piece = np.clip(np.searchsorted(knots, time, "right") - 1, 0, len(knots) - 2)
+        fading = self.fading[piece] * np.exp(-self.rate * (time - knots[piece]))
+        growing = self.growing[piece] * np.exp(self.rate * (time - knots[piece + 1]))
+        return self.polynomial(time, derivative) + self.rate**derivative * (growing + (-1) ** derivative * fading)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,8 +69,10 @@ class ComMotion:
     """Half of rise and fall [m]."""
     lowest_at: float
     """Time of the lowest point [s]."""
-    path: PPoly = field(repr=False)
-    """Forward position x [m] over time [s]."""
+    slope: float = 0.0
+    """Of the ground [rad], uphill positive: x is along it, z at right angles to it."""
+    path: PPoly | HyperbolicPath = field(repr=False)
+    """Forward position x [m] over time [s]; `path(time, n)` is its n-th derivative."""
 
     def position(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """(x, z) [m]."""
@@ -50,28 +86,95 @@ class ComMotion:
         """(forward, up) [m/s^2]."""
         return self.path(time, 2), _bob(time, self.step_time, self.amplitude, self.lowest_at, 2)
 
+    def zmp(self, time: ArrayLike) -> NDArray:
+        """ZMP [m] by equation (1)."""
+        return zmp(*self.position(time), *self.acceleration(time), self.slope)
+
 
 def periodic_com(
-    zmp_times: NDArray, zmp_points: NDArray, step_length: float, height: float, amplitude: float, lowest_at: float
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    step_length: float,
+    height: float,
+    amplitude: float,
+    lowest_at: float,
+    slope: float = 0.0,
 ) -> ComMotion:
     """The one CoM motion over a ZMP that repeats itself every step.
 
     The ZMP p [m] runs straight between `zmp_points` at `zmp_times` [s] (first 0, last the step time T). The height
-    is z = height - amplitude cos(2 pi (t - lowest_at) / T) [m]. Solves x'' = (g + z'') / z (x - p) with
-    x(T) = x(0) + step_length and x'(T) = x'(0) by superposing one particular and two homogeneous solutions, so that
-    the periodic one costs a 2 x 2 system; error below 1e-9 m.
+    is z = height - amplitude cos(2 pi (t - lowest_at) / T) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a
+    the `slope` [rad], with x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `amplitude` is 0,
+    else with an error below 1e-9 m.
     """
+    if amplitude == 0:
+        lines = PPoly(np.stack([np.diff(zmp_points) / np.diff(zmp_times), zmp_points[:-1]]), zmp_times)
+        path = closed_form(lines, step_length, height, slope)
+    else:
+        path = _integrated(zmp_times, zmp_points, step_length, height, amplitude, lowest_at, slope)
+    return ComMotion(
+        step_time=float(zmp_times[-1]),
+        height=height,
+        amplitude=amplitude,
+        lowest_at=lowest_at,
+        slope=slope,
+        path=path,
+    )
+
+
+def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.0) -> HyperbolicPath:
+    """The CoM path at constant `height` [m] over a ZMP of any degree and number of pieces, repeating with it.
+
+    `zmp` [m] over the time of one step [s] starts again `step_length` further on; it may jump. The polynomial
+    p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
+    exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
+    """
+    back, down = _gravity(slope)
+    rate = sqrt(down / height)
+    coefficients = np.array(zmp.c, float)
+    for order in range(2, len(coefficients), 2):
+        coefficients[order:] += zmp.derivative(order).c / rate**order
+    coefficients[-1] += height * back / down
+    polynomial = PPoly(coefficients, zmp.x)
+
+    # What the polynomials lack at the end of each piece to go on as the next one does, in x and in x' / rate.
+    lasts, velocity = np.diff(zmp.x), polynomial.derivative().c
+    jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, lasts)
+    jump[-1] += step_length
+    kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, lasts)) / rate
+    # Their sum concerns the growing exponentials alone, their difference the fading ones.
+    decay, this = np.exp(-rate * lasts), np.eye(len(lasts))
+    following = np.roll(this, 1, axis=1)
+    return HyperbolicPath(
+        polynomial=polynomial,
+        rate=rate,
+        fading=np.linalg.solve(this * decay - following, (jump - kick) / 2),
+        growing=np.linalg.solve(this - following * decay, (jump + kick) / 2),
+    )
+
+
+def _integrated(
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    step_length: float,
+    height: float,
+    amplitude: float,
+    lowest_at: float,
+    slope: float,
+) -> PPoly:
+    """`periodic_com` by superposing one particular and two homogeneous solutions: periodic at the cost of 2 x 2."""
     step_time = zmp_times[-1]
+    back, down = _gravity(slope)
 
     def pull(t: ArrayLike) -> NDArray:
         z = height + _bob(t, step_time, amplitude, lowest_at)
-        return (GRAVITY + _bob(t, step_time, amplitude, lowest_at, 2)) / z
+        return (down + _bob(t, step_time, amplitude, lowest_at, 2)) / z
 
-    driven = np.array([1.0, 0.0, 0.0])  # columns: driven by the ZMP, from unit position, from unit velocity
+    driven = np.array([1.0, 0.0, 0.0])  # columns: driven by ZMP and slope, from unit position, from unit velocity
 
     def motion(t: float, state: NDArray) -> NDArray:
         x, v = state[:3], state[3:]
-        return np.concatenate([v, pull(t) * (x - driven * np.interp(t, zmp_times, zmp_points))])
+        return np.concatenate([v, pull(t) * (x - driven * np.interp(t, zmp_times, zmp_points)) - driven * back])
 
     state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
     times, states = [], []
@@ -89,15 +192,14 @@ def periodic_com(
     start_state = np.linalg.solve(ends[:, 1:] - np.eye(2), np.array([step_length, 0.0]) - ends[:, 0])
     weights = np.array([1.0, *start_state])
     position, velocity = weights @ x, weights @ v
-    acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points))
+    acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
     quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
-    return ComMotion(
-        step_time=float(step_time),
-        height=height,
-        amplitude=amplitude,
-        lowest_at=lowest_at,
-        path=PPoly.from_bernstein_basis(quintics),
-    )
+    return PPoly.from_bernstein_basis(quintics)
+
+
+def _gravity(slope: float) -> tuple[float, float]:
+    """Gravity (back along the ground, down into it) [m/s^2]."""
+    return GRAVITY * sin(slope), GRAVITY * cos(slope)
 
 
 def _bob(t: ArrayLike, step_time: float, amplitude: float, lowest_at: float, derivative: int = 0) -> NDArray:

@@ -4,7 +4,7 @@ All positions are in the foot's own frame: x [m] forward of where its ankle is w
 the floor. Pitch [rad] is positive toes up. Stride phase 0 is this foot's heel strike, 1 its next, two steps further on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from .body import Body
+from .errors import SpringfootError, require_within
 
+ROCKER_MARGIN = 0.005
+"""The foot is flat, and the heel still down, this far [m, at 1.70 m] before the ZMP comes, and after it has gone."""
+QUICKEST_FOOT_FLAT = 0.02
+"""Stride phase before which no foot comes flat; in very short steps the ZMP starts ahead of the landing heel."""
+HEEL_STRIKE_PITCH = 0.293
+"""Foot to ground at heel strike [rad] per (step length / leg length)^2: the thesis's q_f = 0.13 at its 0.6 m."""
+HEEL_ROCKER_RATE = 4.5
+"""Heel-strike pitch per duration of the heel rocker, at most [rad/stride]: a quick foot-flat needs a flat landing."""
+TOE_OFF_PITCH = 1.32
+"""Foot to ground at toe-off [rad] per (step length / leg length)^1.5, fitted with the swing below."""
 HEEL_ROCKER_POWER = 2
 """The foot comes down from its heel-strike pitch as the square of what is left of the heel rocker."""
 TOE_ROCKER_POWER = 2.12
@@ -29,6 +40,10 @@ VIA_UP = (0.225, 0.104)
 """Ankle above the floor [m], at 1.70 m."""
 VIA_PITCH = (-1.0, -0.183)
 """Pitch [rad]."""
+MID_SWING = (0.3, 0.7)
+"""Parts of the swing between which ball and heel must clear the floor: they leave and land on either side of it."""
+FLOOR_TOLERANCE = 0.003
+"""A swing foot may be this deep [m] in the floor: a landing heel slides in at a shallow angle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +63,8 @@ class FootPath:
     """Foot to ground at heel strike [rad] (thesis q_f)."""
     toe_off_pitch: float
     """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
+    lift: float = 0.0
+    """The via points of the swing lie this much [m] higher than `VIA_UP`."""
 
     def pitch(self, stride_phase: ArrayLike) -> NDArray:
         """Foot to ground [rad], toes up positive, 0 from foot flat to heel-off."""
@@ -79,6 +96,11 @@ class FootPath:
         """Ball of the foot above the floor [m]: the toe joint above its standing height."""
         return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
 
+    @property
+    def clearance(self) -> float:
+        """Least height [m] of ball and heel above the floor in `MID_SWING`."""
+        return float(self._heights(MID_SWING).min())
+
     def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Rear and front end (x, x) [m] of what is on the ground in stance: heel, sole, then toe joint to toe tip."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
@@ -86,6 +108,11 @@ class FootPath:
         return np.where(phase <= self.heel_off, heel, joint), np.where(
             phase >= self.foot_flat, joint + self.body.toe_length, heel
         )
+
+    def _heights(self, part: tuple[float, float]) -> NDArray:
+        """(2, 200) ball and heel above the floor [m] over a part of the swing."""
+        phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
+        return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
 
     @property
     def _drop(self) -> float:
@@ -121,10 +148,70 @@ class FootPath:
         start, end = self._toe_rocker(self.toe_off), self._heel_rocker(0.0)
         end[0, 0] += 2 * self.step_length
         forward = start[0, 0] + np.array(VIA_FORWARD) * (end[0, 0] - start[0, 0])
-        via = np.stack([forward, np.array(VIA_UP) * self.body.length_scale, VIA_PITCH], -1)
+        via = np.stack([forward, np.array(VIA_UP) * self.body.length_scale + self.lift, VIA_PITCH], -1)
         knots = self.toe_off + np.array([0.0, *VIA, 1.0]) * (1 - self.toe_off)
         ends = ([(1, start[1]), (2, start[2])], [(1, end[1]), (2, end[2])])
         return make_interp_spline(knots, np.stack([start[0], *via, end[0]]), k=5, bc_type=ends)
+
+
+def feet_under_zmp(
+    body: Body, step_length: float, zmp_times: NDArray, zmp_points: NDArray, clearance: float | None = None
+) -> FootPath:
+    """Feet whose rockers follow the ZMP, so that it stays on what is on the ground.
+
+    The ZMP runs straight between three points [m from the stance ankle] at three times [s]: heel strike, the other
+    foot's toe-off, the next heel strike. `clearance` [m]: as in `plan_walk`. Raises `SpringfootError` for a ZMP off the
+    feet and for a step shorter than its travel.
+    """
+    margin = ROCKER_MARGIN * body.length_scale
+    heel, ball, toe_tip = -body.heel_to_ankle, body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
+    first, zmp_from, zmp_to = zmp_points
+    for name, value, low, high in (("start", zmp_from, heel, ball), ("end", zmp_to, ball + margin, toe_tip)):
+        beyond = max(low - value, value - high)
+        if not beyond < 0:
+            raise SpringfootError(
+                f"ZMP at the {name} of single support must be in ({low:.3f}, {high:.3f}) m from the ankle, "
+                f"got {value:.3f}: outside by {beyond:.3f} m"
+            )
+    if first >= zmp_from:
+        raise SpringfootError(
+            f"step of {step_length:.3f} m must be longer than the ZMP travel, {zmp_to - zmp_from:.3f} m, "
+            f"is {first - zmp_from:.3f} m too short"
+        )
+    stride_time = 2 * zmp_times[-1]
+    flat, heel_off = np.interp([heel - margin, ball + margin], zmp_points, zmp_times) / stride_time
+    flat = max(float(flat), QUICKEST_FOOT_FLAT)
+    stride = step_length / body.leg_length
+    feet = FootPath(
+        body=body,
+        step_length=step_length,
+        foot_flat=flat,
+        heel_off=float(heel_off),
+        toe_off=float(0.5 + zmp_times[1] / stride_time),
+        heel_strike_pitch=min(HEEL_STRIKE_PITCH * stride**2, HEEL_ROCKER_RATE * flat),
+        toe_off_pitch=TOE_OFF_PITCH * stride**1.5,
+    )
+    if clearance is not None:
+        clearance = require_within("clearance", clearance, (0.0, body.leg_length), "m")
+        flattest = feet._heights(MID_SWING)
+        # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
+        gain = replace(feet, lift=1.0)._heights(MID_SWING) - flattest
+        feet = replace(feet, lift=float(((clearance - flattest) / gain).max()))
+    return feet
+
+
+def refuse_swing_in_ground(feet: FootPath) -> None:
+    """Raises `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`: its ball or heel.
+
+    The tip of the toe is not looked at: early in swing the toe bends back to people's posture, which at 1.2 m/s would
+    take its tip 20 mm into the floor; a sprung toe gives way.
+    """
+    lowest = float(feet._heights((0.005, 0.995)).min())
+    if lowest < -FLOOR_TOLERANCE:
+        raise SpringfootError(
+            f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "
+            "a longer step, a longer double support or more clearance helps"
+        )
 
 
 def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:

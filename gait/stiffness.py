@@ -1,6 +1,10 @@
-"""Joint stiffness: equation (4) of the thesis, K = d tau / d theta, and schedules of it over the stride."""
+"""Joint stiffness: equation (4) of the thesis, K = d tau / d theta, and schedules of it over the stride.
+
+Angle and torque of ankle and toe over one stride -> gait events -> a straight line between each two -> springs.
+"""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .body import Body
 from .errors import SpringfootError, require_within
 from .human import human_gait
+from .identification import PhaseSpring, identify
 
 SPRINGS = ("ankle", "toe")
 """The joints of a schedule, in the order of the last axis of its arrays."""
@@ -21,6 +26,8 @@ STIFFNESS_RANGE = (0.0, 1e5)
 """Stiffnesses accepted in a schedule [N m/rad]."""
 ANGLE_RANGE = (-np.pi, np.pi)
 """Equilibrium angles accepted in a schedule [rad]."""
+HEEL_OFF_RISE = 0.05
+"""The heel is off when the toe has made this part of its rise from its lowest angle in stance to its largest."""
 
 
 class Segment(NamedTuple):
@@ -95,15 +102,87 @@ def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: fl
     return stiffness, (first_angle + last_angle) / 2 + (first_torque + last_torque) / 2 / stiffness
 
 
+def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
+    """Stride phases of heel strike, foot flat, maximum dorsiflexion and toe-off, in this order, from the ankle angle.
+
+    `phase` (n,) ascends from 0, heel strike, at least to `toe_off`; `angle` (n,) [rad], dorsiflexion positive. Foot
+    flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has its foot flat
+    at heel strike, one that only plantarflexes its maximum too. Raises `SpringfootError` for curves that do not fit.
+    """
+    phase, angle = _stance(phase, angle, toe_off)
+    top = int(angle.argmax())
+    dip = int(angle[: top + 1].argmin())
+    return {
+        "heel_strike": float(phase[0]),
+        "foot_flat": float(phase[dip]),
+        "maximum_dorsiflexion": float(phase[top]),
+        "toe_off": float(phase[-1]),
+    }
+
+
+def toe_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
+    """Stride phases of heel strike, heel-off, maximum dorsiflexion and toe-off, in this order, from the toe angle.
+
+    As `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of stance (a toe
+    lands raised, too); heel-off the last time before it at which the toe has made no more than `HEEL_OFF_RISE` of its
+    rise from the lowest angle since a quarter of stance, when the foot is flat.
+    """
+    phase, angle = _stance(phase, angle, toe_off)
+    quarter, half = np.searchsorted(phase, [toe_off / 4, toe_off / 2])
+    top = int(half + angle[half:].argmax())
+    flat = angle[quarter : top + 1]
+    heel_off = int(quarter + np.flatnonzero(flat <= flat.min() + HEEL_OFF_RISE * (angle[top] - flat.min()))[-1])
+    return {
+        "heel_strike": float(phase[0]),
+        "heel_off": float(phase[heel_off]),
+        "maximum_dorsiflexion": float(phase[top]),
+        "toe_off": float(phase[-1]),
+    }
+
+
+def schedule_from_curves(
+    phase: ArrayLike,
+    toe_off: float,
+    ankle: tuple[ArrayLike, ArrayLike],
+    toe: tuple[ArrayLike, ArrayLike] | None = None,
+    *,
+    lowest: tuple[float, float] = (0.0, 0.0),
+    toe_stiffness: float = TOE_STIFFNESS,
+) -> StiffnessSchedule:
+    """Equation (4) on any curves, measured, planned or simulated: a straight line, one spring, between two events.
+
+    Args:
+        phase: (n,) stride phases, ascending from 0, heel strike, at least to `toe_off`.
+        toe_off: stride phase at which swing begins; springs then rest at 0 with the lowest stiffness.
+        ankle: angle (n,) [rad], dorsiflexion positive, and torque (n,) [N m], positive as the angle (a plantarflexion
+            moment with its sign turned).
+        toe: the same of the toe, up positive; None where no moment is known: `toe_stiffness` resting at 0 in stance.
+        lowest: stiffness of ankle and toe [N m/rad] in swing, below which no line falls; the thesis says 0. A line
+            no spring can follow takes it through its mid-point (`line_spring`).
+        toe_stiffness: [N m/rad], where `toe` is None.
+
+    Raises `SpringfootError` for curves that do not fit, or a rest angle beyond `ANGLE_RANGE` (a heavy load on a
+    line of low stiffness: give a higher `lowest`).
+    """
+    low_ankle, low_toe = (require_within("lowest", k, STIFFNESS_RANGE, "N m/rad") for k in lowest)
+    ankle_lines = _lines(ankle_events(phase, ankle[0], toe_off), phase, *ankle, low_ankle)
+    if toe is None:
+        toe_lines = [Segment(0.0, toe_stiffness, 0.0)]
+    else:
+        toe_lines = _lines(toe_events(phase, toe[0], toe_off), phase, *toe, low_toe)
+    return StiffnessSchedule(
+        (*ankle_lines, Segment(toe_off, low_ankle, 0.0)), (*toe_lines, Segment(toe_off, low_toe, 0.0))
+    )
+
+
 def thesis_schedule(
     body: Body, speed: float = 1.2, swing_stiffness: tuple[float, float] = LOWEST_STIFFNESS
 ) -> StiffnessSchedule:
     """The thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
 
-    Ankle events: heel strike, foot flat (the first dip of the angle), maximum dorsiflexion, toe-off. Torques scale
-    with mass x height from people's at `speed` [m/s]. The toe has `TOE_STIFFNESS` from heel strike to toe-off and
-    rests at 0. In swing both springs rest at 0 with `swing_stiffness` (ankle, toe) [N m/rad, for 1.70 m and 63 kg];
-    no line of the ankle falls below it.
+    Torques scale with mass x height from people's at `speed` [m/s]. Of the toe people's moment is not known: it has
+    `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. In swing both springs rest at 0 with
+    `swing_stiffness` (ankle, toe) [N m/rad, for 1.70 m and 63 kg]; no line of the ankle falls below it.
     """
     human = human_gait(speed, body.height)
     scale = body.stiffness_scale
@@ -111,21 +190,105 @@ def thesis_schedule(
         require_within("swing_stiffness", k, STIFFNESS_RANGE, "N m/rad") for k in swing_stiffness
     )
     phase = np.linspace(0.0, human.toe_off, 1001)
-    angle = human.mean("ankle", phase)
-    top = int(angle.argmax())
-    dip = int(angle[:top].argmin())
     # The data count plantarflexion positive, the joint dorsiflexion.
     torque = -human.mean("ankle_moment", phase) * body.mass * body.length_scale
+    return schedule_from_curves(
+        phase,
+        human.toe_off,
+        (human.mean("ankle", phase), torque),
+        lowest=(lowest_ankle * scale, lowest_toe * scale),
+        toe_stiffness=TOE_STIFFNESS * scale,
+    )
 
-    events = [0, dip, top, len(phase) - 1]
-    points = [(float(angle[i]), float(torque[i])) for i in events]
-    ankle = [
-        Segment(float(phase[event]), *line_spring(start, end, lowest_ankle * scale))
-        for event, start, end in zip(events[:-1], points[:-1], points[1:], strict=True)
+
+@dataclass(frozen=True, kw_only=True)
+class QuasiStiffness:
+    """One phase of the ankle's angle-moment curve: people's mean curves beside published single trials."""
+
+    phase: str
+    """Its name, as published."""
+    start: float
+    """Stride phase at which it begins."""
+    end: float
+    """Stride phase at which it ends."""
+    slope: float
+    """Of people's mean curve, moment over angle by least squares [N m/(rad kg)]."""
+    identified: PhaseSpring
+    """The spring and damper of the same stretch; stiffness [N m/(rad kg)]."""
+    published: float
+    """Median of the published slopes [N m/(rad kg)]."""
+    published_sd: float
+    """Their standard deviation over trials [N m/(rad kg)]."""
+
+
+FUKUCHI_SPEED = 1.2
+"""Middle [m/s] of the speed class of `FUKUCHI_OVERGROUND`, 1.1 to 1.3 m/s."""
+FUKUCHI_OVERGROUND = (
+    ("controlled plantarflexion", 0.0, 0.058, 1.20, 0.52),
+    ("early rising", 0.058, 0.282, 2.14, 0.82),
+    ("late rising", 0.282, 0.460, 8.33, 2.87),
+    ("descending (push-off)", 0.460, 0.649, 3.48, 0.69),
+)
+"""Phase, its start and end, median and SD of the ankle's quasi-stiffness [N m/(rad kg)] in 25 overground trials of 25
+adults (Fukuchi et al., PeerJ 6:e4640, 2018, CC BY 4.0; per-trial slopes computed in github.com/nikorose87/DJS-GA)."""
+
+
+def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
+    """People's ankle stiffness per phase at 1.2 m/s (`human_gait`, mean curves) beside another laboratory's trials."""
+    human = human_gait(FUKUCHI_SPEED)
+    phase = np.arange(100) / 100
+    angle, moment = human.mean("ankle", phase), human.mean("ankle_moment", phase)
+    velocity = human.rate("ankle", phase) / human.stride_time
+    bounds = (0.0, *(end for _, _, end, _, _ in FUKUCHI_OVERGROUND))
+    rows = []
+    for row, spring in zip(FUKUCHI_OVERGROUND, identify(-moment, angle, velocity, phase, bounds), strict=True):
+        name, start, end, median, sd = row
+        inside = (phase >= start) & (phase < end)
+        rows.append(
+            QuasiStiffness(
+                phase=name,
+                start=start,
+                end=end,
+                slope=float(np.polyfit(angle[inside], moment[inside], 1)[0]),
+                identified=spring,
+                published=median,
+                published_sd=sd,
+            )
+        )
+    return tuple(rows)
+
+
+def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
+    """Phases and angles from heel strike to `toe_off`, its own sample the last."""
+    require_within("toe_off", toe_off, (0.0, 1.0))
+    phase, angle = _curves(phase, angle)
+    if not (len(phase) > 1 and phase[0] == 0.0 and np.all(np.diff(phase) > 0) and 0 < toe_off <= phase[-1]):
+        raise SpringfootError(f"phase must ascend from 0 to toe_off ({toe_off:g}) or beyond, got {phase!s:.60}")
+    inside = phase < toe_off
+    return np.append(phase[inside], toe_off), np.append(angle[inside], np.interp(toe_off, phase, angle))
+
+
+def _curves(*curves: ArrayLike) -> list[NDArray]:
+    """The curves as float arrays (n,), all finite and of the same length."""
+    arrays = [np.asarray(curve, float) for curve in curves]
+    shapes = [array.shape for array in arrays]
+    if len(shapes[0]) != 1 or len(set(shapes)) > 1 or not all(np.isfinite(array).all() for array in arrays):
+        raise SpringfootError(f"curves must be finite numbers, one a phase, got shapes {shapes}")
+    return arrays
+
+
+def _lines(
+    events: dict[str, float], phase: ArrayLike, angle: ArrayLike, torque: ArrayLike, lowest: float
+) -> list[Segment]:
+    """One segment from each event to the next; events that coincide leave no line between them."""
+    phases, angles, torques = _curves(phase, angle, torque)
+    times = list(events.values())
+    points = [(float(np.interp(time, phases, angles)), float(np.interp(time, phases, torques))) for time in times]
+    return [
+        Segment(time, *line_spring(start, end, lowest))
+        for (time, until), (start, end) in zip(pairwise(times), pairwise(points), strict=True)
+        if until > time
     ]
-    swing = Segment(human.toe_off, lowest_ankle * scale, 0.0)
-    toe = (Segment(0.0, TOE_STIFFNESS * scale, 0.0), Segment(human.toe_off, lowest_toe * scale, 0.0))
-    return StiffnessSchedule((*ankle, swing), toe)
 
 
 def _segment(joint: str, entry: object) -> Segment:

@@ -6,7 +6,7 @@ import pytest
 from springfoot.envs.actuation import FEET, action_of
 from springfoot.envs.biped import Biped, Tick
 from springfoot.envs.model import DAMPING_TIME, SIDES, torque_limits
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 from springfoot.gait.errors import SpringfootError
@@ -208,3 +208,21 @@ def test_info_carries_what_the_springs_do():
         assert info[f"torque/ankle_{side}"][0] == pytest.approx(spring, abs=1e-9)
     assert info["work/stiffness/toe_left"][0] < 0  # softer under load gives energy back
     assert np.isfinite([value[0] for name, value in info.items() if name != "termination"]).all()
+
+
+def test_the_walk_follows_own_data():
+    """Own stride time and step length set the plan's step, at cadence `people`; the commanded speed stays."""
+    own = {"name": "mine", "strides": 9, "speed": 1.0, "stride_time": 1.25, "step_length": 0.625, "toe_off": 0.65}
+    own |= {"mean": {"ankle": [[0.1, 0.0]], "grf_vertical": [1.0]}, "sd": {}}
+    plain, biped = Biped(BipedSettings(), 1), Biped(settings_from(human=own), 1)
+    assert biped.plan.speed == pytest.approx(1.2)
+    # speed 1.2 for 1.0: step length and rate each take the square root of it
+    assert biped.plan.stride_time == pytest.approx(1.25 / np.sqrt(1.2))
+    assert biped.plan.step_length == pytest.approx(0.625 * np.sqrt(1.2))
+    planned = [list(biped.observation_names).index(f"planned_ankle_{side}") for side in SIDES]
+    for each in (plain, biped):
+        each.reset(np.arange(1), [0], start=0.2)
+    assert biped.observe()[0, planned] == pytest.approx(0.1, abs=1e-6)
+    assert np.abs(plain.observe()[0, planned] - 0.1).max() > 0.01
+    thesis = Biped(settings_from(human=own, cadence="thesis"), 1)
+    assert thesis.plan.step_time == pytest.approx(0.5)

@@ -102,6 +102,16 @@ def test_the_fingerprint_knows_the_legs_and_what_the_feet_follow():
     assert [part for part in base if retuned[part] != base[part]] == ["legs"]
 
 
+def test_a_policy_carries_the_gait_it_was_trained_after(policy, tmp_path):
+    own = {"name": "mine.csv", "strides": 9, "speed": 1.1, "stride_time": 1.1, "step_length": 0.6, "toe_off": 0.62}
+    own |= {"mean": {"knee": [[0.4, 0.0], [0.1, -0.2]]}, "sd": {}}
+    settings = settings_from(speed=1.1, human=own)
+    after = fingerprint(Biped(settings, 1))
+    assert after["legs"] != fingerprint(Biped(settings_from(speed=1.1), 1))["legs"]
+    save_policy(tmp_path / "policy.safetensors", replace(policy, settings=settings, fingerprint=after))
+    assert load_policy(tmp_path / "policy.safetensors").settings == settings
+
+
 def changed(policy, path, header=None, tensors=None):
     """The policy's file with parts of its header or tensors changed."""
     save_policy(path, policy)

@@ -6,12 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tyro
 
 import evaluate
 import train
 from springfoot.agents import studies
+from springfoot.gait import human_gait
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
@@ -22,25 +24,36 @@ COMMANDS = re.findall(
 )
 
 
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A reader's folder, with the file of own curves that the README speaks of."""
+    percent = np.arange(101)
+    knee = np.degrees(human_gait(1.2).mean("knee", percent / 100))
+    rows = [f"{at},{angle:.3f}" for at, angle in zip(percent, knee, strict=True)]
+    (tmp_path / "my_gait.csv").write_text("\n".join(["percent,knee_flexion_deg", *rows]) + "\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page):
     links = re.findall(r"\]\(([^)#]+)", re.sub(r"\s+", " ", page.read_text(encoding="utf-8")))
     assert all(link.startswith("https://") or (page.parent / link).exists() for link in links), links
 
 
-def test_readme_examples_run_in_their_order():
+def test_readme_examples_run_in_their_order(folder):
     code = (
         "\n".join(BLOCKS)
         .replace("1_000_000", "64")
         .replace("SegmentedFootBipedVecEnv(64", "SegmentedFootBipedVecEnv(2")
     )
     code = code.replace("n_steps=128, batch_size=1024", "n_steps=8, batch_size=16").replace("range(500)", "range(50)")
-    assert len(BLOCKS) == 4
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert len(BLOCKS) == 5
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
 
 
-def test_readme_commands_are_understood():
+def test_readme_commands_are_understood(folder):
     programs = {
         "train.py": train.Flags,
         "evaluate.py": evaluate.Flags,

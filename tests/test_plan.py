@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_bvp
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, plan_walk
 from springfoot.gait.feet import turned
@@ -57,6 +56,13 @@ def test_zmp_recomputed_from_the_motion_stays_inside_the_support(arguments):
         assert np.all(zmp >= rear - tolerance) and np.all(zmp <= front + tolerance)
 
 
+def test_planned_zmp_runs_straight_across_and_then_along_the_stance_foot():
+    plan = plan_of()
+    times = np.array([0.0, plan.double_support, plan.step_time])
+    straight = np.interp(PHASE * plan.step_time, times, [0.140 - plan.step_length, -0.020, 0.140])
+    assert np.abs(plan.zmp(PHASE) - straight).max() < 1e-6
+
+
 @PLANS
 def test_speed_closes_and_net_fore_aft_impulse_is_zero(arguments):
     plan = plan_of(*arguments)
@@ -81,53 +87,6 @@ def test_walking_com_height_and_rise_are_peoples():
     _, height = plan.com(PHASE)
     assert 0.965 < height.mean() < 0.985
     assert 0.034 < height.max() - height.min() < 0.041
-
-
-def test_at_constant_height_the_com_is_the_closed_form():
-    plan = plan_of(com_amplitude=0.0)
-    rate = np.sqrt(GRAVITY / plan.motion.height)
-    times = np.array([0.0, plan.double_support, plan.step_time])
-    zmp = np.array([0.140 - plan.step_length, -0.020, 0.140])
-    # Over a straight ZMP x = p + a cosh + b sinh; four conditions: smooth inside, repeating at the ends.
-    first, second = np.diff(times)
-    slopes = np.diff(zmp) / np.diff(times)
-    cosh, sinh = np.cosh(rate * np.array([first, second])), np.sinh(rate * np.array([first, second]))
-    matrix = np.array(
-        [
-            [cosh[0], sinh[0], -1, 0],
-            [sinh[0], cosh[0], 0, -1],
-            [-1, 0, cosh[1], sinh[1]],
-            [0, -1, sinh[1], cosh[1]],
-        ]
-    )
-    kink = (slopes[1] - slopes[0]) / rate
-    a1, b1, a2, b2 = np.linalg.solve(matrix, [0.0, kink, 0.0, -kink])
-    t = PHASE * plan.step_time
-    u = rate * np.where(t < first, t, t - first)
-    expected = np.interp(t, times, zmp) + np.where(
-        t < first, a1 * np.cosh(u) + b1 * np.sinh(u), a2 * np.cosh(u) + b2 * np.sinh(u)
-    )
-    assert np.abs(plan.com(PHASE)[0] - expected).max() < 1e-9
-
-
-def test_at_moving_height_the_com_is_the_periodic_solution_of_the_cart_table():
-    plan = plan_of()
-    times = np.array([0.0, plan.double_support, plan.step_time])
-    zmp = np.array([0.140 - plan.step_length, -0.020, 0.140])
-
-    def motion(t, state):
-        _, height = plan.motion.position(t)
-        _, lift = plan.motion.acceleration(t)
-        return np.stack([state[1], (GRAVITY + lift) / height * (state[0] - np.interp(t, times, zmp))])
-
-    def repeats(start, end):
-        return np.array([end[0] - start[0] - plan.step_length, end[1] - start[1]])
-
-    grid = np.union1d(np.linspace(0, plan.step_time, 401), times)
-    guess = np.stack([np.linspace(-0.33, 0.33, len(grid)), np.full(len(grid), 1.2)])
-    solution = solve_bvp(motion, repeats, grid, guess, tol=1e-9, max_nodes=20_000)
-    assert solution.success
-    assert np.abs(plan.motion.path(grid) - solution.sol(grid)[0]).max() < 1e-8
 
 
 @PLANS
@@ -155,8 +114,7 @@ def test_swing_foot_clears_the_floor_and_lands_two_steps_on_smoothly(arguments):
     feet = plan.feet
     swing = np.linspace(feet.toe_off, 1, 500)[1:-1]
     assert feet.ball_clearance(swing).min() > -1e-12 and feet.heel(swing)[1].min() > -0.003
-    middle = feet.toe_off + np.linspace(0.2, 0.9, 200) * (1 - feet.toe_off)
-    assert feet.ball_clearance(middle).min() > 0.005 * plan.body.length_scale
+    assert 0.015 < feet.clearance / plan.body.length_scale < 0.020
     tiny = 1e-7
     for event, step in ((feet.toe_off, 0.0), (1.0, 2 * plan.step_length)):
         for before, after in zip(feet.ankle(event - tiny), feet.ankle(event + tiny), strict=True):
@@ -199,12 +157,43 @@ def test_joint_angles_rebuild_the_planned_body(arguments):
     np.testing.assert_allclose(com, planned, atol=1e-9)
 
 
-@pytest.mark.parametrize("arguments", [("people",), ("thesis",)], ids=str)
-def test_angles_are_like_peoples_at_1_2(arguments):
-    plan = plan_of(*arguments)
+@pytest.mark.parametrize("cadence", ["people", "thesis"])
+@pytest.mark.parametrize("double_support", [None, 0.06])
+def test_angles_are_like_peoples_at_1_2(cadence, double_support):
+    plan = plan_of(cadence, double_support=double_support)
     assert rms_deg(plan, "thigh") < 4.0
     assert rms_deg(plan, "knee") < 5.0
     assert rms_deg(plan, "ankle") < 7.0
+
+
+def test_step_time_replaces_the_cadence_and_the_step_follows_from_the_speed():
+    plan = plan_of(step_time=0.6)
+    assert plan.step_time == 0.6 and plan.step_length == pytest.approx(0.72) and plan.stride_time == 1.2
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.017, 0.05, 0.15])
+def test_swing_foot_clears_the_floor_by_what_was_asked(clearance):
+    feet = plan_of(clearance=clearance).feet
+    swing = feet.toe_off + np.linspace(0.3, 0.7, 2000) * (1 - feet.toe_off)
+    lowest = min(feet.ball_clearance(swing).min(), feet.heel(swing)[1].min())
+    assert lowest == pytest.approx(clearance, abs=1e-5) and feet.clearance == pytest.approx(clearance, abs=1e-12)
+
+
+def test_on_a_slope_the_com_stays_above_the_foot_and_the_legs_bend():
+    """Uphill the CoM is ahead along the ground by z tan a, hip and ankle flex more; downhill the knee."""
+    slope = np.radians(5)
+    level, up, down = plan_of(), plan_of(slope=slope), plan_of(slope=-slope)
+    assert up.step_length == level.step_length and up.step_time == level.step_time
+    for plan, sign in ((up, 1), (down, -1)):
+        ahead = plan.com(PHASE)[0].mean() - level.com(PHASE)[0].mean()
+        assert ahead == pytest.approx(sign * plan.motion.height * np.tan(slope), rel=0.02)
+        forward, _ = plan.com_acceleration(PHASE)
+        assert abs(forward.mean()) < 1e-6  # what gravity takes on the way the ground gives back
+    stance = np.linspace(0.1, 0.4, 100)
+    ten = np.radians(10)
+    assert up.joint_angles(0.0)["thigh"] > level.joint_angles(0.0)["thigh"] + ten
+    assert up.joint_angles(stance)["ankle"].mean() > level.joint_angles(stance)["ankle"].mean() + ten / 2
+    assert down.joint_angles(stance)["knee"].mean() > level.joint_angles(stance)["knee"].mean() + ten
 
 
 def test_joint_rates_are_the_derivatives_and_phases_wrap():
@@ -244,6 +233,14 @@ def test_leg_inverse_kinematics_reaches_its_target():
         ((1.2,), {"zmp_travel": (-0.10, 0.14)}, "outside by"),
         ((1.2,), {"double_support": 0.0}, "double_support"),
         ((1.2,), {"com_amplitude": 0.2}, "com_amplitude"),
+        ((1.2,), {"slope": np.radians(5.1)}, r"slope must be in \[-0.087\d*, 0.087\d*\] rad"),
+        ((1.2,), {"step_time": 2.0}, r"step_time must be in \[0.25, 1.2\] s"),
+        ((0.4,), {"step_time": 0.25}, r"longer than the ZMP travel, 0.160 m, is 0.060 m too short"),
+        ((1.2,), {"step_time": 1.1}, r"\d\.\d+ m lower than allowed"),
+        ((1.2,), {"clearance": -0.01}, "clearance must be in"),
+        ((1.2,), {"clearance": 0.5}, r"knee bent by .* \d+\.\d deg more than it can"),
+        ((1.2,), {"zmp_travel": 0.1}, "zmp_travel must be 2 numbers"),
+        ((1.2,), {"zmp_travel": (float("nan"), 0.14)}, "zmp_travel start"),
     ],
 )
 def test_impossible_plans_are_refused_with_their_reason(arguments, settings, reason):

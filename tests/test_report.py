@@ -20,7 +20,8 @@ from springfoot.agents.evaluation import CURVES, measure
 from springfoot.agents.recording import load_recording, prepare, record
 from springfoot.agents.report import people_metrics, print_table, write_report
 from springfoot.envs import Biped, BipedSettings
-from springfoot.gait import SpringfootError
+from springfoot.envs.settings import reference_gait, settings_from
+from springfoot.gait import SpringfootError, human_gait
 
 FILES = {
     "metrics.json",
@@ -113,7 +114,7 @@ def test_the_table_is_plain_text_within_80_columns(recording):
 
 
 def test_people_beside_the_model_are_those_of_the_reference():
-    people = people_metrics(1.2, 1.70)
+    people = people_metrics(human_gait(1.2, 1.70))
     assert people["step_length_m"] == pytest.approx(0.655, abs=0.005)
     assert people["toe_off_percent"] == pytest.approx(63.3, abs=0.2)
     assert people["moments"]["ankle"] == pytest.approx(1.31, abs=0.02)
@@ -184,6 +185,20 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
     assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} == FILES
 
 
+def test_a_gait_that_was_measured_here_can_be_walked_after(command, folder, tmp_path):
+    curves = folder / "gait_cycle.csv"
+    code, out, _ = command("schedule", "--episodes", "1", "--seconds", "4.5", "--human", str(curves), "--out", "own")
+    assert code == 0 and "own: gait_cycle.csv; people's instead: nothing" in out
+    metrics = json.loads((tmp_path / "own" / "metrics.json").read_text(encoding="utf-8"))
+    first = rows_of(curves)[0]
+    assert metrics["falls"] == 0
+    assert metrics["reference"]["condition"] == "gait_cycle.csv"
+    assert metrics["reference"]["speed_m_s"] == float(first["speed_m_s"])
+    own = reference_gait(settings_from(**metrics["environment"]))
+    assert np.degrees(own.mean("knee", 0.0)) == pytest.approx(float(first["knee_flexion_deg"]), abs=1.0)
+    assert metrics["cadence_steps_min"] == pytest.approx(120 / own.stride_time, rel=0.05)
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -197,6 +212,8 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
         ["constant", "--equilibrium", "phase"],
         ["constant:1,2,3"],
         ["foreign.safetensors"],
+        ["constant", "--human", "foreign.safetensors"],
+        ["constant", "--human", "nothing.csv"],
     ],
 )
 def test_bad_input_is_one_line_exit_code_2_and_nothing_written(command, tmp_path, words):

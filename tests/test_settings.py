@@ -7,8 +7,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from, settings_to_json
+from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, reference_gait, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
+from springfoot.gait.human import human_gait
+
+OWN = {"name": "my_gait.csv", "strides": 12, "speed": None, "stride_time": 1.2, "step_length": None, "toe_off": 0.63}
+OWN |= {"mean": {"knee": [[0.4, 0], [0.1, -0.2]]}, "sd": {}}
 
 
 def test_json_round_trip_keeps_every_value():
@@ -21,6 +25,7 @@ def test_json_round_trip_keeps_every_value():
         ankle_stiffness_range=[10, 900],
         start=0.25,
         reward_weights={"stiffness": -0.2},
+        human=OWN,
     )
     text = json.dumps(settings_to_json(settings), allow_nan=False)
     assert settings_from(**json.loads(text)) == settings
@@ -38,6 +43,16 @@ def test_defaults_are_the_body_and_speed_of_the_thesis():
     settings = BipedSettings()
     assert (settings.height, settings.mass, settings.speed) == (1.70, 63.0, 1.2)
     assert settings == settings_from()
+
+
+def test_own_data_stand_in_peoples_place_and_people_where_they_are_missing():
+    people, own = human_gait(1.1, 1.8), reference_gait(settings_from(speed=1.1, height=1.8, human=OWN))
+    assert own.condition == "my_gait.csv" and own.stride_time == 1.2
+    assert own.mean("knee", 0.25) == pytest.approx(0.4 + 0.2)
+    assert own.mean("thigh", 0.25) == people.mean("thigh", 0.25)
+    assert "thigh" in own.borrowed and "knee" not in own.borrowed and "knee sd" in own.borrowed
+    nobody = reference_gait(BipedSettings(speed=1.1, height=1.8))
+    assert nobody.mean("knee", 0.25) == people.mean("knee", 0.25) and nobody.borrowed == ()
 
 
 def test_every_setting_is_documented():
@@ -68,6 +83,9 @@ BAD = [
     ({"schedule": [1, 2]}, ["schedule"]),
     ({"schedule": {"k": 1.0}}, ["schedule", "ankle", "toe"]),
     ({"schedule": {"ankle": [[0.0, float("nan"), 0.0]], "toe": [[0.0, 28.0, 0.0]]}}, ["ankle stiffness", "nan"]),
+    ({"human": "my_gait.csv"}, ["human", "read_gait", "'my_gait.csv'"]),
+    ({"human": OWN | {"stride_time": -1.0}}, ["my_gait.csv", "stride_time", "-1"]),
+    ({"human": OWN | {"mean": {"elbow": [[0, 0]]}}}, ["human", "elbow", "knee"]),
     ({"episode_seconds": 0.0}, ["episode_seconds", "0.02"]),
     ({"start": "standing"}, ["start", "'random'", "[0, 1)"]),
     ({"start": 1.0}, ["start", "1.0"]),

@@ -1,6 +1,7 @@
 """train.py as it is typed: flags, refusals that leave nothing behind, Ctrl-C, and going on."""
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -52,9 +53,26 @@ def test_flags_take_the_place_of_the_preset():
     assert config.environment.push_newton == preset.environment.push_newton
 
 
+def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
+    rows = [f"{percent},{10 + percent % 100},{name}" for name in ("slow", "fast") for percent in range(101)]
+    (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
+    own = given(SettingsFlags(human=f"{tmp_path / 'mean.csv'}:fast"))["human"]
+    assert own["name"] == "mean.csv:fast" and list(own["mean"]) == ["knee"]
+    assert train.configured(PRESETS["walk"], {}, {"human": own}).environment.human == own
+    time = [k / 100 for k in range(500)]
+    thigh = [f"{t},{20 * math.cos(2 * math.pi * t)}" for t in time]
+    knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t + 0.3))}" for t in time]
+    for name, curve in (("thigh", thigh), ("knee", knee)):
+        (tmp_path / f"{name}.csv").write_text("\n".join([f"time_s,{name}_flexion_deg", *curve]))
+    own = given(SettingsFlags(human=f"{tmp_path / 'thigh.csv'},{tmp_path / 'knee.csv'}"))["human"]
+    assert own["name"] == "thigh.csv,knee.csv" and own["stride_time"] == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (["--out", "new", "--human", "nothing.csv"], "no file nothing.csv"),
+        (["--out", "new", "--human", "file"], "must be a .csv, .mot, .sto or .c3d file"),
         ([], "give either --out NEW_FOLDER or --resume FOLDER"),
         (["--out", "new", "--resume", "old"], "give either"),
         (["--out", "new", "--mass", "-1"], "mass must be"),

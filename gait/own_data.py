@@ -1,0 +1,255 @@
+"""Curves that users bring: a measured walk in a file -> strides -> mean and spread -> a `HumanGait`.
+
+Read are CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_file`). Heel strikes and toe-offs
+are found in the vertical force; without it, in the events that the file names; without those, in the leg's motion.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .body import MASS_RANGE
+from .c3d_file import c3d_trial
+from .cycle import CONTACT_THRESHOLD_BW, PERCENT
+from .errors import SpringfootError, require_count, require_within
+from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series
+from .motion_files import Curves, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
+from .strides import Walk, cut_strides, together
+
+ACCEPTED = {
+    "speed": (0.1, 4.0, "m/s"),
+    "stride_time": (0.4, 4.0, "s"),
+    "step_length": (0.05, 2.0, "m"),
+    "toe_off": (0.3, 0.9, "of the stride"),
+}
+"""Least and largest of what is known beside the curves."""
+_PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
+_MOST_COEFFICIENTS, _LARGEST = 64, 1e3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OwnGait:
+    """Someone's mean curves and their spread over strides, to stand in people's place; made by `read_gait`."""
+
+    name: str
+    """The file's name."""
+    strides: int | None
+    """Strides averaged, both feet together; this and the next four are None where the file does not tell."""
+    speed: float | None
+    """Walking speed [m/s]."""
+    stride_time: float | None
+    """Heel strike to next heel strike of the same foot [s]."""
+    step_length: float | None
+    """Heel strike to heel strike of the other foot [m]."""
+    toe_off: float | None
+    """Phase of toe-off, 0..1."""
+    mean: Mapping[str, NDArray]
+    """Curve -> coefficients as in `HumanGait.mean_series`; only curves that are in the file."""
+    sd: Mapping[str, NDArray]
+    """As `mean`, of the standard deviation."""
+
+    def gait(self, speed: float, height: float) -> HumanGait:
+        """These curves as a `HumanGait`; what is missing is people's of `height` [m] at `speed` [m/s].
+
+        They are taken as they are, whatever `height` and `speed`. A step length that is not known is what the stride
+        time gives at the own speed, or else at `speed`. `HumanGait.borrowed` names what is people's.
+        """
+        people = human_gait(speed, height)
+        own: dict[str, float] = {}
+        for name in ("stride_time", "step_length", "toe_off"):
+            if (value := getattr(self, name)) is not None:
+                own[name] = value
+        if "stride_time" in own:
+            own.setdefault("step_length", (self.speed or speed) * own["stride_time"] / 2)
+        borrowed = [name for name in ("stride_time", "step_length", "toe_off") if name not in own]
+        borrowed += [name for name in people.mean_series if name not in self.mean]
+        borrowed += [f"{name} sd" for name in people.sd_series if name not in self.sd]
+        return replace(
+            people,
+            speed=self.speed or speed,
+            condition=self.name,
+            clamped=False,
+            mean_series={**people.mean_series, **self.mean},
+            sd_series={**people.sd_series, **self.sd},
+            borrowed=tuple(borrowed),
+            **own,  # type: ignore[arg-type]
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values, SI units: `OwnGait.from_json` is its inverse."""
+        return asdict(self) | {kind: _rows(getattr(self, kind)) for kind in ("mean", "sd")}
+
+    @classmethod
+    def from_json(cls, values: object) -> "OwnGait":
+        """The gait that `to_json` wrote; raises `SpringfootError` for anything else."""
+        names = set(cls.__dataclass_fields__)
+        if not isinstance(values, Mapping) or set(values) != names or not isinstance(values["name"], str):
+            raise SpringfootError(
+                f"human must be what springfoot.gait.read_gait(FILE).to_json() gives ({', '.join(sorted(names))}), "
+                f"got {values!r:.80}"
+            )
+        own = cls(**{**values, "mean": _series("mean", values["mean"]), "sd": _series("sd", values["sd"])})
+        return _checked(own)
+
+
+def read_gait(
+    *paths: str | Path, condition: str | None = None, side: str = "both", mass: float | None = None
+) -> OwnGait:
+    """The mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
+
+    CSV: `percent` 0, 1, ..., 100 and mean curves in our columns (`_sd` behind for the spread; what evaluate.py writes
+    as gait_cycle.csv; `condition` picks one of several below each other), or `time_s` and curves over time, with
+    `_left` or `_right` behind for two legs. OpenSim: .mot, .sto. C3D: needs ezc3d. Strides of both feet are pooled, or
+    those of one `side`. Forces and moments in N and N m are divided by the body weight that the forces bear over whole
+    strides, or by `mass` [kg]; without either, moments are left out. Raises `SpringfootError`, naming file, line and
+    column, for what cannot be read.
+    """
+    if side not in ("both", "left", "right"):
+        raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
+    if mass is not None:
+        require_within("mass", mass, MASS_RANGE, "kg")
+    trials = []
+    for path in map(Path, paths):
+        match path.suffix.lower():
+            case ".csv":
+                table = read_csv(path)
+                if "percent" in table.columns and len(paths) == 1:
+                    return _from_percent(table, condition)
+                trials.append(csv_trial(table))
+            case ".mot" | ".sto":
+                trials.append(opensim_trial(path))
+            case ".c3d":
+                trials.append(c3d_trial(path))
+            case _:
+                raise SpringfootError(f"{path.name} must be a .csv, .mot, .sto or .c3d file")
+    if not trials:
+        raise SpringfootError("read_gait needs a file")
+    return _from_walk(together(trials), side, mass)
+
+
+def _from_percent(table: Table, condition: str | None) -> OwnGait:
+    """Mean curves over percent, as they stand in the file."""
+    table = _one_condition(table, condition)
+    mean, sd = our_columns(table), our_columns(table, "_sd")
+    if not mean:
+        raise SpringfootError(f"{table.name}, line 1: none of the columns {', '.join(COLUMNS.values())}")
+
+    def parameter(column: str) -> float | None:
+        return float(table.numbers(column)[0]) if table.has(column) else None
+
+    toe_off = parameter("toe_off_percent")
+    if toe_off is None and "grf_vertical" in mean:
+        toe_off = float(PERCENT[mean["grf_vertical"] > CONTACT_THRESHOLD_BW].max(initial=0)) + 1
+    strides = parameter("n")
+    own = OwnGait(
+        name=table.name,
+        strides=None if strides is None else round(strides),
+        toe_off=None if toe_off is None else toe_off / 100,
+        mean={},
+        sd={},
+        **{name: parameter(column) for name, column in _PARAMETERS.items()},
+    )
+    return _fitted(own, mean, {name: curve for name, curve in sd.items() if name in mean})
+
+
+def _one_condition(table: Table, condition: str | None) -> Table:
+    """The rows of one gait, percent 0 to 100."""
+    percent, size = table.numbers("percent"), len(PERCENT)
+    for k, ((line, _), value) in enumerate(zip(table.rows, percent, strict=True)):
+        if value != k % size:
+            raise table.error(line, "percent", f"must be {k % size} here (0, 1, ..., 100), got {value:g}")
+    if len(percent) % size:
+        line = table.rows[-1][0]
+        raise table.error(line, "percent", f"ends at {percent[-1]:g}, must go on to 100")
+    blocks = [table.rows[k : k + size] for k in range(0, len(percent), size)]
+    if len(blocks) == 1 and condition is None:
+        return table
+    if "condition" not in table.columns:
+        raise SpringfootError(f"{table.name} holds {len(blocks)} gaits and no column condition to tell them apart")
+    names = [block[0][1][table.columns.index("condition")] for block in blocks]
+    if condition not in names:
+        asked = "name one" if condition is None else f"not {condition!r}"
+        raise SpringfootError(
+            f"{table.name} holds the conditions {', '.join(names)}; {asked}, as {table.name}:{names[0]}"
+        )
+    return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
+
+
+def _from_walk(walk: Walk, side: str, mass: float | None) -> OwnGait:
+    """Strides averaged."""
+    strides, curves = cut_strides(walk, side, mass)
+    mean = {name: values.mean(axis=0) for name, values in curves.items()}
+    for name in ("thigh", "hip"):
+        if name in mean and mean[name][0] <= mean[name][50]:
+            raise SpringfootError(
+                f"{walk.name}: the {name} is behind at heel strike; are left and right, or a sign, interchanged?"
+            )
+    duration = strides[:, 2] - strides[:, 0]
+    stride_time = float(np.mean(duration))
+    own = OwnGait(
+        name=walk.name,
+        strides=len(strides),
+        speed=walk.speed,
+        stride_time=stride_time,
+        step_length=None if walk.speed is None else walk.speed * stride_time / 2,
+        toe_off=float(np.mean((strides[:, 1] - strides[:, 0]) / duration)),
+        mean={},
+        sd={},
+    )
+    return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()})
+
+
+def _fitted(own: OwnGait, mean: Curves, sd: Curves) -> OwnGait:
+    """`own` with series fitted to curves (101,)."""
+
+    def fit(curves: Curves) -> dict[str, list]:
+        rows = {}
+        for name, curve in curves.items():
+            rows[name] = stance_series(curve, own.toe_off or 1.0) if name in FORCES else fourier_series(curve)
+        return rows
+
+    own = _checked(own)
+    refuse_absurd(own.name, mean)
+    return _checked(replace(own, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
+
+
+def _checked(own: OwnGait) -> OwnGait:
+    for name, (low, high, unit) in ACCEPTED.items():
+        if getattr(own, name) is not None:
+            require_within(f"{own.name}: {name}", getattr(own, name), (low, high), unit)
+    if own.strides is not None:
+        require_count(f"{own.name}: strides", own.strides)
+    if own.toe_off is None and any(name in FORCES for name in (*own.mean, *own.sd)):
+        raise SpringfootError(f"{own.name}: forces need a toe_off")
+    return own
+
+
+def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
+    """Coefficients as plain numbers, complex ones as [real, imaginary]."""
+    return {
+        name: (np.stack([np.real(c), np.imag(c)], -1) if np.iscomplexobj(c) else c).tolist()
+        for name, c in series.items()
+    }
+
+
+def _series(kind: str, rows: object) -> dict[str, NDArray]:
+    """The inverse of `_rows`; raises `SpringfootError` for anything else."""
+    if not isinstance(rows, Mapping):
+        raise SpringfootError(f"human {kind} must map curves to coefficients, got {rows!r:.60}")
+    series = {}
+    for name, values in rows.items():
+        if name not in COLUMNS:
+            raise SpringfootError(f"human {kind} has no curve {name!r:.40}; there are {', '.join(COLUMNS)}")
+        try:
+            array = np.array(values, float)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        shape_fits = array.ndim == 1 if name in FORCES else array.ndim == 2 and array.shape[1:] == (2,)
+        if not shape_fits or not 0 < len(array) <= _MOST_COEFFICIENTS or not (np.abs(array) < _LARGEST).all():
+            raise SpringfootError(f"human {kind} {name} must be finite coefficients, got {values!r:.60}")
+        series[name] = array if name in FORCES else array[:, 0] + 1j * array[:, 1]
+    return series
