@@ -70,19 +70,21 @@ class Simulation:
         body: whose model is simulated.
         num: N.
         threads: of the physics; any number gives the same bits.
+        model: the body's model with other options, such as a timestep that divides `WINDOW`, in place of the default.
     """
 
-    def __init__(self, body: Body, num: int, threads: int = 1):
+    def __init__(self, body: Body, num: int, threads: int = 1, model: mujoco.MjModel | None = None):
         self.body = body
         self.num = num
-        self.model = build_model(body)
+        self.model = model or build_model(body)
+        self._substeps = round(WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, threads)
         self._qpos = self._batch.bind("qpos")
         self._qvel = self._batch.bind("qvel")
         self._ctrl = self._batch.bind("ctrl")
         self._time = self._batch.bind("time")
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
-        self._record = {"sensordata": np.empty((num, STEPS_PER_WINDOW, self.model.nsensordata))}
+        self._record = {"sensordata": np.empty((num, self._substeps, self.model.nsensordata))}
         self._geometry = _Geometry(body)
         self._beta = damping_times(body)
         self._limit = torque_limits(body)
@@ -112,12 +114,12 @@ class Simulation:
         ctrl[..., 0], ctrl[..., 1] = stiffness, drive
         warnings = self._batch.warning[:, :, 1].copy()
         if ids is None:
-            sensors = self._batch.rollout(STEPS_PER_WINDOW, record=["sensordata"], out=self._record)["sensordata"]
+            sensors = self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)["sensordata"]
             force = sensors.mean(axis=1)
         else:
             force = np.zeros((self.num, self.model.nsensordata))
             if len(ids):
-                force[ids] = self._batch.rollout(STEPS_PER_WINDOW, record=["sensordata"], ids=ids)["sensordata"].mean(1)
+                force[ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)["sensordata"].mean(1)
         raised = self._batch.warning[:, :, 1] > warnings
         force = force.reshape(self.num, len(SIDES), len(CONTACTS), 3)[..., [0, 2]]
         return self._measure(stiffness, drive, force, _warning_names(raised))
