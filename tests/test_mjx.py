@@ -44,5 +44,5 @@ def test_mjx_walks_as_c_mujoco_does():
         contacts.add(int(data.ncon))
         for mine, theirs in ((data.qpos, here.qpos), (data.qvel, here.qvel)):
             apart = max(apart, float(np.abs(mine - np.asarray(theirs)).max()))
-    assert len(contacts) > 1 and STEPS <= WINDOWS * physics.substeps * (len(walk.actions) - first)
+    assert len(contacts) > 1 and WINDOWS * physics.substeps * (len(walk.actions) - first) >= STEPS
     assert apart < 1e-6
