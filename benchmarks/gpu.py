@@ -96,7 +96,7 @@ def _modules() -> tuple[Any, Any]:
         import warp  # pyright: ignore[reportMissingImports]  # optional
     except ImportError as error:
         raise SpringfootError(f"needs mujoco_warp: pip install springfoot[gpu] ({error})") from None
-    warp.config.quiet = True
+    warp.config.log_level = warp.LOG_WARNING  # or it names every kernel it compiles
     return warp, mujoco_warp
 
 
