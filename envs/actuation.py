@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from springfoot.gait.body import Body
 
+from .kernel import kernel
 from .model import ANKLE
 from .phase import PhaseTable
 from .settings import BipedSettings
@@ -24,8 +25,14 @@ def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDAr
 
 def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
     """Absolute mode: actions in [-1, 1], (..., 2) for ankle and toe, on a log scale to N m/rad."""
+    middle, factor = _log_scale(settings, body)
+    return middle * factor**action
+
+
+def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
+    """Stiffness at action 0 [N m/rad], and by what one action more multiplies it."""
     low, high = stiffness_ranges(settings, body)
-    return low * (high / low) ** ((action + 1.0) / 2.0)
+    return np.sqrt(low * high), np.sqrt(high / low)
 
 
 def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDArray:
@@ -55,13 +62,16 @@ class FootSprings:
         num: int,
         variant: NDArray | None = None,
     ):
-        self._settings, self._body = settings, body
-        self._variant = (np.zeros(num, int) if variant is None else variant)[:, None]
-        self._equilibrium = PhaseTable(equilibrium)
-        self._schedule = PhaseTable(schedule)
+        self._residual = settings.action_mode == "residual"
+        self._middle, self._factor = _log_scale(settings, body)
+        self._equilibrium = PhaseTable(equilibrium, variant)
+        self._schedule = PhaseTable(schedule, variant)
         self.stiffness = np.zeros((num, 2, 2))
+        """(N, side, 2) K [N m/rad]; changed in place."""
         self.equilibrium = np.zeros((num, 2, 2))
+        """(N, side, 2) rest angle [rad]; changed in place."""
         self._fresh = np.ones(num, bool)
+        self._everyone = np.ones(num, bool)
 
     def reset(self, ids: NDArray) -> None:
         """The next change of springs `ids` costs no work."""
@@ -69,34 +79,63 @@ class FootSprings:
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
-        return self._schedule.at(leg_phase, self._variant)
+        return self._schedule.at(leg_phase)
 
     def set_stiffness(
-        self, action: NDArray, leg_phase: NDArray, angle: NDArray, frozen: NDArray | None = None
+        self, action: NDArray, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None
     ) -> NDArray:
         """Take new stiffness from an action (N, 4) at foot angles (N, side, 2); returns the work put in [J].
 
-        Changing K under a deflection x puts 1/2 (K' - K) x^2 into the spring. Rows in the mask `frozen` (N,) stay.
+        Changing K under a deflection x puts 1/2 (K' - K) x^2 into the spring. Without `running` (N,), all change.
         """
         action = action.reshape(self.stiffness.shape)
-        if self._settings.action_mode == "residual":
+        if self._residual:
             stiffness = self.scheduled(leg_phase) * np.exp(action)
         else:
-            stiffness = stiffness_of(action, self._settings, self._body)
-        if frozen is not None:
-            stiffness[frozen] = self.stiffness[frozen]
-        work = 0.5 * (stiffness - self.stiffness) * (self.equilibrium - angle) ** 2
-        self.stiffness = stiffness
-        return np.where(self._fresh[:, None, None], 0.0, work)
-
-    def move_equilibrium(self, leg_phase: NDArray, angle: NDArray, frozen: NDArray | None = None) -> NDArray:
-        """Take the rest angles of the legs' phases; returns the work put in, 1/2 K (x'^2 - x^2) [J]."""
-        equilibrium = self._equilibrium.at(leg_phase, self._variant)
-        if frozen is not None:
-            equilibrium[frozen] = self.equilibrium[frozen]
-        before, after = self.equilibrium - angle, equilibrium - angle
-        work = 0.5 * self.stiffness * (after * after - before * before)
-        self.equilibrium = equilibrium
-        work = np.where(self._fresh[:, None, None], 0.0, work)
-        self._fresh = np.zeros_like(self._fresh) if frozen is None else self._fresh & frozen
+            stiffness = self._middle * self._factor**action
+        running = self._everyone if running is None else running
+        work = np.empty_like(stiffness)
+        _stiffen(stiffness, self.equilibrium, angle, self._fresh, running, self.stiffness, work)
         return work
+
+    def move_equilibrium(self, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None) -> NDArray:
+        """Take the rest angles of the legs' phases; returns the work put in, 1/2 K (x'^2 - x^2) [J]."""
+        equilibrium = self._equilibrium.at(leg_phase)
+        running = self._everyone if running is None else running
+        work = np.empty_like(equilibrium)
+        _move(equilibrium, self.stiffness, angle, self._fresh, running, self.equilibrium, work)
+        return work
+
+    def command(self, stiffness: NDArray, drive: NDArray) -> None:
+        """Put K [N m/rad] and the drive torque K theta_eq [N m] into their places in two arrays (N, side, joint)."""
+        stiffness[..., FEET] = self.stiffness
+        np.multiply(self.stiffness, self.equilibrium, out=drive[..., FEET])
+
+
+@kernel
+def _stiffen(wanted, equilibrium, angle, fresh, running, stiffness, work):
+    for i in range(len(stiffness)):
+        for side in range(2):
+            for joint in range(2):
+                before, after = stiffness[i, side, joint], wanted[i, side, joint]
+                deflection = equilibrium[i, side, joint] - angle[i, side, joint]
+                work[i, side, joint] = 0.0
+                if running[i]:
+                    stiffness[i, side, joint] = after
+                    if not fresh[i]:
+                        work[i, side, joint] = 0.5 * (after - before) * deflection**2
+
+
+@kernel
+def _move(wanted, stiffness, angle, fresh, running, equilibrium, work):
+    for i in range(len(equilibrium)):
+        for side in range(2):
+            for joint in range(2):
+                before = equilibrium[i, side, joint] - angle[i, side, joint]
+                after = wanted[i, side, joint] - angle[i, side, joint]
+                work[i, side, joint] = 0.0
+                if running[i]:
+                    equilibrium[i, side, joint] = wanted[i, side, joint]
+                    if not fresh[i]:
+                        work[i, side, joint] = 0.5 * stiffness[i, side, joint] * (after * after - before * before)
+        fresh[i] = fresh[i] and not running[i]

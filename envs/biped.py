@@ -6,7 +6,8 @@ operations for any N, so a batch of N gives the same bits as N batches of one.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import isfinite
 
 import mujoco
 import numpy as np
@@ -19,12 +20,14 @@ from springfoot.gait.plan import plan_walk
 
 from .actuation import FEET, FootSprings
 from .equilibrium import foot_curves
+from .kernel import kernel
 from .legs import LegConstants, Legs, leg_constants
 from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
+from .outcome import Outcome, report
 from .phase import GRID, PhaseTable, leg_phases
 from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
-from .task import Task
+from .task import ALIVE, Task
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
 """Control windows in one step."""
@@ -51,23 +54,6 @@ class Tick:
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray
     """(N,) which environments ran."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
-    """What one step returns; every array has N rows."""
-
-    observation: NDArray
-    """(N, D) float32."""
-    reward: NDArray
-    """(N,)."""
-    terminated: NDArray
-    """(N,) fallen or diverged."""
-    truncated: NDArray
-    """(N,) out of time."""
-    info: dict[str, NDArray]
-    """Name -> (N,): `stiffness/`, `torque/`, `equilibrium/`, `work/stiffness/`, `work/equilibrium/` + action name;
-    `reward/` + term; `phase/left`, `phase/right`, `time` [s], `speed` [m/s], `termination` ("" or the reason)."""
 
 
 class Biped:
@@ -111,7 +97,6 @@ class Biped:
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else rest
         self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
-        self._ankle = PhaseTable(self.human.mean("ankle", GRID)[:, None])
         self._start = self._start_curves(self.constants[0].period_factor * stride_time)
         self._trunk_pitch = np.deg2rad(self.constants[0].trunk_pitch_deg)
         self._passive_damping = passive_damping(self.body)
@@ -122,9 +107,13 @@ class Biped:
         self.observation_low, self.observation_high = self._task.low, self._task.high
 
         self._random: list[np.random.Generator | None] = [None] * num_envs
+        self._everyone = np.ones(num_envs, bool)
+        self._no_reason = np.full(num_envs, "")
+        self._no_reason.flags.writeable = False
         self._steps = np.zeros(num_envs, int)
         self._last_action = np.zeros((num_envs, len(ACTIONS)))
-        self._force = np.zeros((num_envs, len(SIDES), len(CONTACTS), 2))
+        self._windows = np.zeros((WINDOWS, num_envs, len(SIDES), len(CONTACTS), 2))
+        self._force = np.zeros(self._windows.shape[1:])
         self._pushes = _Pushes(settings, num_envs)
         self._stiffness = np.zeros((num_envs, len(SIDES), len(JOINTS)))
         self._drive = np.zeros_like(self._stiffness)
@@ -171,7 +160,7 @@ class Biped:
             if self.settings.start_noise:
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
             self._pushes.reset(index, random)
-        self._legs.left_phase[ids] = phase
+        self._legs.reset(ids, phase)
         self._springs.reset(ids)
         self._steps[ids] = 0
         self._last_action[ids] = 0.0
@@ -181,82 +170,73 @@ class Biped:
 
     def observe(self) -> NDArray:
         """(N, D) float32 observation of the present."""
-        phase = self._legs.phase
-        return self._task.observe(self._now, phase, self._last_action, self._ankle.at(phase)[..., 0], self._force)
+        return self._task.observe(self._now, self._legs.phase, self._last_action, self._force)
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
         """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
         action = self._decode(actions)
-        running = np.ones(self.num_envs, bool) if active is None else active
-        frozen = None if running.all() else ~running
-        if frozen is not None:
-            action[frozen] = self._last_action[frozen]
-        springs, feet = self._springs, self._now.angle[..., FEET]
-        work_stiffness = springs.set_stiffness(action, self._legs.phase, feet, frozen)
+        running, ids = self._everyone, None
+        if active is not None and not active.all():
+            running, ids = active, np.flatnonzero(active)
+            action = np.where(running[:, None], action, self._last_action)
+        springs, phase = self._springs, self._legs.phase
+        work_stiffness = springs.set_stiffness(action, phase, self._now.angle[..., FEET], running)
         work_equilibrium = np.zeros_like(work_stiffness)
-        forces, diverged = [], self._now.diverged
-        for window in range(WINDOWS):
-            work_equilibrium += self._window(running, frozen)
-            forces.append(self._now.force)
-            # MuJoCo puts what diverged back to its start and steps on: the name must outlive the window
-            diverged = np.where(diverged == "", self._now.diverged, diverged) if window else self._now.diverged
-        self._now = replace(self._now, diverged=diverged)
-        self._steps += running
-        windows = np.stack(forces)
-        force = windows.sum(0) / WINDOWS
-        if frozen is not None:
-            force[frozen] = self._force[frozen]
-        self._force = force
-
-        m, phase = self._now, self._legs.phase
-        terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, windows)
-        self._last_action = action
-        termination = np.where(m.diverged == "", self._task.fallen(m), np.char.add("diverged: ", m.diverged))
-        termination[~running] = ""
-        terminated = termination != ""
-        time = self._steps * STEP_SECONDS
-        truncated = running & ~terminated & (time >= self.settings.episode_seconds - STEP_SECONDS / 2)
-        info = {
-            **_by_action("stiffness", springs.stiffness),
-            **_by_action("torque", m.torque[..., FEET]),
-            **_by_action("equilibrium", springs.equilibrium),
-            **_by_action("work/stiffness", work_stiffness),
-            **_by_action("work/equilibrium", work_equilibrium),
-            **{f"reward/{name}": term for name, term in terms.items()},
-            "phase/left": phase[:, 0],
-            "phase/right": phase[:, 1],
-            "time": time,
-            "speed": m.com_velocity[:, 0],
-            "termination": termination,
-        }
-        reward = np.where(running, self._task.reward(terms), 0.0)
-        return Outcome(observation=self.observe(), reward=reward, terminated=terminated, truncated=truncated, info=info)
-
-    def _decode(self, actions: NDArray) -> NDArray:
-        action = np.asarray(actions, float)
-        if action.shape != (self.num_envs, len(ACTIONS)):
-            raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
-        if not np.isfinite(action).all():
-            raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
-        return np.clip(action, -1.0, 1.0)
-
-    def _window(self, running: NDArray, frozen: NDArray | None) -> NDArray:
-        """One control window; returns the work of moving the foot springs' equilibrium, (N, side, 2) [J]."""
-        springs, legs, m = self._springs, self._legs, self._now
-        phase = legs.phase
-        work = springs.move_equilibrium(phase, m.angle[..., FEET], frozen)
-        self._stiffness[..., : FEET.start], self._drive[..., : FEET.start] = legs.command(m)
-        self._stiffness[..., FEET] = springs.stiffness
-        self._drive[..., FEET] = springs.stiffness * springs.equilibrium
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        before = legs.left_phase
-        ids = None if frozen is None else np.flatnonzero(running)
+        for window in range(WINDOWS):
+            work_equilibrium += self._window(running, ids)
+            self._windows[window] = self._now.force
+        m = self._now
+        terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, self._windows)
+        reward = self._task.reward(terms)
+        terminated, truncated = self._end(running, terms, reward)
+        values = report(
+            *(springs.stiffness, m.torque[..., FEET], springs.equilibrium, work_stiffness, work_equilibrium),
+            *(terms, phase, self._steps * STEP_SECONDS, m.com_velocity[:, 0]),
+        )
+        _average(self._windows, running, self._force)
+        self._last_action = action
+        return Outcome(
+            observation=self.observe(),
+            reward=reward,
+            terminated=terminated,
+            truncated=truncated,
+            values=values,
+            termination=self._reasons(terminated) if terminated.any() else self._no_reason,
+        )
+
+    def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray]:
+        """Count the step; which episodes it terminates and truncates. Who did not take it gets no reward."""
+        terminated, truncated = np.empty((2, self.num_envs), bool)
+        limit = self.settings.episode_seconds / STEP_SECONDS - 0.5  # times are sums of steps
+        _end(limit, running, terms[:, ALIVE], self._steps, reward, terminated, truncated)
+        return terminated, truncated
+
+    def _reasons(self, terminated: NDArray) -> NDArray:
+        """Why those `terminated` (N,) are, "" for the others."""
+        diverged = self._now.diverged
+        reasons = np.where(diverged == "", self._task.fallen(self._now), np.char.add("diverged: ", diverged))
+        return np.where(terminated, reasons, "")
+
+    def _decode(self, actions: NDArray) -> NDArray:
+        action = np.array(actions, float, order="C")
+        if action.shape != (self.num_envs, len(ACTIONS)):
+            raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
+        if not _clip(action):
+            raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
+        return action
+
+    def _window(self, running: NDArray, ids: NDArray | None) -> NDArray:
+        """One control window; returns the work of moving the foot springs' equilibrium, (N, side, 2) [J]."""
+        springs, legs, m = self._springs, self._legs, self._now
+        phase = None if self.on_tick is None else legs.phase.copy()
+        work = springs.move_equilibrium(legs.phase, m.angle[..., FEET], running)
+        legs.command(m, self._stiffness, self._drive)
+        springs.command(self._stiffness, self._drive)
         self._now = self._simulation.advance(self._stiffness, self._drive, ids)
-        legs.advance(self._now)
-        if frozen is not None:
-            legs.left_phase[frozen] = before[frozen]
-        if self.on_tick is not None:
+        legs.advance(self._now, running)
+        if self.on_tick is not None and phase is not None:
             self.on_tick(self._tick(phase, running))
         return work
 
@@ -317,11 +297,39 @@ class _Pushes:
 
     def _draw(self, index: int, random: np.random.Generator) -> None:
         self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)
-        self._force[index] = self._size * random.choice((-1.0, 1.0))
+        self._force[index] = self._size * (-1.0, 1.0)[random.integers(2)]
         self._ends[index] += self._interval
 
 
-def _by_action(name: str, values: NDArray) -> dict[str, NDArray]:
-    """(N, side, 2) -> {name/ankle_left: (N,), ...}."""
-    columns = values.reshape(len(values), len(ACTIONS))
-    return {f"{name}/{action}": columns[:, index] for index, action in enumerate(ACTIONS)}
+@kernel
+def _clip(action):
+    """Clip to [-1, 1] in place; False, and nothing is sure, where one is not a finite number."""
+    for i in range(action.shape[0]):
+        for k in range(action.shape[1]):
+            if not isfinite(action[i, k]):
+                return False
+            action[i, k] = min(max(action[i, k], -1.0), 1.0)
+    return True
+
+
+@kernel
+def _average(windows, running, force):
+    for i in range(len(force)):
+        if running[i]:
+            for side in range(2):
+                for contact in range(3):
+                    for axis in range(2):
+                        total = 0.0
+                        for window in range(len(windows)):
+                            total += windows[window, i, side, contact, axis]
+                        force[i, side, contact, axis] = total / len(windows)
+
+
+@kernel
+def _end(limit, running, alive, steps, reward, terminated, truncated):
+    for i in range(len(running)):
+        terminated[i] = running[i] and alive[i] == 0.0
+        steps[i] += running[i]
+        truncated[i] = running[i] and not terminated[i] and steps[i] >= limit
+        if not running[i]:
+            reward[i] = 0.0

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .biped import Biped
+from .outcome import INFO
 from .rendering import RENDER_MODES, Camera
 from .settings import STEP_SECONDS, check_start, settings_from
 
@@ -178,7 +179,8 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
-        info = {name: value[0].item() for name, value in outcome.info.items()}
+        info: dict[str, Any] = dict(zip(INFO, outcome.values[0].tolist(), strict=True))
+        info["termination"] = str(outcome.termination[0])
         return outcome.observation[0], float(outcome.reward[0]), terminated, truncated, info
 
     def render(self) -> Any:

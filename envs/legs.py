@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from math import sqrt
+from math import radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,8 @@ from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import HumanGait
 
-from .model import HIP, KNEE, damping_times
+from .kernel import kernel
+from .model import HIP, KNEE, LEFT, RIGHT, damping_times
 from .phase import GRID, PhaseTable, leg_phases
 from .simulation import WINDOW, Measurement
 
@@ -137,51 +138,93 @@ class Legs:
         variant: NDArray | None = None,
     ):
         variant = np.zeros(num, int) if variant is None else variant
-        scale, root = body.stiffness_scale, sqrt(body.length_scale)
+        self._gains = np.array([_gains(c, body, stride_time, speed) for c in constants], GAINS)[variant]
+        self._table = PhaseTable(np.stack([leg_curves(c, body, human, stride_time) for c in constants]), variant)
+        self.phase = leg_phases(np.zeros(num))
+        """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
 
-        def of_each(value):
-            return np.array([value(c) for c in constants], float)[variant]
+    def reset(self, ids: NDArray, left_phase: NDArray) -> None:
+        """Put the left legs of `ids` (K,) at phases (K,)."""
+        self.phase[ids] = leg_phases(left_phase)
 
-        self._variant = variant[:, None]
-        self._speed = speed
-        self._touchdown_force = TOUCHDOWN_LOAD * body.mass * GRAVITY
-        self._rate = of_each(lambda c: WINDOW / (c.period_factor * stride_time))
-        self._rate_gain = of_each(lambda c: c.period_speed_gain / root)
-        self._pitch = of_each(lambda c: np.deg2rad(c.trunk_pitch_deg))
-        self._trunk_stiffness = of_each(lambda c: c.trunk_stiffness * scale)
-        self._trunk_damping = of_each(lambda c: c.trunk_damping * scale * root)
-        self._speed_torque = of_each(lambda c: c.speed_torque * scale / root)
-        self._swing_gain = of_each(lambda c: c.swing_speed_gain / root)
-        self._table = PhaseTable(np.stack([leg_curves(c, body, human, stride_time) for c in constants]))
-        self.left_phase = np.zeros(num)
+    def advance(self, m: Measurement, running: NDArray) -> None:
+        """Let one window pass for those `running` (N,): the phase runs on, waits for a late foot, and starts anew
+        with the one that lands."""
+        _advance(self._gains, m.com_velocity, m.force, running, self.phase)
 
-    @property
-    def phase(self) -> NDArray:
-        """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike."""
-        return leg_phases(self.left_phase)
+    def command(self, m: Measurement, stiffness: NDArray, drive: NDArray) -> None:
+        """Put hip and knee stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] into their places in
+        two arrays (N, side, joint)."""
+        curves = self._table.at(self.phase)
+        _command(self._gains, curves, m.root, m.root_velocity, m.com_velocity, stiffness, drive)
 
-    def advance(self, m: Measurement) -> None:
-        """Let one window pass: the phase runs on, waits for a late foot, and starts anew with the one that lands."""
-        phase = self.left_phase
-        rate = self._rate * (1.0 + self._rate_gain * (m.com_velocity[:, 0] - self._speed))
-        waiting = np.where(phase < 0.5, 0.5, 1.0) - HOLD
-        phase = np.minimum(phase + np.maximum(rate, 0.0), np.maximum(waiting, phase))
-        landed = m.force[..., 1].sum(-1) > self._touchdown_force
-        strike = landed & (leg_phases(phase) > TOUCHDOWN_PHASE)
-        self.left_phase = np.where(strike[:, 0], 0.0, np.where(strike[:, 1], 0.5, phase))
 
-    def command(self, m: Measurement) -> tuple[NDArray, NDArray]:
-        """Hip and knee stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m], each (N, side, 2)."""
-        curves = self._table.at(self.phase, self._variant)
-        stance = curves[..., 0]
-        stiffness, drive = curves[..., 1:3], curves[..., 3:5]
-        too_fast = (m.com_velocity[:, 0] - self._speed)[:, None]
-        pitch, pitch_rate = m.root[:, 2], m.root_velocity[:, 2]
-        trunk = -self._trunk_stiffness * (pitch - self._pitch) - self._trunk_damping * pitch_rate
-        on_trunk = trunk[:, None] + self._speed_torque[:, None] * too_fast
-        placement = self._swing_gain[:, None] * too_fast  # a faster body puts its foot further ahead
-        drive[..., HIP] += stance * on_trunk + (1.0 - stance) * stiffness[..., HIP] * placement
-        return stiffness, drive
+GAINS = np.dtype(
+    [
+        ("speed", float),  # commanded [m/s]
+        ("touchdown", float),  # vertical force of a foot that has landed [N]
+        ("rate", float),  # phase in one window
+        ("rate_gain", float),  # its rise for each m/s too fast [s/m]
+        ("pitch", float),  # held trunk pitch [rad]
+        ("trunk_stiffness", float),  # [N m/rad]
+        ("trunk_damping", float),  # [N m s/rad]
+        ("speed_torque", float),  # [N s]
+        ("swing_gain", float),  # [rad s/m]
+    ]
+)
+"""Constants of one body's legs, scaled to it."""
+
+
+def _gains(c: LegConstants, body: Body, stride_time: float, speed: float) -> tuple[float, ...]:
+    scale, root = body.stiffness_scale, sqrt(body.length_scale)
+    return (
+        speed,
+        TOUCHDOWN_LOAD * body.mass * GRAVITY,
+        WINDOW / (c.period_factor * stride_time),
+        c.period_speed_gain / root,
+        radians(c.trunk_pitch_deg),
+        c.trunk_stiffness * scale,
+        c.trunk_damping * scale * root,
+        c.speed_torque * scale / root,
+        c.swing_speed_gain / root,
+    )
+
+
+@kernel
+def _advance(gains, com_velocity, force, running, phase):
+    for i in range(len(phase)):
+        if not running[i]:
+            continue
+        gain, left = gains[i], phase[i, LEFT]
+        rate = gain.rate * (1.0 + gain.rate_gain * (com_velocity[i, 0] - gain.speed))
+        waiting = (0.5 if left < 0.5 else 1.0) - HOLD
+        left = min(left + max(rate, 0.0), max(waiting, left))
+        right = (left + 0.5) % 1.0
+        if left > TOUCHDOWN_PHASE and _load(force[i, LEFT]) > gain.touchdown:
+            left = 0.0
+        elif right > TOUCHDOWN_PHASE and _load(force[i, RIGHT]) > gain.touchdown:
+            left = 0.5
+        phase[i, LEFT], phase[i, RIGHT] = left, (left + 0.5) % 1.0
+
+
+@kernel
+def _load(force):
+    return force[0, 1] + force[1, 1] + force[2, 1]
+
+
+@kernel
+def _command(gains, curves, root, root_velocity, com_velocity, stiffness, drive):
+    for i in range(len(gains)):
+        gain = gains[i]
+        too_fast = com_velocity[i, 0] - gain.speed
+        trunk = -gain.trunk_stiffness * (root[i, 2] - gain.pitch) - gain.trunk_damping * root_velocity[i, 2]
+        on_trunk = trunk + gain.speed_torque * too_fast
+        placement = gain.swing_gain * too_fast  # a faster body puts its foot further ahead
+        for side in range(2):
+            stance, hip, knee = curves[i, side, 0], curves[i, side, 1], curves[i, side, 2]
+            stiffness[i, side, HIP], stiffness[i, side, KNEE] = hip, knee
+            drive[i, side, HIP] = curves[i, side, 3] + (stance * on_trunk + (1.0 - stance) * hip * placement)
+            drive[i, side, KNEE] = curves[i, side, 4]
 
 
 def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:

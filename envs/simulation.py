@@ -6,6 +6,7 @@ physics step); contact forces are the mean over the window's physics steps, so t
 """
 
 from dataclasses import dataclass
+from math import cos, sin
 
 import mujoco
 import numpy as np
@@ -14,11 +15,15 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
 
+from .kernel import kernel
 from .model import (
+    ANKLE,
     CONTACTS,
     JOINTS,
+    KNEE,
     SIDES,
     TIMESTEP,
+    TOE,
     build_model,
     contact_offsets,
     damping_times,
@@ -30,7 +35,7 @@ WINDOW = 0.01
 STEPS_PER_WINDOW = round(WINDOW / TIMESTEP)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(kw_only=True, eq=False)  # making it frozen takes longer than measuring
 class Measurement:
     """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
 
@@ -60,7 +65,7 @@ class Measurement:
     force: NDArray
     """(N, side, contact, 2) ground reaction force (forward, up) on each, mean over the window [N]."""
     diverged: NDArray
-    """(N,) names of MuJoCo warnings raised in the window, "" where all is well."""
+    """(N,) name of the first MuJoCo warning raised since the episode began, "" where all is well."""
 
 
 class Simulation:
@@ -81,13 +86,17 @@ class Simulation:
         self._batch = Batch(self.model, num, threads)
         self._qpos = self._batch.bind("qpos")
         self._qvel = self._batch.bind("qvel")
-        self._ctrl = self._batch.bind("ctrl")
-        self._time = self._batch.bind("time")
+        self._ctrl = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
+        self._time = self._batch.bind("time").reshape(num)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
-        self._record = {"sensordata": np.empty((num, self._substeps, self.model.nsensordata))}
-        self._geometry = _Geometry(body)
-        self._beta = damping_times(body)
-        self._limit = torque_limits(body)
+        self._warnings = self._batch.warning[:, :, 1]
+        self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
+        self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
+        self._segments = _segments(body)
+        self._everyone = np.arange(num)
+        self._no_torque = np.zeros((num, len(SIDES), len(JOINTS)))
+        self._no_warning = np.full(num, "", dtype=_NAME)
+        self._no_warning.flags.writeable = False
 
     def reset(self, ids: NDArray, root: NDArray, root_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
         """Put simulations `ids` (K,) into the states given: (K, 3), (K, 3), (K, side, joint), (K, side, joint)."""
@@ -110,25 +119,21 @@ class Simulation:
         Returns:
             The measurement at the window's end, of all N.
         """
-        ctrl = self._ctrl.reshape(self.num, len(SIDES), len(JOINTS), 2)
-        ctrl[..., 0], ctrl[..., 1] = stiffness, drive
-        warnings = self._batch.warning[:, :, 1].copy()
+        self._ctrl[..., 0], self._ctrl[..., 1] = stiffness, drive
         if ids is None:
-            sensors = self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)["sensordata"]
-            force = sensors.mean(axis=1)
+            self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)
         else:
-            force = np.zeros((self.num, self.model.nsensordata))
+            self._sensors[:] = 0.0
             if len(ids):
-                force[ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)["sensordata"].mean(1)
-        raised = self._batch.warning[:, :, 1] > warnings
-        force = force.reshape(self.num, len(SIDES), len(CONTACTS), 3)[..., [0, 2]]
-        return self._measure(stiffness, drive, force, _warning_names(raised))
+                self._record["sensordata"][ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)[
+                    "sensordata"
+                ]
+        return self._measure(stiffness, drive)
 
     def measure(self) -> Measurement:
         """The state as it stands, with no torque and no force: what is known right after a reset."""
-        none = np.zeros((self.num, len(SIDES), len(JOINTS)))
-        force = np.zeros((self.num, len(SIDES), len(CONTACTS), 2))
-        return self._measure(none, none, force, np.full(self.num, "", dtype=_NAME))
+        self._sensors[:] = 0.0
+        return self._measure(self._no_torque, self._no_torque)
 
     def data(self, index: int) -> mujoco.MjData:
         """A copy of one simulation's state after `mj_forward`, to render or to inspect."""
@@ -136,95 +141,155 @@ class Simulation:
         mujoco.mj_forward(self.model, data)
         return data
 
-    def _measure(self, stiffness: NDArray, drive: NDArray, force: NDArray, diverged: NDArray) -> Measurement:
-        position, rate = self._qpos.copy(), self._qvel.copy()
-        angle = position[:, 3:].reshape(self.num, len(SIDES), len(JOINTS))
-        velocity = rate[:, 3:].reshape(self.num, len(SIDES), len(JOINTS))
-        torque = drive - stiffness * (angle + self._beta * velocity)
-        com, com_velocity, ankle, contact = self._geometry.locate(position, rate)
-        return Measurement(
-            time=self._time.reshape(self.num).copy(),
-            root=position[:, :3],
-            root_velocity=rate[:, :3],
-            angle=angle,
-            velocity=velocity,
-            torque=np.clip(torque, -self._limit, self._limit),
-            com=com,
-            com_velocity=com_velocity,
-            ankle=ankle,
-            contact=contact,
-            force=force,
-            diverged=diverged,
+    def _measure(self, stiffness: NDArray, drive: NDArray) -> Measurement:
+        legs, feet = (self.num, len(SIDES), len(JOINTS)), (self.num, len(SIDES), len(CONTACTS), 2)
+        m = Measurement(
+            time=self._time.copy(),
+            root=np.empty((self.num, 3)),
+            root_velocity=np.empty((self.num, 3)),
+            angle=np.empty(legs),
+            velocity=np.empty(legs),
+            torque=np.empty(legs),
+            com=np.empty((self.num, 2)),
+            com_velocity=np.empty((self.num, 2)),
+            ankle=np.empty((self.num, len(SIDES), 2)),
+            contact=np.empty(feet),
+            force=np.empty(feet),
+            diverged=_names(self._warnings) if _any_raised(self._warnings) else self._no_warning,
         )
+        _read_joints(self._segments, self._qpos, self._qvel, stiffness, drive, m.angle, m.velocity, m.torque)
+        _average(self._sensors, m.force)
+        state = self._qpos, self._qvel, m.root, m.root_velocity
+        _locate(self._segments, *state, m.com, m.com_velocity, m.ankle, m.contact)
+        return m
 
 
 _NAME = "U32"
 
 
-def _warning_names(raised: NDArray) -> NDArray:
-    """(N, warning) -> (N,) the first warning's name without its prefix, or ""."""
-    names = np.full(len(raised), "", dtype=_NAME)
-    if raised.any():
-        for index in np.flatnonzero(raised.any(axis=1)):
-            names[index] = mujoco.mjtWarning(int(raised[index].argmax())).name.removeprefix("mjWARN_")
+def _names(warnings: NDArray) -> NDArray:
+    """(N, warning) counters -> (N,) the first raised one's name without its prefix, or ""."""
+    names = np.full(len(warnings), "", dtype=_NAME)
+    for index in np.flatnonzero(warnings.any(axis=1)):
+        names[index] = mujoco.mjtWarning(int(warnings[index].argmax())).name.removeprefix("mjWARN_")
     return names
 
 
-class _Geometry:
-    """Planar forward kinematics of one body, as sums over segments.
+@kernel
+def _any_raised(warnings):
+    for i in range(warnings.shape[0]):
+        for kind in range(warnings.shape[1]):
+            if warnings[i, kind] > 0:
+                return True
+    return False
 
-    A segment turned up-forward by the angle s (a thigh's flexion, a foot's toes-up pitch) carries the local offset
-    (u, w) to (u cos s - w sin s, u sin s + w cos s). The CoM is the hip plus one such offset for each segment: its
-    own share of the mass times its CoM, plus all that hangs from its far end.
+
+@kernel
+def _read_joints(segments, position, rate, stiffness, drive, angle, velocity, torque):
+    beta, limit = segments[0].beta, segments[0].limit
+    for i in range(len(torque)):
+        for side in range(2):
+            for joint in range(4):
+                theta, theta_rate = position[i, 3 + 4 * side + joint], rate[i, 3 + 4 * side + joint]
+                spring = drive[i, side, joint] - stiffness[i, side, joint] * (theta + beta[joint] * theta_rate)
+                angle[i, side, joint], velocity[i, side, joint] = theta, theta_rate
+                torque[i, side, joint] = min(max(spring, -limit[joint]), limit[joint])
+
+
+@kernel
+def _average(sensors, force):
+    steps = sensors.shape[1]
+    for i in range(len(force)):
+        for side in range(2):
+            for contact in range(3):
+                forward = up = 0.0
+                for step in range(steps):
+                    forward += sensors[i, step, side, contact, 0]
+                    up += sensors[i, step, side, contact, 2]
+                force[i, side, contact, 0], force[i, side, contact, 1] = forward / steps, up / steps
+
+
+SEGMENTS = np.dtype(
+    [
+        ("trunk", float, 2),  # the trunk's part of hip -> CoM [m], in its own frame (forward, up)
+        ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see _segments
+        ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
+        ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
+        ("radius", float, len(CONTACTS)),
+        ("beta", float, len(JOINTS)),  # [s]
+        ("limit", float, len(JOINTS)),  # [N m]
+    ]
+)
+"""A body as its kinematics and springs need it."""
+
+
+def _segments(body: Body) -> NDArray:
+    """(1,) of `SEGMENTS`.
+
+    The CoM is the hip plus one offset for each segment, turned with it: its own share of the mass times its CoM, plus
+    the share of all that hangs from its far end times that end.
     """
+    foot, toe = body.foot_mass, body.toe_mass
+    beyond_knee = body.shank_mass + foot + toe
+    forward, below = body.foot_com
+    toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
+    offsets = contact_offsets(body)
+    segments = np.zeros(1, SEGMENTS)
+    segments["trunk"] = np.array([0.0, body.trunk_mass * body.trunk_com_above_hip]) / body.mass
+    segments["part"] = (
+        np.array(
+            [
+                (0.0, -(body.thigh_mass * body.thigh_com + beyond_knee * body.thigh_length)),
+                (0.0, -(body.shank_mass * body.shank_com + (foot + toe) * body.shank_length)),
+                (foot * forward + toe * toe_joint[0], -foot * below + toe * toe_joint[1]),
+                (toe * body.toe_com, 0.0),
+            ]
+        )
+        / body.mass
+    )
+    segments["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
+    segments["contact"] = [(forward, up) for forward, up, _ in offsets.values()]
+    segments["radius"] = [radius for *_, radius in offsets.values()]
+    segments["beta"], segments["limit"] = damping_times(body), torque_limits(body)
+    return segments
 
-    def __init__(self, body: Body):
-        foot, toe = body.foot_mass, body.toe_mass
-        beyond_knee = body.shank_mass + foot + toe
-        forward, below = body.foot_com
-        drop = body.ankle_height - body.toe_joint_height
-        thigh = (0.0, -(body.thigh_mass * body.thigh_com + beyond_knee * body.thigh_length))
-        shank = (0.0, -(body.shank_mass * body.shank_com + (foot + toe) * body.shank_length))
-        ankle = (foot * forward + toe * body.ankle_to_toe_joint, -(foot * below + toe * drop))
-        joint = (toe * body.toe_com, 0.0)
-        trunk = (0.0, body.trunk_mass * body.trunk_com_above_hip)
-        self._com = np.array([trunk, *([thigh, shank, ankle, joint] * len(SIDES))]).T / body.mass  # (2, segment)
-        self._thigh, self._shank = body.thigh_length, body.shank_length
-        offsets = contact_offsets(body)
-        lowest = np.array([(u, w) for u, w, _ in offsets.values()])
-        self._radius = np.array([radius for *_, radius in offsets.values()])
-        # contact centres = ankle + foot-frame offset (heel; ball; toe joint) + toe-frame offset (0; 0; toe sphere)
-        self._foot = np.array([lowest[0], lowest[1], (body.ankle_to_toe_joint, -drop)]).T
-        self._toe = np.array([(0, 0), (0, 0), lowest[2]], float).T
 
-    def locate(self, position: NDArray, rate: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(N, 11) positions and rates -> com (N, 2), its velocity (N, 2), ankles (N, side, 2), contacts."""
-        num = len(position)
-        turn = self._segment_angles(position)
-        spin = self._segment_angles(rate)
-        cos, sin = np.cos(turn), np.sin(turn)
-        u, w = self._com
-        across, up = cos * u - sin * w, sin * u + cos * w  # each segment's part of hip -> CoM
-        com = np.stack([position[:, 0] + across.sum(-1), position[:, 1] + up.sum(-1)], axis=-1)
-        velocity = np.stack([rate[:, 0] - (up * spin).sum(-1), rate[:, 1] + (across * spin).sum(-1)], axis=-1)
-        cos, sin = (value[:, 1:].reshape(num, len(SIDES), len(JOINTS)) for value in (cos, sin))
-        ankle_x = position[:, :1] + self._thigh * sin[..., 0] + self._shank * sin[..., 1]
-        ankle_z = position[:, 1:2] - self._thigh * cos[..., 0] - self._shank * cos[..., 1]
-        (fu, fw), (tu, tw) = self._foot, self._toe
-        foot_cos, foot_sin, toe_cos, toe_sin = cos[..., 2:3], sin[..., 2:3], cos[..., 3:4], sin[..., 3:4]
-        x = ankle_x[..., None] + foot_cos * fu - foot_sin * fw + toe_cos * tu - toe_sin * tw
-        z = ankle_z[..., None] + foot_sin * fu + foot_cos * fw + toe_sin * tu + toe_cos * tw - self._radius
-        return com, velocity, np.stack([ankle_x, ankle_z], axis=-1), np.stack([x, z], axis=-1)
+@kernel
+def _locate(segments, position, rate, root, root_velocity, com, com_velocity, ankle, contact):
+    """Planar forward kinematics.
 
-    @staticmethod
-    def _segment_angles(position: NDArray) -> NDArray:
-        """(N, 11) -> (N, 9) turn of trunk, then thigh, shank, foot, toe of each side, towards up-forward."""
-        turn = np.empty((len(position), 1 + len(SIDES) * len(JOINTS)))
-        turn[:, 0] = -position[:, 2]
-        joints = position[:, 3:].reshape(len(position), len(SIDES), len(JOINTS))
-        legs = turn[:, 1:].reshape(joints.shape)
-        legs[..., 0] = joints[..., 0] - position[:, 2:3]
-        legs[..., 1] = legs[..., 0] - joints[..., 1]
-        legs[..., 2] = legs[..., 1] + joints[..., 2]
-        legs[..., 3] = legs[..., 2] + joints[..., 3]
-        return turn
+    A segment turned up-forward by s (a thigh's flexion, a foot's toes-up pitch) carries the offset (u, w) in its frame
+    to (u cos s - w sin s, u sin s + w cos s), and spinning at ds/dt moves it at ds/dt (-z, x).
+    """
+    body = segments[0]
+    for i in range(len(root)):
+        for k in range(3):
+            root[i, k], root_velocity[i, k] = position[i, k], rate[i, k]
+        hip_x, hip_z, pitch = position[i, 0], position[i, 1], position[i, 2]
+        x, z = _turned(body.trunk, cos(-pitch), sin(-pitch))
+        com_x, com_z = hip_x + x, hip_z + z
+        com_rate_x, com_rate_z = rate[i, 0] + z * rate[i, 2], rate[i, 1] - x * rate[i, 2]
+        for side in range(2):
+            joint_x, joint_z, turn, spin = hip_x, hip_z, -pitch, -rate[i, 2]
+            for joint in range(4):
+                sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
+                turn += sign * position[i, 3 + 4 * side + joint]
+                spin += sign * rate[i, 3 + 4 * side + joint]
+                c, s = cos(turn), sin(turn)
+                x, z = _turned(body.part[joint], c, s)
+                com_x, com_z = com_x + x, com_z + z
+                com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
+                if joint == ANKLE:
+                    ankle[i, side, 0], ankle[i, side, 1] = joint_x, joint_z
+                for k in range(3):
+                    if joint == (TOE if k == 2 else ANKLE):  # heel and ball are on the foot
+                        x, z = _turned(body.contact[k], c, s)
+                        contact[i, side, k, 0], contact[i, side, k, 1] = joint_x + x, joint_z + z - body.radius[k]
+                x, z = _turned(body.end[joint], c, s)
+                joint_x, joint_z = joint_x + x, joint_z + z
+        com[i, 0], com[i, 1], com_velocity[i, 0], com_velocity[i, 1] = com_x, com_z, com_rate_x, com_rate_z
+
+
+@kernel
+def _turned(offset, c, s):
+    return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c

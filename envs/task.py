@@ -1,11 +1,11 @@
-"""The walking task: observation, named reward terms and falls, as NumPy on arrays over N environments.
+"""The walking task: observation, named reward terms and falls, on arrays over N environments.
 
 Row i of every result depends on row i of the arguments alone, by the same operations for any N: a batch of N
-gives the same bits as N batches of one. Hence sums only over a few elements, and no matrix products.
+gives the same bits as N batches of one.
 """
 
-from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from math import exp, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,9 @@ from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.human import ANGLES, HumanGait
 from springfoot.gait.plan import WalkPlan
 
-from .model import ACTIONS, ANKLE, CONTACTS, HIP, JOINTS, KNEE, LEFT, RIGHT, SIDES, TOE
+from .kernel import kernel
+from .model import ANKLE, HIP, JOINTS, KNEE, LEFT, RIGHT, TOE
+from .observation import OBSERVATION, Observer
 from .phase import GRID, PhaseTable
 from .settings import DEFAULT_WEIGHTS, STEP_SECONDS, BipedSettings
 
@@ -47,154 +49,71 @@ FORCE_TOLERANCE = 0.15
 """Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
 
 
-class Entry(NamedTuple):
-    """One entry of the observation: name, unit it is divided by, bounds it is clipped to, and its meaning."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    meaning: str
-
-
-def _entries() -> tuple[Entry, ...]:
-    legs = [(side, joint) for side in SIDES for joint in JOINTS]
-    sign: dict[str, str] = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
-    return (
-        Entry("hip_height", "leg length", 0.0, 2.0, "height of the hip"),
-        Entry("pitch", "rad", -3.2, 3.2, "pitch of the trunk, forward positive"),
-        *(Entry(f"{joint}_{side}", "rad", -3.2, 3.2, f"angle, {sign[joint]} positive") for side, joint in legs),
-        Entry("hip_velocity_x", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, forward positive"),
-        Entry("hip_velocity_z", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, up positive"),
-        Entry("pitch_rate", "sqrt(g/l)", -15.0, 15.0, "rate of the pitch, forward positive"),
-        *(
-            Entry(f"{joint}_rate_{side}", "sqrt(g/l)", -15.0, 15.0, f"angular rate, {sign[joint]} positive")
-            for side, joint in legs
-        ),
-        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase"),
-        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase"),
-        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase"),
-        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase"),
-        *(
-            Entry(
-                f"load_{contact}_{side}",
-                "body weight",
-                0.0,
-                5.0,
-                "vertical force, mean of the step",
-            )
-            for side in SIDES
-            for contact in CONTACTS
-        ),
-        Entry("com_x_error", "leg length", -2.0, 2.0, "CoM minus plan, forward positive"),
-        Entry("com_z_error", "leg length", -2.0, 2.0, "CoM minus plan, up positive"),
-        Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
-        *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before") for name in ACTIONS),
-        *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive") for side in SIDES),
-        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right"),
-        Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)"),
-        Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m"),
-        Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg"),
-    )
-
-
-OBSERVATION = _entries()
-"""Every entry of the observation, in order; l is the leg length (hip to floor when standing)."""
+CURVES = np.dtype(
+    [
+        ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
+        ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
+        ("force_sd", float, 2),  # its standard deviation
+        ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
+        ("speed", float),  # the plan's forward speed of the CoM [m/s]
+    ]
+)
+"""What people and the plan do at a phase of one leg's stride; `com` and `speed` where its stance began last."""
+SCALES = np.dtype(
+    [
+        ("min_hip_height", float),  # [m]
+        ("stride_length", float),  # of the plan [m]
+        ("tolerance", float, 3),  # of the CoM's x, z [m] and forward speed [m/s]
+        ("pose_share", float, len(JOINTS)),
+        ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
+        ("stiffness_share", float, 2),
+        ("weight", float),  # of the body [N]
+    ]
+)
+"""What one body in one task is measured by."""
+TERMS = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
+"""The reward's terms, in the order in which they are summed."""
+ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
 
 
 class Task:
-    """What is seen, what is rewarded and what counts as a fall, for one body and plan; holds no state."""
+    """What is seen, what is rewarded and what counts as a fall, for one body and plan."""
 
     def __init__(self, settings: BipedSettings, body: Body, plan: WalkPlan, human: HumanGait) -> None:
-        length, leg = body.length_scale, body.leg_length
+        length = body.length_scale
         self.names = tuple(entry.name for entry in OBSERVATION)
-        self.low = np.array([entry.low for entry in OBSERVATION], np.float32)
-        self.high = np.array([entry.high for entry in OBSERVATION], np.float32)
+        self._observer = Observer(body, settings.speed)
+        self.low, self.high = self._observer.low, self._observer.high
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
 
-        self._weight = body.mass * GRAVITY
-        unit = {
-            "1": 1.0,
-            "rad": 1.0,
-            "leg length": leg,
-            "sqrt(g l)": sqrt(GRAVITY * leg),
-            "sqrt(g/l)": sqrt(GRAVITY / leg),
-            "body weight": self._weight,
-        }
-        self._units = np.array([unit[entry.unit] for entry in OBSERVATION])
-        self._command = np.array([settings.speed, length, body.mass_scale])
-        self._min_hip_height = MIN_HIP_HEIGHT * length
-        self._tracking_tolerance = np.array(
-            [COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)]
-        )
-        self._stiffness_unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
-        self._stiffness_share = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
-        self._pose_share = np.array([POSE_WEIGHTS[joint] for joint in range(len(JOINTS))])
-        self._half_step = 0.5 * STEP_SECONDS / plan.stride_time
+        self._weights = np.array([self.weights[name] for name in TERMS])
+        self._curves = PhaseTable(_curves(plan, human).view(float).reshape(len(GRID), -1))
+        self._scales = np.zeros(1, SCALES)
+        self._scales["min_hip_height"] = MIN_HIP_HEIGHT * length
+        self._scales["stride_length"] = 2 * plan.step_length
+        self._scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
+        self._scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
+        self._scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
+        self._scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
+        self._scales["weight"] = body.mass * GRAVITY
 
-        self._step_length = plan.step_length
-        self._plan = PhaseTable(_com_curves(plan))
-        self._pose = PhaseTable(np.stack([human.mean(name, GRID) for name in ANGLES], -1))
-        force = ("grf_forward", "grf_vertical")
-        mean, sd = [human.mean(name, GRID) for name in force], [human.sd(name, GRID) for name in force]
-        self._force = PhaseTable(np.stack(mean + sd, -1))
-
-    def observe(
-        self,
-        m: "Measurement",
-        leg_phase: NDArray,
-        last_action: NDArray,
-        planned_ankle: NDArray,
-        force: NDArray,
-    ) -> NDArray:
+    def observe(self, m: "Measurement", leg_phase: NDArray, last_action: NDArray, force: NDArray) -> NDArray:
         """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
 
-        `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `planned_ankle` (N, 2) [rad]; `force`
-        (N, 2, 3, 2) on the body [N], mean over the step. What is not a number reads as the upper bound.
+        `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean
+        over the step. What is not a number reads as the upper bound.
         """
-        n = len(leg_phase)
-        left_leads = leg_phase[:, LEFT] < 0.5
-        angle = 2 * np.pi * leg_phase[:, LEFT]
-        sin, cos = np.sin(angle), np.cos(angle)
-        cycle = np.stack((sin, cos, 2 * sin * cos, 1 - 2 * sin * sin), -1)
-        seen = np.concatenate(
-            (
-                m.root[:, 1:],
-                m.angle.reshape(n, -1),
-                m.root_velocity,
-                m.velocity.reshape(n, -1),
-                cycle,
-                force[..., 1].reshape(n, -1),
-                self.tracking(m, leg_phase),
-                last_action,
-                planned_ankle,
-                np.where(left_leads, 1.0, -1.0)[:, None],
-                np.broadcast_to(self._command, (n, len(self._command))),
-            ),
-            axis=1,
-        )
-        seen /= self._units
-        return np.fmax(np.fmin(seen, self.high), self.low).astype(np.float32)
+        curves = self._at(leg_phase)
+        error, planned_ankle = self._error(m, leg_phase, curves), curves["pose"][..., ANKLE]
+        return self._observer.observe(m, leg_phase, error, planned_ankle, last_action, force)
 
     def planned_com(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """The plan's CoM (x in the world, z) [m], shape (N, 2)."""
-        return self._reference(m, leg_phase)[:, :2]
+        return m.com - self.tracking(m, leg_phase)[:, :2]
 
     def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3)."""
-        return np.concatenate((m.com, m.com_velocity[:, :1]), axis=1) - self._reference(m, leg_phase)
-
-    def _reference(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
-        """The plan's CoM x (in the world) [m], z [m] and forward speed [m/s], shape (N, 3).
-
-        The plan counts x from the ankle of the leg whose stance began last, the one with a phase in [0, 0.5).
-        """
-        left_leads = leg_phase[:, LEFT] < 0.5
-        step_phase = 2 * np.where(left_leads, leg_phase[:, LEFT], leg_phase[:, RIGHT] % 0.5)
-        planned = self._plan.at(step_phase)
-        planned[:, 0] += self._step_length * step_phase
-        planned[:, 0] += np.where(left_leads, m.ankle[:, LEFT, 0], m.ankle[:, RIGHT, 0])
-        return planned
+        return self._error(m, leg_phase, self._at(leg_phase))
 
     def terms(
         self,
@@ -204,8 +123,8 @@ class Task:
         last_action: NDArray,
         stiffness: NDArray,
         force_windows: NDArray,
-    ) -> dict[str, NDArray]:
-        """The reward's terms, unweighted and dimensionless, each (N,).
+    ) -> NDArray:
+        """The reward's terms, unweighted and dimensionless, (N, len(TERMS)) in the order of `TERMS`.
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance
@@ -218,57 +137,132 @@ class Task:
         `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
         (W, N, 2, 3, 2) on the body [N] in the W control windows of the step.
         """
-        close = np.exp(-np.square(self.tracking(m, leg_phase) / self._tracking_tolerance))
-        return {
-            "alive": self._upright(m).astype(float),
-            "speed": close[:, 2],
-            "com_x": close[:, 0],
-            "com_z": close[:, 1],
-            "pose": np.exp(-self._pose_error(m, leg_phase) / POSE_TOLERANCE),
-            "stiffness_rate": np.square(action - last_action).sum(-1),
-            "stiffness": self._stiffness_cost(stiffness),
-            "grf": np.exp(-self._force_distance(leg_phase, force_windows) / FORCE_TOLERANCE),
-        }
+        terms = np.empty((len(leg_phase), len(TERMS)))
+        state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged == ""
+        curves = self._at(leg_phase)
+        _judge(self._scales, curves, *state, leg_phase, action, last_action, stiffness, force_windows, terms)
+        return terms
 
-    def reward(self, terms: dict[str, NDArray]) -> NDArray:
+    def reward(self, terms: NDArray) -> NDArray:
         """Weighted sum of the terms, (N,); 0 where `alive` is 0."""
-        total = np.zeros_like(terms["alive"])
-        for name, weight in self.weights.items():
-            total += weight * terms[name]
-        return total * terms["alive"]
+        total = np.empty(len(terms))
+        _sum(self._weights, terms, total)
+        return total
 
     def fallen(self, m: "Measurement") -> NDArray:
         """Why each environment has fallen, a string array (N,): empty while it has not."""
         tilted = np.where(np.abs(m.root[:, 2]) <= MAX_PITCH, "", TOO_TILTED)
-        return np.where(m.root[:, 1] >= self._min_hip_height, tilted, TOO_LOW)
+        return np.where(m.root[:, 1] >= self._scales["min_hip_height"], tilted, TOO_LOW)
 
-    def _upright(self, m: "Measurement") -> NDArray:
-        """Neither fallen nor diverged; what is not a number is not upright."""
-        high = m.root[:, 1] >= self._min_hip_height
-        return high & (np.abs(m.root[:, 2]) <= MAX_PITCH) & (m.diverged == "")
+    def _error(self, m: "Measurement", leg_phase: NDArray, curves: NDArray) -> NDArray:
+        error = np.empty((len(leg_phase), 3))
+        _track(self._scales, curves, m.com, m.com_velocity, m.ankle, leg_phase, error)
+        return error
 
-    def _pose_error(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
-        error = m.angle - self._pose.at(leg_phase)
-        error[:, :, HIP] -= m.root[:, 2:]  # thigh to the vertical = hip - pitch
-        share = (self._pose_share * np.square(error)).sum(-1)
-        return 0.5 * (share[:, LEFT] + share[:, RIGHT])
-
-    def _stiffness_cost(self, stiffness: NDArray) -> NDArray:
-        cost = (self._stiffness_share * np.square(stiffness / self._stiffness_unit)).sum(-1)
-        return 0.5 * (cost[:, LEFT] + cost[:, RIGHT])
-
-    def _force_distance(self, leg_phase: NDArray, force_windows: NDArray) -> NDArray:
-        foot = force_windows.sum(3) / self._weight  # (W, N, side, forward/up) in body weights
-        excess = EXCESS_SHARE / len(foot) * np.maximum(foot[..., 1] - MAX_FORCE, 0.0).sum(0)
-        # the mean over the step belongs to its middle
-        people = self._force.at((leg_phase - self._half_step) % 1.0)
-        distance = np.abs(foot.sum(0) / len(foot) - people[..., :2]) - people[..., 2:]
-        away = excess + np.maximum(distance, 0.0).sum(-1)
-        return away[:, LEFT] + away[:, RIGHT]
+    def _at(self, leg_phase: NDArray) -> NDArray:
+        """(N, side) of `CURVES`."""
+        return self._curves.at(leg_phase).view(CURVES)[..., 0]
 
 
-def _com_curves(plan: WalkPlan) -> NDArray:
-    """The plan's CoM over one step: x [m] less its mean advance, z [m], forward speed [m/s]; all periodic."""
-    x, z = plan.com(GRID)
-    speed, _ = plan.com_velocity(GRID)
-    return np.stack((x - plan.step_length * GRID, z, speed), -1)
+def _curves(plan: WalkPlan, human: HumanGait) -> NDArray:
+    """(SAMPLES,) of `CURVES`."""
+    curves = np.zeros(len(GRID), CURVES)
+    curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
+    middle = (GRID - 0.5 * STEP_SECONDS / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
+    for axis, name in enumerate(("grf_forward", "grf_vertical")):
+        curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
+    step = (2 * GRID) % 1.0
+    x, z = plan.com(step)
+    curves["com"] = np.stack((x - plan.step_length * step, z), -1)
+    curves["speed"], _ = plan.com_velocity(step)
+    return curves
+
+
+@kernel
+def _track(scales, curves, com, com_velocity, ankle, leg_phase, error):
+    for i in range(len(error)):
+        x, z, speed = _error(scales[0], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        error[i, 0], error[i, 1], error[i, 2] = x, z, speed
+
+
+@kernel
+def _error(scale, curves, com, com_velocity, ankle, leg_phase):
+    """CoM minus plan: x, z, forward speed. The plan counts x from the ankle of the leg whose stance began last."""
+    leader = LEFT if leg_phase[LEFT] < 0.5 else RIGHT
+    planned = curves[leader]
+    planned_x = ankle[leader, 0] + scale.stride_length * leg_phase[leader] + planned.com[0]
+    return com[0] - planned_x, com[1] - planned.com[1], com_velocity[0] - planned.speed
+
+
+@kernel
+def _judge(
+    scales,
+    curves,
+    root,
+    angle,
+    com,
+    com_velocity,
+    ankle,
+    well,
+    leg_phase,
+    action,
+    last_action,
+    stiffness,
+    windows,
+    terms,
+):
+    scale = scales[0]
+    for i in range(len(root)):
+        upright = root[i, 1] >= scale.min_hip_height and abs(root[i, 2]) <= MAX_PITCH  # a NaN is not
+        terms[i, ALIVE] = 1.0 if upright and well[i] else 0.0
+        x, z, speed = _error(scale, curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
+        terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
+        terms[i, SPEED] = exp(-((speed / scale.tolerance[2]) ** 2))
+        pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
+        for side in range(2):
+            people = curves[i, side]
+            pose_error += 0.5 * _pose_error(scale, root[i, 2], angle[i, side], people)
+            force_distance += _force_distance(scale, windows[:, i, side], people)
+            for joint in range(2):
+                k = stiffness[i, side, joint] / scale.stiffness_unit[joint]
+                stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
+        for k in range(4):
+            stiffness_rate += (action[i, k] - last_action[i, k]) ** 2
+        terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
+        terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
+        terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
+
+
+@kernel
+def _pose_error(scale, pitch, angle, people):
+    error = 0.0
+    for joint in range(4):
+        lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
+        error += scale.pose_share[joint] * (angle[joint] - people.pose[joint] - lean) ** 2
+    return error
+
+
+@kernel
+def _force_distance(scale, windows, people):
+    """Body weights by which one foot's forces in the windows of a step leave people's range."""
+    count = len(windows)
+    forward = up = excess = 0.0
+    for window in range(count):
+        contacts = windows[window]
+        vertical = (contacts[0, 1] + contacts[1, 1] + contacts[2, 1]) / scale.weight
+        forward += (contacts[0, 0] + contacts[1, 0] + contacts[2, 0]) / scale.weight / count
+        up += vertical / count
+        excess += max(vertical - MAX_FORCE, 0.0) / count
+    beyond_forward = max(abs(forward - people.force[0]) - people.force_sd[0], 0.0)
+    beyond_up = max(abs(up - people.force[1]) - people.force_sd[1], 0.0)
+    return EXCESS_SHARE * excess + beyond_forward + beyond_up
+
+
+@kernel
+def _sum(weights, terms, total):
+    for i in range(len(total)):
+        total[i] = 0.0
+        for term in range(len(weights)):
+            total[i] += weights[term] * terms[i, term]
+        total[i] *= terms[i, ALIVE]

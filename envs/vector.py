@@ -14,6 +14,7 @@ from springfoot.gait.errors import SpringfootError, require_count
 
 from .biped import Biped
 from .faces import METADATA, check_can_render, check_options, check_render_mode, spaces_of
+from .outcome import INFO, Outcome
 from .rendering import Camera
 from .settings import STEP_SECONDS, BipedSettings, settings_from
 
@@ -60,6 +61,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
+        self._started = False
 
     @property
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -92,20 +94,26 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Hold the stiffnesses that `actions` (N, 4) stand for during 20 ms."""
-        resetting = self._check_running()
+        self._check_running()
         if np.shape(actions) != self.action_space.shape:
             raise SpringfootError(f"actions must have shape {self.action_space.shape}, got {np.shape(actions)}")
-        outcome = self.biped.step(np.where(resetting[:, None], 0.0, actions), active=~resetting)
+        resetting = self._over
+        if resetting.any():
+            outcome = self.biped.step(np.where(resetting[:, None], 0.0, actions), active=~resetting)
+        else:
+            outcome = self.biped.step(actions)
         ended = outcome.terminated | outcome.truncated
-        observation, infos = outcome.observation, _masked(outcome.info, ~resetting)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
-            infos = _masked(outcome.info, ~ended) | _final(observation, outcome.info, ended)
+        observation, infos = outcome.observation, {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
             resetting = ended
+            if ended.any():
+                infos = _final(outcome, ended)
+        else:
+            self._over = ended
+        infos = _masked(outcome, ~resetting) | infos
         if resetting.any():
             self._restart(np.flatnonzero(resetting))
             observation = self.biped.observe()
-        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
-            self._over = ended.copy()
         if self.render_mode == "human":
             self.render()
         return observation, outcome.reward, outcome.terminated, outcome.truncated, infos
@@ -126,15 +134,17 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
     def _restart(self, ids: NDArray, start: float | str | None = None) -> None:
         self.biped.reset(ids, [self._generators[index] for index in ids], start)
 
-    def _check_running(self) -> NDArray:
-        """Which environments this step resets, (N,); refuses a step that someone should have reset before."""
+    def _check_running(self) -> None:
+        """Refuses a step of environments that someone should have reset before."""
+        if self._started and self.autoreset_mode is not AutoresetMode.DISABLED:
+            return
         waiting = np.array([generator is None for generator in self._generators])
         if self.autoreset_mode is AutoresetMode.DISABLED:
             waiting |= self._over
         if waiting.any():
             which = ", ".join(map(str, np.flatnonzero(waiting)))
             raise SpringfootError(f"no episode is running in environments {which}: call reset() before step()")
-        return self._over.copy()
+        self._started = True
 
     def _spread(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         """One seed for each environment."""
@@ -156,31 +166,33 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         return mask
 
 
-def _masked(info: dict[str, NDArray], mask: NDArray) -> dict[str, Any]:
+_MASKS = tuple(f"_{name}" for name in INFO)
+
+
+def _masked(outcome: Outcome, mask: NDArray) -> dict[str, Any]:
     """Gymnasium's form of a vector's info: fresh arrays, each with `_name`, the mask of whom it is about."""
-    infos: dict[str, Any] = {}
-    if not mask.any():
-        return infos
-    for name, value in info.items():
-        if value.dtype.kind == "U":
-            value = value.astype(object)
-            value[~mask] = None
-            infos[name] = value
-        else:
-            infos[name] = np.where(mask, value, 0)
-        infos[f"_{name}"] = mask.copy()
+    chosen = np.count_nonzero(mask)
+    if not chosen:
+        return {}
+    values = outcome.values.T if chosen == len(mask) else np.where(mask, outcome.values.T, 0.0)
+    masks = np.empty((len(INFO), len(mask)), bool)
+    masks[:] = mask
+    infos: dict[str, Any] = dict(zip(INFO, values, strict=True)) | dict(zip(_MASKS, masks, strict=True))
+    infos["termination"], infos["_termination"] = outcome.termination.astype(object), mask
+    if chosen < len(mask):
+        infos["termination"][~mask] = None
     return infos
 
 
-def _final(observation: NDArray, info: dict[str, NDArray], ended: NDArray) -> dict[str, Any]:
+def _final(outcome: Outcome, ended: NDArray) -> dict[str, Any]:
     """Last observation and info of the episodes that ended in this step."""
     last = np.full(len(ended), None, dtype=object)
     for index in np.flatnonzero(ended):
-        last[index] = observation[index].copy()
+        last[index] = outcome.observation[index].copy()
     return {
         "final_obs": last,
         "_final_obs": ended.copy(),
-        "final_info": _masked(info, ended),
+        "final_info": _masked(outcome, ended.copy()),
         "_final_info": ended.copy(),
     }
 

@@ -6,7 +6,7 @@ import pytest
 from springfoot.envs.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
 from springfoot.envs.simulation import Measurement
-from springfoot.envs.task import EXCESS_SHARE, FORCE_TOLERANCE, OBSERVATION, TOO_LOW, TOO_TILTED, Task
+from springfoot.envs.task import EXCESS_SHARE, FORCE_TOLERANCE, OBSERVATION, TERMS, TOO_LOW, TOO_TILTED, Task
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
@@ -62,7 +62,8 @@ class Setup:
             "stiffness": np.tile([300.0, 60.0], (n, 2, 1)) * self.body.mass_scale * self.body.length_scale,
             "force_windows": self.people_force(left_phase),
         }
-        return self.task.terms(measurement, leg_phases(np.atleast_1d(left_phase)), **(values | other))
+        terms = self.task.terms(measurement, leg_phases(np.atleast_1d(left_phase)), **(values | other))
+        return dict(zip(TERMS, terms.T, strict=True))
 
 
 def leg_phases(left):
@@ -203,7 +204,7 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     assert set(terms) == set(weights)
     expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
     expected[0] = 0.0
-    np.testing.assert_allclose(setup.task.reward(terms), expected, rtol=1e-12)
+    np.testing.assert_allclose(setup.task.reward(np.stack([*terms.values()], -1)), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("height", [1.7, 1.2])
@@ -228,7 +229,6 @@ def observe(setup, measured, left_phase, **other):
     n = len(left_phase)
     values = {
         "last_action": np.zeros((n, 4)),
-        "planned_ankle": np.zeros((n, 2)),
         "force": np.zeros((n, 2, 3, 2)),
     }
     return setup.task.observe(measured, leg_phases(left_phase), **(values | other))
@@ -244,8 +244,8 @@ def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
     force = np.zeros((2, 2, 3, 2))
     force[..., 1] = np.arange(6).reshape(2, 3) * 100.0
     action = np.tile([0.1, 0.2, 0.3, 0.4], (2, 1))
-    planned = np.tile([0.15, -0.25], (2, 1))
-    seen = observe(setup, measured, [0.1, 0.7], last_action=action, planned_ankle=planned, force=force)
+    planned = setup.human.mean("ankle", np.array([0.1, 0.6]))
+    seen = observe(setup, measured, [0.1, 0.7], last_action=action, force=force)
     row, other = (dict(zip(setup.task.names, values, strict=True)) for values in seen)
 
     leg = setup.body.leg_length
@@ -273,8 +273,8 @@ def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
         "com_z_error": 0.0,
         "last_action_ankle_left": 0.1,
         "last_action_toe_right": 0.4,
-        "planned_ankle_left": 0.15,
-        "planned_ankle_right": -0.25,
+        "planned_ankle_left": planned[LEFT],
+        "planned_ankle_right": planned[RIGHT],
         "leading_leg": 1.0,
         "command_speed": setup.body.froude_speed(0.9),
         "height_ratio": 1.5 / 1.7,
@@ -320,14 +320,13 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
     action, last = rng.uniform(-1, 1, (2, n, 4))
     stiffness = rng.uniform(5, 800, (n, 2, 2))
     force = rng.uniform(-500, 1000, (2, n, 2, 3, 2))
-    planned = rng.normal(0, 0.2, (n, 2))
 
     def results(rows):
         measured = Measurement(diverged=base.diverged[rows], **{name: value[rows] for name, value in numbers.items()})
         legs = leg_phases(left[rows])
-        seen = setup.task.observe(measured, legs, last[rows], planned[rows], force[0, rows])
+        seen = setup.task.observe(measured, legs, last[rows], force[0, rows])
         terms = setup.task.terms(measured, legs, action[rows], last[rows], stiffness[rows], force[:, rows])
-        return np.column_stack([seen, setup.task.reward(terms), *terms.values()])
+        return np.column_stack([seen, setup.task.reward(terms), terms])
 
     together = results(slice(None))
     alone = np.concatenate([results(slice(i, i + 1)) for i in range(n)])

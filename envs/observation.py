@@ -1,0 +1,171 @@
+"""What a policy sees: the entries of the observation, dimensionless and bounded."""
+
+from math import cos, pi, sin, sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import GRAVITY, Body
+
+from .kernel import kernel
+from .model import ACTIONS, CONTACTS, JOINTS, LEFT, SIDES
+
+if TYPE_CHECKING:
+    from .simulation import Measurement
+
+
+class Entry(NamedTuple):
+    """One entry of the observation: name, unit it is divided by, bounds it is clipped to, and its meaning."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    meaning: str
+
+
+def _entries() -> tuple[Entry, ...]:
+    legs = [(side, joint) for side in SIDES for joint in JOINTS]
+    sign: dict[str, str] = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
+    return (
+        Entry("hip_height", "leg length", 0.0, 2.0, "height of the hip"),
+        Entry("pitch", "rad", -3.2, 3.2, "pitch of the trunk, forward positive"),
+        *(Entry(f"{joint}_{side}", "rad", -3.2, 3.2, f"angle, {sign[joint]} positive") for side, joint in legs),
+        Entry("hip_velocity_x", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, forward positive"),
+        Entry("hip_velocity_z", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, up positive"),
+        Entry("pitch_rate", "sqrt(g/l)", -15.0, 15.0, "rate of the pitch, forward positive"),
+        *(
+            Entry(f"{joint}_rate_{side}", "sqrt(g/l)", -15.0, 15.0, f"angular rate, {sign[joint]} positive")
+            for side, joint in legs
+        ),
+        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase"),
+        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase"),
+        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase"),
+        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase"),
+        *(
+            Entry(
+                f"load_{contact}_{side}",
+                "body weight",
+                0.0,
+                5.0,
+                "vertical force, mean of the step",
+            )
+            for side in SIDES
+            for contact in CONTACTS
+        ),
+        Entry("com_x_error", "leg length", -2.0, 2.0, "CoM minus plan, forward positive"),
+        Entry("com_z_error", "leg length", -2.0, 2.0, "CoM minus plan, up positive"),
+        Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
+        *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before") for name in ACTIONS),
+        *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive") for side in SIDES),
+        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right"),
+        Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)"),
+        Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m"),
+        Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg"),
+    )
+
+
+OBSERVATION = _entries()
+"""Every entry of the observation, in order; l is the leg length (hip to floor when standing)."""
+
+
+SEEN = np.dtype(
+    [
+        ("root", float, 2),
+        ("angle", float, (len(SIDES), len(JOINTS))),
+        ("root_velocity", float, 3),
+        ("velocity", float, (len(SIDES), len(JOINTS))),
+        ("cycle", float, 4),
+        ("load", float, (len(SIDES), len(CONTACTS))),
+        ("error", float, 3),
+        ("last_action", float, len(ACTIONS)),
+        ("planned_ankle", float, len(SIDES)),
+        ("leading_leg", float),
+        ("command", float, 3),
+    ]
+)
+"""The entries of `OBSERVATION`, in order, before they are made dimensionless [SI]."""
+
+
+class Observer:
+    """Sees bodies of one kind, commanded one speed [m/s]."""
+
+    def __init__(self, body: Body, speed: float) -> None:
+        leg = body.leg_length
+        self.low = np.array([entry.low for entry in OBSERVATION], np.float32)
+        self.high = np.array([entry.high for entry in OBSERVATION], np.float32)
+        unit = {
+            "1": 1.0,
+            "rad": 1.0,
+            "leg length": leg,
+            "sqrt(g l)": sqrt(GRAVITY * leg),
+            "sqrt(g/l)": sqrt(GRAVITY / leg),
+            "body weight": body.mass * GRAVITY,
+        }
+        self._units = np.array([unit[entry.unit] for entry in OBSERVATION])
+        self._row = np.zeros(1, SEEN)  # the body that is being looked at
+        self._row["command"] = speed, body.length_scale, body.mass_scale
+        self._entries = self._row.view(float)
+
+    def observe(
+        self,
+        m: "Measurement",
+        leg_phase: NDArray,
+        error: NDArray,
+        planned_ankle: NDArray,
+        last_action: NDArray,
+        force: NDArray,
+    ) -> NDArray:
+        """The observation, float32 (N, D); what is not a number reads as the upper bound.
+
+        `leg_phase` (N, 2); `error` (N, 3) of the CoM and its speed against the plan [m, m, m/s]; `planned_ankle`
+        (N, 2) [rad]; `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean over the step.
+        """
+        observation = np.empty((len(leg_phase), len(OBSERVATION)), np.float32)
+        state = m.root, m.root_velocity, m.angle, m.velocity, leg_phase, error, planned_ankle, last_action, force
+        _observe(*state, self._row, self._entries, self._units, self.low, self.high, observation)
+        return observation
+
+
+@kernel
+def _observe(
+    root,
+    root_velocity,
+    angle,
+    velocity,
+    leg_phase,
+    error,
+    planned_ankle,
+    last_action,
+    force,
+    seen,
+    entries,
+    units,
+    low,
+    high,
+    observation,
+):
+    """`entries` are the numbers of the one body `seen`, in order."""
+    row = seen[0]
+    for i in range(len(observation)):
+        left = leg_phase[i, LEFT]
+        s, c = sin(2 * pi * left), cos(2 * pi * left)
+        row.cycle[0], row.cycle[1], row.cycle[2], row.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
+        row.leading_leg = 1.0 if left < 0.5 else -1.0
+        row.root[0], row.root[1] = root[i, 1], root[i, 2]
+        for k in range(3):
+            row.root_velocity[k], row.error[k] = root_velocity[i, k], error[i, k]
+        for k in range(4):
+            row.last_action[k] = last_action[i, k]
+        for side in range(2):
+            row.planned_ankle[side] = planned_ankle[i, side]
+            for joint in range(4):
+                row.angle[side, joint], row.velocity[side, joint] = angle[i, side, joint], velocity[i, side, joint]
+            for contact in range(3):
+                row.load[side, contact] = force[i, side, contact, 1]
+        for k in range(len(entries)):
+            value = entries[k] / units[k]
+            if not value <= high[k]:  # nor is what is not a number
+                value = high[k]
+            observation[i, k] = max(value, low[k])

@@ -1,0 +1,96 @@
+"""What one step of the batch returns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .kernel import kernel
+from .model import ACTIONS, SIDES
+from .task import TERMS
+
+REPORT = np.dtype(
+    [
+        ("stiffness", float, (len(SIDES), 2)),
+        ("torque", float, (len(SIDES), 2)),
+        ("equilibrium", float, (len(SIDES), 2)),
+        ("work_stiffness", float, (len(SIDES), 2)),
+        ("work_equilibrium", float, (len(SIDES), 2)),
+        ("reward", float, len(TERMS)),
+        ("phase", float, len(SIDES)),
+        ("time", float),
+        ("speed", float),
+    ]
+)
+"""What is reported of one body's step besides observation and reward."""
+INFO = (
+    *(
+        f"{name}/{action}"
+        for name in ("stiffness", "torque", "equilibrium", "work/stiffness", "work/equilibrium")
+        for action in ACTIONS
+    ),
+    *(f"reward/{term}" for term in TERMS),
+    *(f"phase/{side}" for side in SIDES),
+    "time",
+    "speed",
+)
+"""The names of its numbers, in order: of each action `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad]
+at the step's end, `work/stiffness/` and `work/equilibrium/` [J] of the step; of each term `reward/`, unweighted; of
+each leg `phase/` [0, 1); `time` [s], `speed` [m/s]."""
+
+
+@dataclass(kw_only=True, eq=False)
+class Outcome:
+    """What one step returns; every array has N rows."""
+
+    observation: NDArray
+    """(N, D) float32."""
+    reward: NDArray
+    """(N,)."""
+    terminated: NDArray
+    """(N,) fallen or diverged."""
+    truncated: NDArray
+    """(N,) out of time."""
+    values: NDArray
+    """(N, len(INFO)) in the order of `INFO`."""
+    termination: NDArray
+    """(N,) why an episode was terminated, "" where it was not; read only."""
+
+    @property
+    def info(self) -> dict[str, NDArray]:
+        """Name -> (N,): `values` by their names in `INFO`, and `termination`."""
+        return dict(zip(INFO, self.values.T, strict=True)) | {"termination": self.termination}
+
+
+def report(
+    stiffness: NDArray,
+    torque: NDArray,
+    equilibrium: NDArray,
+    work_stiffness: NDArray,
+    work_equilibrium: NDArray,
+    terms: NDArray,
+    leg_phase: NDArray,
+    time: NDArray,
+    speed: NDArray,
+) -> NDArray:
+    """`Outcome.values` of (N, side, 2) five times, (N, len(TERMS)), (N, side), (N,) and (N,)."""
+    rows = np.empty(len(time), REPORT)
+    per_action = stiffness, torque, equilibrium, work_stiffness, work_equilibrium
+    _report(*per_action, terms, leg_phase, time, speed, rows)
+    return rows.view(float).reshape(len(time), len(INFO))
+
+
+@kernel
+def _report(stiffness, torque, equilibrium, work_stiffness, work_equilibrium, terms, leg_phase, time, speed, rows):
+    for i in range(len(rows)):
+        row = rows[i]
+        row.time, row.speed = time[i], speed[i]
+        for term in range(terms.shape[1]):
+            row.reward[term] = terms[i, term]
+        for side in range(2):
+            row.phase[side] = leg_phase[i, side]
+            for joint in range(2):
+                row.stiffness[side, joint], row.torque[side, joint] = stiffness[i, side, joint], torque[i, side, joint]
+                row.equilibrium[side, joint] = equilibrium[i, side, joint]
+                row.work_stiffness[side, joint] = work_stiffness[i, side, joint]
+                row.work_equilibrium[side, joint] = work_equilibrium[i, side, joint]
