@@ -14,7 +14,7 @@ help:
 	@echo "make test     run the tests"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
-	@echo "make bench    cost of a batched step against MuJoCo's own"
+	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
 	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
@@ -48,7 +48,7 @@ format: install
 	$(BIN)/ruff format .
 
 bench: install
-	$(BIN)/python benchmarks/bench.py
+	$(BIN)/python -m benchmarks.bench
 
 # What pyright cannot see: the rooms behind an editable install's finder, and the names MuJoCo compiles in (no stubs yet).
 build/typing/made: Makefile

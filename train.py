@@ -11,7 +11,7 @@ import tyro
 from springfoot.agents.command import exit_code
 from springfoot.agents.config import PRESETS, TrainingConfig, given, optional_flags
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 
 PRESET = PRESETS["walk"]
 TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
@@ -31,6 +31,9 @@ class Flags:
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
     """Folder of a run to go on with, with its saved settings; --timesteps is then how many more."""
+    seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
+    """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
+    report with the spread; each in a folder seed-N of --out."""
     preset: Literal["walk"] = "walk"
     """Training that is known to work, from which the other flags differ."""
     training: tyro.conf.OmitArgPrefixes[TrainingFlags]  # type: ignore[valid-type]
@@ -40,7 +43,7 @@ class Flags:
 
 
 def main() -> int:
-    """Exit code: 0 trained, 2 bad input, 130 ended by Ctrl-C."""
+    """Exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 ended by Ctrl-C."""
     flags = tyro.cli(Flags)
     return exit_code("train.py", lambda: run(flags))
 
@@ -50,6 +53,12 @@ def run(flags: Flags) -> int:
     settings = given(flags.training) | given(flags.environment)
     if (flags.out is None) == (flags.resume is None):
         raise SpringfootError("give either --out NEW_FOLDER or --resume FOLDER")
+    if flags.seeds is not None:
+        if flags.resume:
+            raise SpringfootError("--seeds begins anew; go on with each seed's own folder by --resume FOLDER/seed-N")
+        if "threads" in settings:
+            raise SpringfootError("--seeds gives each seed one thread; drop --threads")
+        require_count("seeds", flags.seeds)
     if flags.resume and (fixed := sorted(set(settings) - {"timesteps"})):
         raise SpringfootError(f"--resume goes on with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
@@ -59,6 +68,8 @@ def run(flags: Flags) -> int:
     else:
         assert flags.out is not None
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
+        if flags.seeds is not None:
+            return run_seeds(config, flags.out, flags.seeds)
         from springfoot.agents import training
 
         folder, record = flags.out, training.train(config, flags.out)
@@ -72,6 +83,21 @@ def run(flags: Flags) -> int:
     if interrupted:
         print(f"Or:      python train.py --resume {folder}")
     return 130 if interrupted else 0
+
+
+def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
+    """Trains from several seeds and says how far they agree and where the results lie."""
+    from springfoot.agents import seeds
+
+    record = seeds.train_seeds(config, out, count)
+    print(f"\n{seeds.seeds_table(record)}\n")
+    print(
+        f"Results: {out} ({seeds.SEEDS}, and in each seed-N: best.safetensors, last.safetensors, run.json, TensorBoard)"
+    )
+    print(f"Next:    python -m springfoot.agents.studies seeds {out}/seed-*")
+    if record["status"] == "interrupted":
+        print(f"Or:      python train.py --resume {out}/seed-N, for each N that was interrupted")
+    return {"finished": 0, "interrupted": 130}.get(record["status"], 1)
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -126,6 +127,7 @@ def record(
     episodes: int = 20,
     seed: int = 0,
     threads: int = 2,
+    model: mujoco.MjModel | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> Recording:
     """Run `episodes` episodes of `settings.episode_seconds` each, episode i seeded with `seed` + i.
@@ -137,6 +139,7 @@ def record(
         episodes: how many.
         seed: of the first.
         threads: of the physics; any number gives the same bits.
+        model: the body's with other options, as for `envs.simulation.Simulation`.
         progress: told the simulated time [s] of all episodes together after every step.
     """
     length = WINDOWS * ceil(round(settings.episode_seconds / Biped.dt, 6))
@@ -147,7 +150,7 @@ def record(
     for first in range(0, episodes, BATCH):
         rows = slice(first, min(first + BATCH, episodes))
         count = rows.stop - first
-        biped = Biped(settings, num_envs=count, num_threads=threads)
+        biped = Biped(settings, num_envs=count, num_threads=threads, model=model)
         biped.reset(np.arange(count), [seed + first + i for i in range(count)])
         plan_com = planned_com(biped.plan)
 

@@ -46,14 +46,9 @@ def train(config: TrainingConfig, out: str | Path) -> dict[str, Any]:
     Ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM. Raises
     `SpringfootError`, with nothing written, if `out` exists and is not an empty folder.
     """
-    out = Path(out)
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise SpringfootError(f"{out} already exists; give another --out, or go on with a run by --resume {out}")
+    out = require_new(out)
     run = _Run(config, out, {"sessions": [], "evaluations": []})
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SpringfootError(f"cannot make the folder {out}: {error.strerror}") from None
+    make_folder(out)
     return run.learn()
 
 
@@ -88,6 +83,22 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     return run.learn()
 
 
+def require_new(out: str | Path) -> Path:
+    """`out`, or `SpringfootError` if it exists and is not an empty folder."""
+    out = Path(out)
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise SpringfootError(f"{out} already exists; give another --out, or go on with a run by --resume {out}")
+    return out
+
+
+def make_folder(out: Path) -> None:
+    """Makes the folder and those above it; `SpringfootError` if it cannot be."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpringfootError(f"cannot make the folder {out}: {error.strerror}") from None
+
+
 def evaluate_returns(
     biped: Biped, policy: Callable[[np.ndarray], np.ndarray], seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -113,7 +124,7 @@ class _Run(BaseCallback):
     def __init__(self, config: TrainingConfig, out: Path, record: dict[str, Any], done: int = 0) -> None:
         super().__init__()
         self._config, self._out, self._record = config, out, record
-        threads = config.threads or _processors()
+        threads = config.threads or processors()
         settings = settings_to_json(config.environment)
         self._environments = SegmentedFootBipedVecEnv(config.num_envs, num_threads=threads, **settings)
         self._evaluation = Biped(config.environment, config.eval_episodes, threads)
@@ -229,7 +240,7 @@ class _Run(BaseCallback):
         write_atomically(self._out / RUN, (json.dumps(self._record, indent=2) + "\n").encode())
 
 
-def _processors() -> int:
+def processors() -> int:
     """Processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -1,65 +1,161 @@
-"""What a step costs beside its physics: CPU time of the full batched step over that of `mj_step` alone.
+"""What a step costs beside its physics, what batching gains, and how much faster training is than the study's.
 
     make bench
 
-Both run in one process, in turn, step by step: the batch steps N walking bodies for 20 ms (observation, reward and
-info included); then `mujoco.mj_step(model, data, nstep)` repeats the same physics steps from the same states with the
-same controls. Ratios of such pairs do not depend on how busy or how fast the machine is.
+Everything compared takes turns within one process and on one recorded walk; figures are medians. CPU time is that of
+all threads and worker processes together. Simulated seconds per core-second compare environments of different steps.
 """
 
-import time
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
 
-import mujoco
 import numpy as np
+import tyro
 
-from springfoot.envs.actuation import action_of
-from springfoot.envs.biped import WINDOWS, Biped, Tick
-from springfoot.envs.settings import BipedSettings
-from springfoot.envs.simulation import STEPS_PER_WINDOW
+from springfoot.agents.command import exit_code
+from springfoot.agents.config import PRESETS
 
-STEPS, WARM_UP = 200, 20
+from . import environments, learning
+from .timing import Case, Figures, load, machine, measure
+from .walking import STEP, batch_case, record_walk, step_over_physics
 
-
-def step_over_physics(num: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """CPU time [s] of each full step and of its physics alone, (STEPS,); largest joint-angle difference [rad]."""
-    biped = Biped(BipedSettings(), num)
-    ticks: list[Tick] = []
-    biped.on_tick = ticks.append
-    biped.reset(np.arange(num), range(num))
-    model = biped.model
-    raw = [biped.data(index) for index in range(num)]
-    full, physics = np.empty((2, STEPS + WARM_UP))
-    for step in range(STEPS + WARM_UP):
-        action = action_of(biped.scheduled_stiffness(), biped.settings, biped.body).reshape(num, -1)
-        ticks.clear()
-        begin = time.process_time()
-        outcome = biped.step(action)
-        full[step] = time.process_time() - begin
-        assert not outcome.terminated.any(), "the bench measures walking"
-        physics[step] = 0.0
-        for tick in ticks:
-            controls = np.stack([tick.stiffness, tick.stiffness * tick.equilibrium], -1).reshape(num, -1)
-            for data, control in zip(raw, controls, strict=True):
-                data.ctrl[:] = control
-            begin = time.process_time()
-            for data in raw:
-                mujoco.mj_step(model, data, STEPS_PER_WINDOW)
-            physics[step] += time.process_time() - begin
-    apart = max(np.abs(raw[i].qpos[3:] - ticks[-1].measurement.angle[i].ravel()).max() for i in range(num))
-    return full[WARM_UP:], physics[WARM_UP:], apart
+OVERHEAD_SIZES = (64, 8, 1)
+BATCH_SIZES = (1, 8, 32, 64, 256)
+VECTOR_SIZES = (2, 8, 32)
+THREADS = (1, 2)
 
 
-def main() -> None:
-    """Print the ratios."""
-    print(f"full step of {WINDOWS} x {STEPS_PER_WINDOW} physics steps over mj_step alone, CPU time, {STEPS} pairs")
-    for num in (64, 8, 1):
-        full, physics, apart = step_over_physics(num)
-        low, median, high = np.percentile(full / physics, (25, 50, 75))
+@dataclass(frozen=True, kw_only=True)
+class Flags:
+    """Time everything in turn; prints tables and writes a JSON file."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("build/bench.json")
+    """Where the figures go."""
+    quick: bool = False
+    """Everything once and tiny: shows that it runs; the figures mean nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How long to look."""
+
+    steps: int = 100
+    """Length of the recorded walk in environment steps."""
+    rounds: int = 4
+    """Rounds over the walk for the overhead at N = 64; smaller batches get more."""
+    repeats: int = 9
+    """Blocks of each environment."""
+    updates: int = 4
+    """PPO updates of each recipe."""
+    sizes: Sequence[int] = BATCH_SIZES
+    vectors: Sequence[int] = VECTOR_SIZES
+    update_steps: int | None = None
+    study_steps: int = 512
+
+
+QUICK = Effort(
+    steps=3, rounds=1, repeats=1, updates=1, sizes=(1, 8, 64), vectors=(2,), update_steps=128, study_steps=16
+)
+
+
+def bench(effort: Effort) -> dict[str, Any]:
+    """All figures, printed as they come; see `Flags.out`."""
+    busy = load()
+    # Worker processes first: forked after a thread pool began, they can hang.
+    forked = [environments.subprocesses(num) for num in effort.vectors]
+    asynchronous = environments.walker_async(max(effort.vectors[:2]))
+    walk = record_walk(max(max(effort.sizes), 64), effort.steps)
+
+    overhead, sim_rate, study_rate = {}, 0.0, 0.0
+    print("Full step of 20 ms beside its physics (mj_step alone, same states and controls), CPU time, one thread")
+    for num in OVERHEAD_SIZES:
+        spent, apart = step_over_physics(walk, num, effort.rounds * (1 if num == 64 else 4))
+        full, ours, study = (1e6 * np.median(spent, axis=1) / num).tolist()
+        overhead[str(num)] = float(np.median((spent[0] - spent[1]) / spent[2]))
         print(
-            f"N = {num:2d}: ratio {median:.3f} (quartiles {low:.3f} to {high:.3f}); "
-            f"{1e6 * np.median(physics) / num:.0f} us of physics per body and step; same walk within {apart:.0e} rad"
+            f"  N = {num:2d}: full {full:.1f} us, physics {ours:.1f}, physics at the study's settings {study:.1f}; "
+            f"(full - physics) / study {overhead[str(num)]:.3f}; same walk within {apart:.0e} rad"
         )
+        if num == OVERHEAD_SIZES[0]:
+            sim_rate, study_rate = 1e6 * STEP / full, 1e6 * STEP / study
+
+    cases = [environments.batch(walk, num, threads) for num in effort.sizes for threads in THREADS]
+    cases += [batch_case(walk, 64, threads) for threads in THREADS]
+    cases += [environments.adapter(walk, 64, 2), environments.single(walk)]
+    cases += [environments.dummy(walk, num) for num in effort.vectors]
+    cases += [environments.subproc(walk, env) for env in forked]
+    cases += environments.walkers(asynchronous, 8, 2, effort.steps)
+    figures = _run("Environments", cases, effort.repeats)
+
+    recipes = [learning.our_training(2, effort.update_steps), learning.study_training(effort.study_steps)]
+    trained = _run("Training", recipes, effort.updates)
+    ours, study = (trained[case.name].samples_per_second for case in recipes)
+    planning = learning.planning_seconds(3 * effort.repeats)
+    training = PRESETS["walk"].timesteps / ours
+    two = figures["springfoot, N = 64, 2 threads"].samples_per_second
+    return {
+        "overhead_of_study": {num: overhead[num] for num in ("1", "8", "64")},
+        "thread_speedup_64": two / figures["springfoot, N = 64, 1 thread"].samples_per_second,
+        "vs_dummy": two / _best(figures, "DummyVecEnv"),
+        "vs_subproc": two / _best(figures, "SubprocVecEnv"),
+        "sim_seconds_per_core_second": sim_rate,
+        "study_sim_seconds_per_core_second": study_rate,
+        "ppo_vs_study": ours / study,
+        "load": busy,
+        "leg_kinematics_over_sine": learning.kinematics_over_sine(3 * effort.repeats),
+        "planning_share_of_training": learning.PLANS_PER_TRAINING * planning / training,
+        "machine": machine(),
+        "cases": {name: asdict(each) for name, each in (figures | trained).items()},
+    }
+
+
+def _run(title: str, cases: list[Case], repeats: int) -> dict[str, Figures]:
+    """Times the cases in turn and prints them."""
+    found = measure(cases, repeats)
+    for case in cases:
+        case.close()
+    width = max(map(len, found))
+    print(f"\n{title}; median of {repeats}, per environment step")
+    print(f"  {'':{width}}  wall us  (quartiles)         CPU us  samples/s  simulated s per core-second")
+    for name, each in found.items():
+        low, high = each.wall_quartiles_us
+        print(
+            f"  {name:{width}} {each.wall_us:8.1f}  ({low:7.1f} to {high:7.1f}) {each.cpu_us:8.1f} "
+            f"{each.samples_per_second:10,.0f} {each.sim_seconds_per_core_second:8.0f}"
+        )
+    return found
+
+
+def _best(figures: dict[str, Figures], kind: str) -> float:
+    return max(each.samples_per_second for name, each in figures.items() if name.startswith(kind))
+
+
+def run(flags: Flags) -> None:
+    """Bench, print and write."""
+    about, begin = machine(), perf_counter()
+    versions = ", ".join(f"{name} {number}" for name, number in about["versions"].items())
+    print(f"{about['processor']}, {about['processors']} processors, load {load():.2f}; {versions}\n")
+    results = bench(QUICK if flags.quick else Effort())
+    flags.out.parent.mkdir(parents=True, exist_ok=True)
+    flags.out.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
+    print()
+    for name, value in results.items():
+        if isinstance(value, float) and name != "load":
+            print(f"{name:36} {value:.4g}")
+    print(
+        f"load {results['load']:.2f} before, {load():.2f} after; {perf_counter() - begin:.0f} s; figures in {flags.out}"
+    )
+
+
+def main() -> int:
+    """Exit code: 0 done, 2 a file that cannot be written, 130 ended by Ctrl-C."""
+    return exit_code("bench", lambda: run(tyro.cli(Flags, prog="benchmarks.bench")))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

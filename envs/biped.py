@@ -66,6 +66,7 @@ class Biped:
         legs: leg constants in place of the committed ones, one set or several told apart by `variant`.
         variant: (N,) which of `legs` each body has.
         rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], for each of `legs`.
+        model: as for `Simulation`.
     """
 
     dt = STEP_SECONDS
@@ -80,6 +81,7 @@ class Biped:
         legs: Sequence[LegConstants] | None = None,
         variant: NDArray | None = None,
         rest: NDArray | None = None,
+        model: mujoco.MjModel | None = None,
     ):
         self.settings = settings
         self.num_envs = num_envs
@@ -101,7 +103,7 @@ class Biped:
         self._trunk_pitch = np.deg2rad(self.constants[0].trunk_pitch_deg)
         self._passive_damping = passive_damping(self.body)
 
-        self._simulation = Simulation(self.body, num_envs, num_threads)
+        self._simulation = Simulation(self.body, num_envs, num_threads, model)
         self._task = Task(settings, self.body, self.plan, self.human)
         self.observation_names = self._task.names
         self.observation_low, self.observation_high = self._task.low, self._task.high

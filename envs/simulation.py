@@ -75,12 +75,14 @@ class Simulation:
         body: whose model is simulated.
         num: N.
         threads: of the physics; any number gives the same bits.
+        model: the body's model with other options, such as a timestep that divides `WINDOW`, in place of the default.
     """
 
-    def __init__(self, body: Body, num: int, threads: int = 1):
+    def __init__(self, body: Body, num: int, threads: int = 1, model: mujoco.MjModel | None = None):
         self.body = body
         self.num = num
-        self.model = build_model(body)
+        self.model = model or build_model(body)
+        self._substeps = round(WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, threads)
         self._qpos = self._batch.bind("qpos")
         self._qvel = self._batch.bind("qvel")
@@ -88,8 +90,8 @@ class Simulation:
         self._time = self._batch.bind("time").reshape(num)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
         self._warnings = self._batch.warning[:, :, 1]
-        self._sensors = np.zeros((num, STEPS_PER_WINDOW, len(SIDES), len(CONTACTS), 3))
-        self._record = {"sensordata": self._sensors.reshape(num, STEPS_PER_WINDOW, self.model.nsensordata)}
+        self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
+        self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._segments = _segments(body)
         self._everyone = np.arange(num)
         self._no_torque = np.zeros((num, len(SIDES), len(JOINTS)))
@@ -119,11 +121,11 @@ class Simulation:
         """
         self._ctrl[..., 0], self._ctrl[..., 1] = stiffness, drive
         if ids is None:
-            self._batch.rollout(STEPS_PER_WINDOW, record=["sensordata"], out=self._record)
+            self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)
         else:
             self._sensors[:] = 0.0
             if len(ids):
-                self._record["sensordata"][ids] = self._batch.rollout(STEPS_PER_WINDOW, record=["sensordata"], ids=ids)[
+                self._record["sensordata"][ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)[
                     "sensordata"
                 ]
         return self._measure(stiffness, drive)

@@ -1,0 +1,138 @@
+"""Environments to time: ours behind each of its faces, and others' for the order of magnitude."""
+
+import multiprocessing
+from functools import partial
+from importlib.util import find_spec
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
+
+from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
+
+from .timing import Case
+from .walking import SEED, STEP, Walk, vector
+
+OURS = "springfoot.envs:SegmentedFootBiped-v0"
+OTHERS = "Walker2d-v5"
+FORK = "fork" if "fork" in multiprocessing.get_all_start_methods() else None
+
+
+def batch(walk: Walk, num: int, threads: int) -> Case:
+    """Our full step: observation, reward, termination, autoreset."""
+    env = vector(num, threads)
+    name = f"springfoot, N = {num}, {threads} thread{'s' * (threads > 1)}"
+    return _vector_case(name, env, walk.actions[:, :num], STEP)
+
+
+def adapter(walk: Walk, num: int, threads: int) -> Case:
+    """The same for stable-baselines3."""
+    return _sb3_case(
+        f"SB3 adapter, N = {num}, {threads} threads", SegmentedFootBipedVecEnv(num, num_threads=threads), walk
+    )
+
+
+def single(walk: Walk) -> Case:
+    """One environment by plain `gym.make`."""
+    return _single_case("gym.make, one", gym.make(OURS), walk.actions[:, 0], STEP)
+
+
+def dummy(walk: Walk, num: int) -> Case:
+    """The same environment, one after the other in this process."""
+    return _sb3_case(f"DummyVecEnv, N = {num}", DummyVecEnv([partial(gym.make, OURS)] * num), walk)
+
+
+def subprocesses(num: int) -> SubprocVecEnv:
+    """The same environment, each in a process of its own. Make them before any thread pool: they are forked."""
+    return SubprocVecEnv([partial(gym.make, OURS)] * num, start_method=FORK)
+
+
+def subproc(walk: Walk, env: SubprocVecEnv) -> Case:
+    """What `subprocesses` made."""
+    workers = [process.pid or 0 for process in env.processes]
+    return _sb3_case(f"SubprocVecEnv, N = {env.num_envs}", env, walk, workers)
+
+
+def walker_async(num: int) -> gym.vector.AsyncVectorEnv | None:
+    """Gymnasium's walker, each in a process of its own; before any thread pool, as `subprocesses`.
+
+    None where imageio is missing, without which Gymnasium's MuJoCo environments do not import.
+    """
+    return gym.vector.AsyncVectorEnv([partial(gym.make, OTHERS)] * num, context=FORK) if find_spec("imageio") else None
+
+
+def walkers(asynchronous: gym.vector.AsyncVectorEnv | None, num: int, threads: int, steps: int) -> list[Case]:
+    """Gymnasium's walker under random actions: single, one after the other, in processes, and in EnvPool if here."""
+    if asynchronous is None:
+        print(f"{OTHERS} is left out: it needs imageio (pip install imageio)")
+        return []
+    one = gym.make(OTHERS)
+    one.action_space.seed(SEED)
+    seconds = one.unwrapped.dt  # type: ignore[attr-defined]
+    actions = np.stack([[one.action_space.sample() for _ in range(num)] for _ in range(steps)])
+    serial = gym.vector.SyncVectorEnv([partial(gym.make, OTHERS)] * num)
+    workers = [process.pid or 0 for process in asynchronous.processes]
+    few = actions[:, : asynchronous.num_envs]
+    cases = [
+        _single_case(f"{OTHERS}, one", one, actions[:, 0], seconds),
+        _vector_case(f"{OTHERS} Sync, N = {num}", serial, actions, seconds),
+        _vector_case(f"{OTHERS} Async, N = {asynchronous.num_envs}", asynchronous, few, seconds, workers),
+    ]
+    if find_spec("envpool"):
+        import envpool  # pyright: ignore[reportMissingImports]  # optional
+
+        pool = envpool.make_gymnasium(OTHERS, num_envs=num, num_threads=threads, seed=SEED)
+        name = f"{OTHERS} EnvPool, N = {num}, {threads} threads"
+        cases.append(_vector_case(name, pool, actions, seconds, seed=None))
+    return cases
+
+
+def _vector_case(
+    name: str, env: Any, actions: np.ndarray, seconds: float, workers: list[int] | None = None, seed: int | None = SEED
+) -> Case:
+    def run() -> None:
+        for action in actions:
+            env.step(action)
+
+    def prepare() -> None:
+        env.reset(**({} if seed is None else {"seed": seed}))
+
+    samples = actions.shape[0] * actions.shape[1]
+    return Case(
+        name=name, samples=samples, seconds=seconds, prepare=prepare, run=run, close=env.close, workers=workers or ()
+    )
+
+
+def _sb3_case(name: str, env: VecEnv, walk: Walk, workers: list[int] | None = None) -> Case:
+    actions = walk.actions[:, : env.num_envs]
+
+    def run() -> None:
+        for action in actions:
+            env.step(action)
+
+    def prepare() -> None:
+        env.seed(SEED)
+        env.reset()
+
+    samples = actions.shape[0] * actions.shape[1]
+    return Case(
+        name=name, samples=samples, seconds=STEP, prepare=prepare, run=run, close=env.close, workers=workers or ()
+    )
+
+
+def _single_case(name: str, env: gym.Env, actions: np.ndarray, seconds: float) -> Case:
+    def run() -> None:
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
+                env.reset()
+
+    return Case(
+        name=name,
+        samples=len(actions),
+        seconds=seconds,
+        prepare=lambda: env.reset(seed=SEED),
+        run=run,
+        close=env.close,
+    )

@@ -1,0 +1,148 @@
+"""A recorded walk, and the physics of that walk alone: what every step of ours is held against."""
+
+import time
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from springfoot.envs.actuation import action_of
+from springfoot.envs.biped import WINDOWS, Tick
+from springfoot.envs.model import build_model
+from springfoot.envs.simulation import WINDOW
+from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.gait.body import Body
+
+from .timing import Case, clock_cost
+
+SEED = 0
+STEP = WINDOWS * WINDOW
+"""Simulated time of one environment step [s]."""
+STUDY_TIMESTEP = 0.001
+"""Physics step of the design study [s]; integrator, solver and cone as ours, islands as MuJoCo's default."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Walk:
+    """T steps of N bodies on the fixed schedule of the leg tuning, seeded `SEED` + i: the same bits in any batch."""
+
+    actions: NDArray
+    """(T, N, 4) float32."""
+    position: NDArray
+    """(T, N, nq) at the beginning of each step."""
+    velocity: NDArray
+    """(T, N, nv)."""
+    controls: NDArray
+    """(T, WINDOWS, N, nu) held in each control window."""
+
+
+def record_walk(num: int, steps: int) -> Walk:
+    """Let `num` bodies walk `steps` steps; none may fall."""
+    env = vector(num)
+    biped, ticks = env.biped, list[Tick]()
+    biped.on_tick = ticks.append
+    env.reset(seed=SEED)
+    actions, position, velocity = [], [], []
+    for _ in range(steps):
+        now = biped.measurement
+        position.append(np.concatenate([now.root, now.angle.reshape(num, -1)], axis=1))
+        velocity.append(np.concatenate([now.root_velocity, now.velocity.reshape(num, -1)], axis=1))
+        action = action_of(biped.scheduled_stiffness(), biped.settings, biped.body)
+        actions.append(action.reshape(num, -1).astype(np.float32))
+        _, _, terminated, *_ = env.step(actions[-1])
+        assert not terminated.any(), "the bench measures walking"
+    held = [np.stack([tick.stiffness, tick.stiffness * tick.equilibrium], -1).reshape(num, -1) for tick in ticks]
+    return Walk(
+        actions=np.stack(actions),
+        position=np.stack(position),
+        velocity=np.stack(velocity),
+        controls=np.stack(held).reshape(steps, WINDOWS, num, -1),
+    )
+
+
+def vector(num: int, threads: int = 1) -> SegmentedFootBipedVector:
+    """Our batch as it is used in training: episodes that end begin anew in the same step."""
+    return SegmentedFootBipedVector(num, num_threads=threads, autoreset_mode=AutoresetMode.SAME_STEP)
+
+
+def study_model() -> mujoco.MjModel:
+    """Our model at the study's settings."""
+    model = build_model(Body())
+    model.opt.timestep = STUDY_TIMESTEP
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    return model
+
+
+class Physics:
+    """`mj_step(model, data, nstep)` for the first N bodies of a walk, and nothing else."""
+
+    def __init__(self, model: mujoco.MjModel, num: int) -> None:
+        self.model, self.substeps = model, round(WINDOW / model.opt.timestep)
+        self.bodies = [mujoco.MjData(model) for _ in range(num)]
+        self._clock = clock_cost()
+
+    def place(self, walk: Walk, step: int) -> None:
+        """Put all bodies where they were at the beginning of a step of the walk."""
+        for index, data in enumerate(self.bodies):
+            data.qpos[:], data.qvel[:] = walk.position[step, index], walk.velocity[step, index]
+
+    def step(self, walk: Walk, step: int) -> float:
+        """Repeat one step from where the bodies are, with the walk's controls; CPU time of the physics [s]."""
+        spent = 0.0
+        for controls in walk.controls[step]:
+            for data, control in zip(self.bodies, controls, strict=False):
+                data.ctrl[:] = control
+            begin = time.process_time()
+            for data in self.bodies:
+                mujoco.mj_step(self.model, data, self.substeps)
+            spent += time.process_time() - begin - self._clock
+        return spent
+
+
+def step_over_physics(walk: Walk, num: int, rounds: int) -> tuple[NDArray, float]:
+    """CPU time [s] of (full step, its physics, the study's physics), taking turns step by step: (3, rounds x steps).
+
+    Also the largest difference [m, rad] between the walk of the full step and of its physics alone after a round.
+    """
+    env = vector(num)
+    ours, study, clock = Physics(env.biped.model, num), Physics(study_model(), num), clock_cost()
+    spent = np.empty((3, rounds + 1, len(walk.actions)))
+    apart = 0.0
+    for round_ in range(rounds + 1):
+        env.reset(seed=SEED)
+        for data in ours.bodies:
+            mujoco.mj_resetData(ours.model, data)
+        ours.place(walk, 0)
+        for step, actions in enumerate(walk.actions[:, :num]):
+            begin = time.process_time()
+            env.step(actions)
+            spent[0, round_, step] = time.process_time() - begin - clock
+            spent[1, round_, step] = ours.step(walk, step)  # walks on by itself: the same bits
+            study.place(walk, step)  # would walk another way after a while
+            spent[2, round_, step] = study.step(walk, step)
+        angle = env.biped.measurement.angle.reshape(num, -1)
+        apart = max(apart, *(float(np.abs(data.qpos[3:] - angle[i]).max()) for i, data in enumerate(ours.bodies)))
+    return spent[:, 1:].reshape(3, -1), apart
+
+
+def batch_case(walk: Walk, num: int, threads: int) -> Case:
+    """`mujoco.batch.Batch` alone, stepped through the walk's controls."""
+    model = build_model(Body())
+    batch, substeps = Batch(model, num, threads), round(WINDOW / model.opt.timestep)
+    position, velocity, control = (batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
+    controls = walk.controls[:, :, :num].reshape(-1, num, model.nu)
+
+    def prepare() -> None:
+        batch.reset(np.arange(num), stage=mujoco.mjtStage.mjSTAGE_NONE)
+        position[:], velocity[:] = walk.position[0, :num], walk.velocity[0, :num]
+
+    def run() -> None:
+        for window in controls:
+            control[:] = window
+            batch.step(nstep=substeps)
+
+    name = f"Batch alone, N = {num}, {threads} thread{'s' * (threads > 1)}"
+    return Case(name=name, samples=num * len(walk.actions), seconds=STEP, prepare=prepare, run=run)
