@@ -83,7 +83,7 @@ ROWS: dict[str, Edit] = {
     "integrator implicit": _option(integrator=int(_INTEGRATOR.mjINT_IMPLICIT)),
     "integrator Euler": _option(integrator=int(_INTEGRATOR.mjINT_EULER)),
     "integrator RK4": _option(integrator=int(_INTEGRATOR.mjINT_RK4)),
-    "no mid-phase collision": _flag(_DISABLE.mjDSBL_MIDPHASE, True),
+    "mid-phase collision": _flag(_DISABLE.mjDSBL_MIDPHASE, False),
     "no joint stops": _flag(_DISABLE.mjDSBL_LIMIT, True),
     "no force sensors": _flag(_DISABLE.mjDSBL_SENSOR, True),
 }

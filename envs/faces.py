@@ -132,6 +132,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `ankle_stiffness_range`| `(20.0, 800.0)` | ankle stiffness at action -1 and +1 [N m/rad]                     |
     | `toe_stiffness_range` | `(5.0, 200.0)` | toe stiffness at action -1 and +1 [N m/rad]                       |
     | `schedule`            | `None`         | a stiffness schedule in JSON form                                 |
+    | `human`               | `None`         | someone's own walk in people's place, JSON form of `OwnGait`      |
     | `episode_seconds`     | `20.0`         | time until truncation [s]                                         |
     | `start`               | `"random"`     | stride phase of the left leg at the start, or `"random"`          |
     | `start_noise`         | `0.0`          | relative spread of joint angles and velocities at the start       |
