@@ -14,7 +14,7 @@ help:
 	@echo "make test     run the tests"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
-	@echo "make bench    cost of a batched step against MuJoCo's own"
+	@echo "make bench    cost of a batched step against MuJoCo's own, of planning, of leg inverse kinematics"
 	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
