@@ -14,7 +14,7 @@ from springfoot.gait.plan import PLAN_SPEED_RANGE, SLOPE_RANGE, STEP_TIME_RANGE,
 
 SAMPLES = 10_000
 PHASE = np.arange(SAMPLES) / SAMPLES
-EXAMPLES = settings(derandomize=True, deadline=None, max_examples=20)
+EXAMPLES = settings(derandomize=True, deadline=None, max_examples=50)
 
 
 @st.composite
