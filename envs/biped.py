@@ -7,7 +7,7 @@ operations for any N, so a batch of N gives the same bits as N batches of one.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import isfinite
 
 import mujoco
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.human import ANGLES, HumanGait
+from springfoot.gait.human import ANGLES
 from springfoot.gait.plan import plan_walk
 
 from .actuation import FEET, FootSprings
@@ -87,9 +87,7 @@ class Biped:
         self.num_envs = num_envs
         self.body = Body(settings.height, settings.mass)
         self.human = reference_gait(settings)
-        self.plan = plan_walk(
-            self.body, settings.speed, settings.cadence, step_time=own_step_time(settings, self.human)
-        )
+        self.plan = plan_walk(self.body, settings.speed, settings.cadence, human=self.human)
         self.on_tick: Callable[[Tick], None] | None = None
 
         self.constants = tuple(legs or [leg_constants(settings.equilibrium, settings.cadence)])
@@ -271,16 +269,6 @@ class Biped:
         lowest = self._simulation.measure().contact[ids, ..., 1].min(axis=(1, 2))
         root[:, 1] = -lowest - START_DEPTH * self.body.length_scale
         self._simulation.reset(ids, root, rate, angle, velocity)
-
-
-def own_step_time(settings: BipedSettings, human: HumanGait) -> float | None:
-    """Step time [s] of own data, None where the plan takes people's or the thesis's.
-
-    Step length and rate share, as in `plan_walk`, what is left between the data and the commanded speed.
-    """
-    if settings.human is None or settings.cadence == "thesis":
-        return None
-    return human.stride_time / 2 / sqrt(settings.speed * human.stride_time / (2 * human.step_length))
 
 
 class _Pushes:
