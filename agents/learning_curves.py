@@ -28,7 +28,7 @@ from .training import RUN
 EPISODES, SECONDS = 20, 20.0
 """What the best policy is judged on."""
 SPEED, RMSE_DEG = 0.03, {"thigh": 3.5, "knee": 4.5, "ankle": 4.0}
-"""Of a walk: speed this near the commanded one [m/s]; angles this near people's, about the distance between two of them."""
+"""Of a walk: speed this near the commanded one [m/s]; angles this near people's, nearer than one of them to their mean."""
 PEAK_BW, FORCE_R = 1.3, 0.93
 """Of a walk: no greater peak of the mean vertical force [body weights], no smaller correlation with people's."""
 
@@ -115,9 +115,9 @@ def _read(folder: Path) -> dict[str, Any]:
     """The record of a finished run, with the time of every evaluation."""
     try:
         record_of_run = json.loads((folder / RUN).read_text(encoding="utf-8"))
-        for entry in record_of_run["evaluations"]:
-            float(entry["seconds"]), float(entry["return_mean"]), int(entry["timesteps"])
-        float(record_of_run["seconds"])
+        keys = ("seconds", "return_mean", "timesteps", "falls")
+        numbers = [entry[key] for entry in record_of_run["evaluations"] for key in keys]
+        float(sum(numbers) + record_of_run["seconds"] + record_of_run["timesteps"])
     except (OSError, ValueError, KeyError, TypeError):
         raise SpringfootError(
             f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"
