@@ -28,7 +28,7 @@ from .training import RUN
 EPISODES, SECONDS = 20, 20.0
 """What the best policy is judged on."""
 SPEED, RMSE_DEG = 0.03, {"thigh": 3.5, "knee": 4.5, "ankle": 4.0}
-"""Of a walk: speed this near the commanded one [m/s]; angles this near people's, nearer than one of them to their mean."""
+"""Of a walk: speed this near the commanded one [m/s]; angles nearer to people's mean than one person's usually are."""
 PEAK_BW, FORCE_R = 1.3, 0.93
 """Of a walk: no greater peak of the mean vertical force [body weights], no smaller correlation with people's."""
 
