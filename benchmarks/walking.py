@@ -22,7 +22,7 @@ SEED = 0
 STEP = WINDOWS * WINDOW
 """Simulated time of one environment step [s]."""
 STUDY_TIMESTEP = 0.001
-"""Physics step of the design study [s]; integrator, solver and cone as ours, islands as MuJoCo's default."""
+"""Physics step of the design study [s]; integrator, solver and cone as ours, flags as MuJoCo's default."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +72,7 @@ def study_model() -> mujoco.MjModel:
     """Our model at the study's settings."""
     model = build_model(Body())
     model.opt.timestep = STUDY_TIMESTEP
-    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    model.opt.disableflags = 0
     return model
 
 
