@@ -23,7 +23,13 @@ from springfoot.gait.plan import WalkPlan
 from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
-CONDITIONS = {name: getattr(BipedSettings, name) for name in ("height", "mass", "speed", "push_newton", "start_noise")}
+CONDITIONS = {
+    name: getattr(BipedSettings, name)
+    for name in (
+        *("height", "mass", "speed", "height_range", "mass_range", "speed_range", "speed_interval"),
+        *("push_newton", "start_noise"),
+    )
+}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""

@@ -5,7 +5,7 @@ in N m/rad through the inverse of the environment's own log scale, hence need `a
 """
 
 from collections.abc import Callable
-from math import inf, nan
+from math import inf, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,9 @@ def schedule(settings: BipedSettings) -> Policy:
     body = Body(settings.height, settings.mass)
     if settings.schedule is not None:
         return _follow(StiffnessSchedule.from_json(settings.schedule).at(GRID)[0], settings, body)
-    return _follow(fixed_stiffness(leg_constants(settings.equilibrium, settings.cadence), body), settings, body)
+    speed = settings.speed / sqrt(body.length_scale)
+    constants = leg_constants(settings.equilibrium, settings.cadence, speed)
+    return _follow(fixed_stiffness(constants, body), settings, body)
 
 
 def _follow(stiffness: NDArray, settings: BipedSettings, body: Body) -> Policy:

@@ -8,11 +8,11 @@ Gains are for 1.70 m and 63 kg and scale with the body (see `envs.model`).
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
 from math import radians, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,13 @@ from .kernel import kernel
 from .model import HIP, KNEE, LEFT, RIGHT, damping_times
 from .phase import GRID, PhaseTable, leg_phases
 from .simulation import WINDOW, Measurement
+from .walkers import Walkers
 
+if TYPE_CHECKING:
+    from .walks import Walk
+
+TUNED_SPEED = 1.2
+"""Speed [m/s] at 1.70 m of the constants whose name tells none."""
 KNOTS = np.arange(10) / 10
 """Stride phases of the knots that correct people's curves (periodic cubic spline)."""
 STANCE_FALL = (0.5, 0.6)
@@ -79,21 +85,42 @@ class LegConstants:
     """Fixed toe stiffness [N m/rad]."""
 
 
-def constants_name(equilibrium: str, cadence: str) -> str:
+def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED) -> str:
     """Name of the committed constants for a setting; "angle" and "phase" share those of "planned"."""
     name = "neutral" if equilibrium == "neutral" else "planned"
-    return name if cadence == "people" else f"{name}, {cadence} cadence"
+    name = name if cadence == "people" else f"{name}, {cadence} cadence"
+    return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
 
 
-def leg_constants(equilibrium: str, cadence: str) -> LegConstants:
-    """The committed constants for a setting; `SpringfootError` where none were found that walk."""
+def leg_constants(equilibrium: str, cadence: str, speed: float = TUNED_SPEED) -> LegConstants:
+    """The committed constants for a setting at `speed` [m/s at 1.70 m]; `SpringfootError` where none walk.
+
+    Linear between the speeds for which there are some, and those of the nearest beyond.
+    """
     name, table = constants_name(equilibrium, cadence), _committed()
     if name not in table:
         raise SpringfootError(
             f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r}; "
             "equilibrium 'neutral' needs cadence 'people'"
         )
-    return constants_from(table[name])
+    sets = {TUNED_SPEED: table[name]}
+    for other in table:
+        if other.startswith(f"{name}, ") and other.endswith(" m/s"):
+            sets[float(other.removeprefix(f"{name}, ").removesuffix(" m/s"))] = table[other]
+    speeds = sorted(sets)
+    place = float(np.interp(speed, speeds, np.arange(len(speeds))))
+    lower = constants_from(sets[speeds[int(place)]])
+    if place == int(place):
+        return lower
+    return _mixed(lower, constants_from(sets[speeds[int(place) + 1]]), place - int(place))
+
+
+def _mixed(lower: LegConstants, upper: LegConstants, weight: float) -> LegConstants:
+    values = {}
+    for field in fields(LegConstants):
+        low, high = (np.array(getattr(each, field.name), float) for each in (lower, upper))
+        values[field.name] = (low + weight * (high - low)).tolist()
+    return constants_from(values)
 
 
 def constants_from(values: dict[str, Any]) -> LegConstants:
@@ -119,29 +146,24 @@ class Legs:
     """Phase and hip-knee controller of N bodies.
 
     Args:
-        constants: one set for all, or several to be told apart by `variant`.
-        body, human: the body, and people at its speed.
-        stride_time: the plan's [s].
-        speed: commanded [m/s].
-        num: N.
-        variant: (N,) which of `constants` each body has.
+        rows: constants and walk of each row of the walkers' tables (`envs.walks.rows`).
+        walkers: bodies and speeds.
     """
 
-    def __init__(
-        self,
-        constants: Sequence[LegConstants],
-        body: Body,
-        human: HumanGait,
-        stride_time: float,
-        speed: float,
-        num: int,
-        variant: NDArray | None = None,
-    ):
-        variant = np.zeros(num, int) if variant is None else variant
-        self._gains = np.array([_gains(c, body, stride_time, speed) for c in constants], GAINS)[variant]
-        self._table = PhaseTable(np.stack([leg_curves(c, body, human, stride_time) for c in constants]), variant)
-        self.phase = leg_phases(np.zeros(num))
+    def __init__(self, rows: "Sequence[tuple[LegConstants, Walk]]", walkers: Walkers):
+        self._walkers = walkers
+        self._rows = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
+        self._table = PhaseTable(
+            np.stack([leg_curves(c, walk.body, walk.human, walk.plan.stride_time) for c, walk in rows])
+        )
+        self._gains = np.zeros(len(walkers.place), GAINS)
+        self.phase = leg_phases(np.zeros(len(walkers.place)))
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
+        self.follow()
+
+    def follow(self) -> None:
+        """Take the walkers' bodies and speeds as they are now."""
+        _follow(self._rows, self._walkers.place, self._walkers.scale, self._gains)
 
     def reset(self, ids: NDArray, left_phase: NDArray) -> None:
         """Put the left legs of `ids` (K,) at phases (K,)."""
@@ -150,18 +172,20 @@ class Legs:
     def advance(self, m: Measurement, running: NDArray) -> None:
         """Let one window pass for those `running` (N,): the phase runs on, waits for a late foot, and starts anew
         with the one that lands."""
-        _advance(self._gains, m.com_velocity, m.force, running, self.phase)
+        _advance(self._gains, self._walkers.speed, m.com_velocity, m.force, running, self.phase)
 
     def command(self, m: Measurement, stiffness: NDArray, drive: NDArray) -> None:
         """Put hip and knee stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] into their places in
         two arrays (N, side, joint)."""
-        curves = self._table.at(self.phase)
-        _command(self._gains, curves, m.root, m.root_velocity, m.com_velocity, stiffness, drive)
+        walkers = self._walkers
+        curves = self._table.at(self.phase, walkers.place)
+        _command(
+            self._gains, walkers.speed, walkers.scale, curves, m.root, m.root_velocity, m.com_velocity, stiffness, drive
+        )
 
 
 GAINS = np.dtype(
     [
-        ("speed", float),  # commanded [m/s]
         ("touchdown", float),  # vertical force of a foot that has landed [N]
         ("rate", float),  # phase in one window
         ("rate_gain", float),  # its rise for each m/s too fast [s/m]
@@ -175,10 +199,9 @@ GAINS = np.dtype(
 """Constants of one body's legs, scaled to it."""
 
 
-def _gains(c: LegConstants, body: Body, stride_time: float, speed: float) -> tuple[float, ...]:
+def _gains(c: LegConstants, body: Body, stride_time: float) -> tuple[float, ...]:
     scale, root = body.stiffness_scale, sqrt(body.length_scale)
     return (
-        speed,
         TOUCHDOWN_LOAD * body.mass * GRAVITY,
         WINDOW / (c.period_factor * stride_time),
         c.period_speed_gain / root,
@@ -191,12 +214,33 @@ def _gains(c: LegConstants, body: Body, stride_time: float, speed: float) -> tup
 
 
 @kernel
-def _advance(gains, com_velocity, force, running, phase):
+def _follow(rows, place, scale, gains):
+    for i in range(len(gains)):
+        row, weight = place[i].row, place[i].weight
+        low, high = rows[row], rows[row + 1 if weight > 0.0 else row]
+        root, mass, torque, gain = scale[i].root, scale[i].mass, scale[i].torque, gains[i]
+        gain.touchdown = mass * _between(low.touchdown, high.touchdown, weight)
+        gain.rate = _between(low.rate, high.rate, weight) / root
+        gain.rate_gain = _between(low.rate_gain, high.rate_gain, weight) / root
+        gain.pitch = _between(low.pitch, high.pitch, weight)
+        gain.trunk_stiffness = torque * _between(low.trunk_stiffness, high.trunk_stiffness, weight)
+        gain.trunk_damping = torque * root * _between(low.trunk_damping, high.trunk_damping, weight)
+        gain.speed_torque = torque / root * _between(low.speed_torque, high.speed_torque, weight)
+        gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / root
+
+
+@kernel
+def _between(low, high, weight):
+    return low + weight * (high - low)
+
+
+@kernel
+def _advance(gains, speed, com_velocity, force, running, phase):
     for i in range(len(phase)):
         if not running[i]:
             continue
         gain, left = gains[i], phase[i, LEFT]
-        rate = gain.rate * (1.0 + gain.rate_gain * (com_velocity[i, 0] - gain.speed))
+        rate = gain.rate * (1.0 + gain.rate_gain * (com_velocity[i, 0] - speed[i]))
         waiting = (0.5 if left < 0.5 else 1.0) - HOLD
         left = min(left + max(rate, 0.0), max(waiting, left))
         right = (left + 0.5) % 1.0
@@ -213,18 +257,19 @@ def _load(force):
 
 
 @kernel
-def _command(gains, curves, root, root_velocity, com_velocity, stiffness, drive):
+def _command(gains, speed, scale, curves, root, root_velocity, com_velocity, stiffness, drive):
     for i in range(len(gains)):
         gain = gains[i]
-        too_fast = com_velocity[i, 0] - gain.speed
+        too_fast = com_velocity[i, 0] - speed[i]
+        torque = scale[i].torque
         trunk = -gain.trunk_stiffness * (root[i, 2] - gain.pitch) - gain.trunk_damping * root_velocity[i, 2]
         on_trunk = trunk + gain.speed_torque * too_fast
         placement = gain.swing_gain * too_fast  # a faster body puts its foot further ahead
         for side in range(2):
-            stance, hip, knee = curves[i, side, 0], curves[i, side, 1], curves[i, side, 2]
+            stance, hip, knee = curves[i, side, 0], torque * curves[i, side, 1], torque * curves[i, side, 2]
             stiffness[i, side, HIP], stiffness[i, side, KNEE] = hip, knee
-            drive[i, side, HIP] = curves[i, side, 3] + (stance * on_trunk + (1.0 - stance) * hip * placement)
-            drive[i, side, KNEE] = curves[i, side, 4]
+            drive[i, side, HIP] = torque * curves[i, side, 3] + (stance * on_trunk + (1.0 - stance) * hip * placement)
+            drive[i, side, KNEE] = torque * curves[i, side, 4]
 
 
 def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:

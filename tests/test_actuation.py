@@ -6,6 +6,7 @@ import pytest
 from springfoot.envs.actuation import FootSprings, action_of, stiffness_of, stiffness_ranges
 from springfoot.envs.phase import GRID, SAMPLES, PhaseTable
 from springfoot.envs.settings import ActionMode, BipedSettings
+from springfoot.envs.walkers import Walkers
 from springfoot.gait.body import Body
 
 
@@ -32,7 +33,8 @@ def test_action_of_inverts_the_map_and_stops_at_the_ends():
 def springs(mode: ActionMode = "absolute", num: int = 3) -> FootSprings:
     rest = np.stack([0.3 * np.sin(2 * np.pi * GRID), 0.1 * np.cos(2 * np.pi * GRID)], -1)[None]
     schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
-    return FootSprings(BipedSettings(action_mode=mode), Body(), rest, schedule, num)
+    settings = BipedSettings(action_mode=mode)
+    return FootSprings(settings, Body(), rest, schedule, Walkers(settings, np.array([1.2]), num))
 
 
 def test_a_residual_action_multiplies_the_schedule():
