@@ -7,7 +7,7 @@ Gains are for 1.70 m and 63 kg and scale with the body (see `envs.model`).
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
@@ -103,20 +103,20 @@ def leg_constants(equilibrium: str, cadence: str, speed: float = TUNED_SPEED) ->
             f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r}; "
             "equilibrium 'neutral' needs cadence 'people'"
         )
-    sets = {TUNED_SPEED: table[name]}
-    for other in table:
-        if other.startswith(f"{name}, ") and other.endswith(" m/s"):
-            sets[float(other.removeprefix(f"{name}, ").removesuffix(" m/s"))] = table[other]
+    prefix, unit = f"{name}, ", " m/s"
+    others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]
+    names = {TUNED_SPEED: name} | {float(other.removeprefix(prefix).removesuffix(unit)): other for other in others}
+    return constants_at({each: constants_from(table[found]) for each, found in names.items()}, speed)
+
+
+def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
+    """Constants at `speed` [m/s], linear between those of `sets` by speed, and the nearest beyond."""
     speeds = sorted(sets)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
-    lower = constants_from(sets[speeds[int(place)]])
-    if place == int(place):
+    lower, weight = sets[speeds[int(place)]], place - int(place)
+    if weight == 0.0:
         return lower
-    return _mixed(lower, constants_from(sets[speeds[int(place) + 1]]), place - int(place))
-
-
-def _mixed(lower: LegConstants, upper: LegConstants, weight: float) -> LegConstants:
-    values = {}
+    upper, values = sets[speeds[int(place) + 1]], {}
     for field in fields(LegConstants):
         low, high = (np.array(getattr(each, field.name), float) for each in (lower, upper))
         values[field.name] = (low + weight * (high - low)).tolist()

@@ -8,7 +8,7 @@ from math import isfinite
 from numbers import Real
 from typing import Any, Literal, get_args
 
-from springfoot.gait.body import HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from springfoot.gait.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError, require_number, require_within
 from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.own_data import OwnGait
@@ -119,6 +119,12 @@ class BipedSettings:
                 _check_range(name, getattr(self, name), unit)
                 for value in getattr(self, name):
                     require_within(name, value, allowed, unit)
+        (short, tall), (light, heavy) = self.height_range or 2 * (self.height,), self.mass_range or 2 * (self.mass,)
+        if light / tall**2 > BMI_RANGE[1] or heavy / short**2 < BMI_RANGE[0]:
+            raise SpringfootError(
+                "height_range and mass_range must have a body with a body-mass index in "
+                f"[{BMI_RANGE[0]:g}, {BMI_RANGE[1]:g}] kg/m^2, got {light / tall**2:.3g} to {heavy / short**2:.3g}"
+            )
         if self.speed_interval is not None:
             require_number("speed_interval", self.speed_interval, STEP_SECONDS, unit="s")
             if self.speed_range is None:

@@ -52,7 +52,8 @@ class Walkers:
         self._target = self.speed.copy()
         self._change = np.full(num, np.inf)  # time of the next speed drawn [s]
         self._changing = False
-        self._locate(np.arange(num))
+        self._everyone = np.arange(num)
+        self._locate(self._everyone)
 
     def reset(
         self, ids: NDArray, randoms: Sequence[np.random.Generator], given: Mapping[str, NDArray] | None = None
@@ -97,13 +98,8 @@ class Walkers:
                     self._changing = True
         if not self._changing:
             return False
-        ids = np.flatnonzero(running & (self.speed != self._target))
-        most = settings.speed_rate * STEP_SECONDS
-        self.speed[ids] += np.clip(self._target[ids] - self.speed[ids], -most, most)
-        near = np.abs(self._target - self.speed) < 1e-9
-        self.speed[near] = self._target[near]
-        self._locate(ids)
-        self._changing = not near.all()
+        self._changing = _approach(settings.speed_rate * STEP_SECONDS, running, self._target, self.speed)
+        self._locate(self._everyone)
         return True
 
     def _draw(self, random: np.random.Generator, given: Mapping[str, float]) -> tuple[Body, float]:
@@ -142,6 +138,21 @@ class Walkers:
 
     def _locate(self, ids: NDArray) -> None:
         _locate(ids, self.speed, self.scale, self._speeds, self._first, self.place)
+
+
+@kernel
+def _approach(most, running, target, speed):
+    """Take a step of at most `most` towards the targets; whether there is still a way to go."""
+    under_way = False
+    for i in range(len(speed)):
+        way = target[i] - speed[i]
+        if running[i]:
+            if abs(way) <= most:
+                speed[i] = target[i]
+            else:
+                speed[i] += most if way > 0.0 else -most
+        under_way = under_way or speed[i] != target[i]
+    return under_way
 
 
 @kernel
