@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from springfoot.envs.actuation import action_of
+from springfoot.envs.constants import leg_constants
 from springfoot.envs.equilibrium import fixed_stiffness
-from springfoot.envs.legs import leg_constants
 from springfoot.envs.model import ACTIONS
 from springfoot.envs.phase import GRID, PhaseTable, leg_phases
 from springfoot.envs.settings import BipedSettings

@@ -17,9 +17,10 @@ from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import ANGLES
 
 from .actuation import FEET, FootSprings
+from .constants import LegConstants
 from .equilibrium import foot_curves
 from .kernel import kernel
-from .legs import LegConstants, Legs
+from .legs import Legs
 from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
 from .outcome import Outcome, report
 from .phase import GRID, PhaseTable, leg_phases

@@ -16,17 +16,17 @@ from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.human import ANGLES, HumanGait
 from springfoot.gait.plan import WalkPlan
 
+from .constants import LegConstants
 from .kernel import kernel
 from .model import ANKLE, HIP, JOINTS, KNEE, LEFT, RIGHT, TOE
 from .observation import OBSERVATION, Observer
 from .phase import GRID, PhaseTable
 from .settings import DEFAULT_WEIGHTS, STEP_SECONDS, BipedSettings
 from .walkers import Walkers
+from .walks import Walk
 
 if TYPE_CHECKING:
-    from .legs import LegConstants
     from .simulation import Measurement
-    from .walks import Walk
 
 MIN_HIP_HEIGHT = 0.65
 """A hip lower than this [m at 1.70 m, scaled with height] is a fall (design study)."""
@@ -90,7 +90,7 @@ class Task:
         walkers: bodies and speeds.
     """
 
-    def __init__(self, settings: BipedSettings, rows: "Sequence[tuple[LegConstants, Walk]]", walkers: Walkers) -> None:
+    def __init__(self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, Walk]], walkers: Walkers) -> None:
         self.names = tuple(entry.name for entry in OBSERVATION)
         self._walkers = walkers
         self._observer = Observer(walkers)

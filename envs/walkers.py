@@ -102,7 +102,7 @@ class Walkers:
         self._locate(self._everyone)
         return True
 
-    def _draw(self, random: np.random.Generator, given: Mapping[str, float]) -> tuple[Body, float]:
+    def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, float]:
         """The speed first, then bodies until one can be."""
         settings = self._settings
         ranges = {name: getattr(settings, f"{name}_range") for name in DRAWN}

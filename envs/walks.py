@@ -17,7 +17,7 @@ from springfoot.gait.body import Body
 from springfoot.gait.human import HumanGait
 from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
 
-from .legs import LegConstants, leg_constants
+from .constants import LegConstants, leg_constants
 from .settings import BipedSettings, reference_gait
 
 SPACING = 0.1

@@ -8,8 +8,9 @@ import pytest
 
 from springfoot.envs import legs
 from springfoot.envs.biped import Biped
+from springfoot.envs.constants import constants_at, constants_from, constants_name, leg_constants
 from springfoot.envs.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
-from springfoot.envs.legs import constants_at, constants_name, knot_curve, leg_constants
+from springfoot.envs.legs import knot_curve
 from springfoot.envs.phase import GRID
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.body import Body
@@ -47,7 +48,7 @@ def test_every_committed_speed_has_its_own_constants():
     table = json.loads(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
     sets = {constants_name("planned", "people", speed): speed for speed in np.round(np.arange(0.4, 2.0, 0.1), 9)}
     for name in set(sets) & set(table["constants"]):
-        expected = legs.constants_from(table["constants"][name])
+        expected = constants_from(table["constants"][name])
         assert leg_constants("planned", "people", sets[name]) == expected
         biped = Biped(BipedSettings(height=1.9, mass=70.0, speed=sets[name] * np.sqrt(1.9 / 1.7)), 1)
         np.testing.assert_allclose(biped.constants[0].hip_knots_deg, expected.hip_knots_deg, rtol=1e-9)
@@ -72,7 +73,7 @@ def test_knots_are_met_and_periodic():
 def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
     body, human = Body(), human_gait(1.2)
     plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
-    constants = legs.constants_from({**vars(leg_constants("planned", "people")), **plain})
+    constants = constants_from({**vars(leg_constants("planned", "people")), **plain})
     rest = planned(constants, body, human, human.stride_time)[:, 0]
     rate = human.rate("ankle", GRID) / (constants.period_factor * human.stride_time)
     torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - human.mean("ankle", GRID) - 0.02 * rate)

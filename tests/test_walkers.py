@@ -151,7 +151,7 @@ def test_a_reset_leaves_the_others_alone():
 
 
 def test_every_face_has_the_same_bits():
-    settings = ANYBODY | {"speed_interval": 0.2, "episode_seconds": 0.4}
+    settings: dict[str, Any] = ANYBODY | {"speed_interval": 0.2, "episode_seconds": 0.4}
     singles = [SegmentedFootBiped(**settings) for _ in range(3)]
     vector = SegmentedFootBipedVector(3, autoreset_mode="SameStep", **settings)
     sb3 = SegmentedFootBipedVecEnv(3, **settings)
