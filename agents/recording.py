@@ -23,12 +23,9 @@ from springfoot.gait.plan import WalkPlan
 from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
+_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval")
 CONDITIONS = {
-    name: getattr(BipedSettings, name)
-    for name in (
-        *("height", "mass", "speed", "height_range", "mass_range", "speed_range", "speed_interval"),
-        *("push_newton", "start_noise"),
-    )
+    name: getattr(BipedSettings, name) for name in ("height", "mass", "speed", *_RANGES, "push_newton", "start_noise")
 }
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
@@ -147,7 +144,11 @@ def record(
         threads: of the physics; any number gives the same bits.
         model: the body's with other options, as for `envs.simulation.Simulation`.
         progress: told the simulated time [s] of all episodes together after every step.
+
+    Raises `SpringfootError` for settings that draw bodies or speeds.
     """
+    if any(getattr(settings, name) is not None for name in _RANGES):
+        raise SpringfootError(f"a recording is of one body at one speed: {', '.join(_RANGES)} must be None")
     length = WINDOWS * ceil(round(settings.episode_seconds / Biped.dt, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
     reason = np.full(episodes, "", dtype="U64")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springfoot.agents.evaluation import CURVES, measure
-from springfoot.agents.recording import SERIES, Recording, load_recording
+from springfoot.agents.recording import SERIES, Recording, load_recording, prepare, record
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT
@@ -188,6 +188,12 @@ def test_numbers_can_be_recomputed_from_the_saved_series(tmp_path):
         assert not any(values.dtype.hasobject for values in file.values())
         assert set(SERIES) < set(file)
     assert measure(load_recording(tmp_path / "strides.npz")).metrics == measure(recording).metrics
+
+
+def test_a_recording_is_of_one_body_at_one_speed():
+    policy, settings = prepare("untrained", {"mass_range": (50.0, 80.0)})
+    with pytest.raises(SpringfootError, match="mass_range"):
+        record(policy, settings, name="untrained", episodes=1)
 
 
 @pytest.mark.parametrize("content", [b"", b"not an archive", b"PK\x03\x04 half an archive", b"\x80\x04K\x01."])
