@@ -89,10 +89,8 @@ class Biped:
         self.num_envs = num_envs
         self.on_tick: Callable[[Tick], None] | None = None
         self.walks = walks_of(settings, legs)
-        self.walk = next(walk for walk in self.walks if walk.speed == settings.speed)
-        self.body, self.human, self.plan, self.constants = (
-            getattr(self.walk, name) for name in ("body", "human", "plan", "constants")
-        )
+        own = next(walk for walk in self.walks if walk.speed == settings.speed)
+        self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
         table = list(rows(self.walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.walkers = Walkers(settings, speeds, num_envs, variant)

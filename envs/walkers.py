@@ -20,7 +20,7 @@ from .settings import STEP_SECONDS, BipedSettings
 SCALE = np.dtype([("length", float), ("root", float), ("mass", float), ("torque", float)])
 """Ratios of a body to the settings' own: of height, its square root (of times and speeds), of mass, and mass x height
 (of torque and stiffness)."""
-DRAWN = ("height", "mass", "speed")
+DRAWN: tuple[str, ...] = ("height", "mass", "speed")
 """What may be drawn for each environment: settings `<name>_range`, and options of a reset."""
 MOST_DRAWS = 1000
 """Bodies drawn for one reset before it is given up: ranges of height and mass may hardly have one in common."""
