@@ -22,7 +22,7 @@ from springfoot.gait.own_data import read_gait
 class TrainingConfig:
     """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
 
-    timesteps: int = 1_000_000
+    timesteps: int = 1_500_000
     """Environment steps of 20 ms to learn from, rounded up to whole updates."""
     seed: int = 0
     """Seed of weights, action noise and environments."""
@@ -50,7 +50,7 @@ class TrainingConfig:
     """Logarithm of the standard deviation of the actions at the start."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden tanh layers, the same for actor and critic."""
-    eval_interval: int = 65_536
+    eval_interval: int = 131_072
     """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
     eval_episodes: int = 16
     """Episodes of each periodic evaluation, on the same fixed seeds every time."""

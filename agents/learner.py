@@ -18,6 +18,11 @@ from springfoot.gait.errors import SpringfootError
 from .bundle import Policy
 from .config import TrainingConfig
 
+NEVER_VARIED = 1e-6
+"""An observation whose variance in training stayed below this told the policy nothing (real ones: above 1e-5)."""
+IGNORED = 1e12
+"""Variance by which such an observation is divided in the policy, so that another value does not reach it."""
+
 
 class Learner:
     """An untrained actor and critic on a batch of environments; the actor's mean action begins in mid-range.
@@ -58,13 +63,16 @@ class Learner:
         network = self.ppo.policy
         hidden = [layer for layer in network.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
         layers = [*hidden, network.action_net]
+        # Weights on what never varied (body, commanded speed) are still the random ones they began with.
+        seen = self._statistics()["observation"]
+        variance = np.where(seen.var < NEVER_VARIED, IGNORED, seen.var)
         return Policy(
             settings=self._environment,
             fingerprint=fingerprint,
             weights=tuple(layer.weight.detach().numpy().copy() for layer in layers),
             biases=tuple(layer.bias.detach().numpy().copy() for layer in layers),
-            observation_mean=self._statistics()["observation"].mean.copy(),
-            observation_variance=self._statistics()["observation"].var.copy(),
+            observation_mean=seen.mean.copy(),
+            observation_variance=variance,
             observation_clip=self.normalized.clip_obs,
         )
 

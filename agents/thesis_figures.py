@@ -14,9 +14,9 @@ from PIL import Image
 
 from springfoot.gait import GRAVITY, Body, HumanGait, WalkPlan, human_gait
 from springfoot.gait import thesis as printed_thesis
-from springfoot.gait.feet import turned
-from springfoot.gait.human import human_cop
+from springfoot.gait.human import ANGLES, human_cop
 from springfoot.gait.kinetics import foot_force
+from springfoot.gait.leg import joint_positions, segment_turns
 from springfoot.gait.thesis import ThesisWalk
 
 from .figures import PEOPLE, PLAN, STYLE
@@ -129,13 +129,10 @@ def of_people(speed: float, body: Body) -> Walk:
     # Mean curves carry 4 % too much weight and a trace of net impulse; a periodic walk has neither.
     acceleration = GRAVITY * np.stack([force[0] - force[0].mean(), force[1] / force[1].mean() - 1])
     wave = _integrated_twice(acceleration, human.stride_time)
-    thigh, knee, ankle = (human.mean(name, phase) for name in ("thigh", "knee", "ankle"))
-    below_hip = body.thigh_length * np.exp(1j * thigh) + body.shank_length * np.exp(1j * (thigh - knee))
     hip = np.stack([stride * phase, 0 * phase]) + wave
-    ankle_path = hip + np.stack([below_hip.imag, -below_hip.real])
+    joints = joint_positions(body, segment_turns({name: human.mean(name, phase) for name in ANGLES}), hip.T)
     flat = (phase > 0.12) & (phase < 0.40)
-    off = ankle_path[:, flat].mean(axis=-1, keepdims=True) - [[0.0], [body.ankle_height]]
-    toe = turned(ankle + thigh - knee, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
+    off = joints["ankle"][flat].mean(axis=0)[:, None] - [[0.0], [body.ankle_height]]
     over = np.round(n * PHASE).astype(int)
     index, later = over % n, stride * (over // n)
 
@@ -149,8 +146,8 @@ def of_people(speed: float, body: Body) -> Walk:
         step_time=human.stride_time / 2,
         double_support=2 * human.toe_off - 1,
         com=moved(hip),
-        ankle=moved(ankle_path),
-        toe_joint=moved(ankle_path + np.stack(toe)),
+        ankle=moved(joints["ankle"].T),
+        toe_joint=moved(joints["toe"].T),
         force=force[:, index],
         foot=foot[:, index],
         zmp=_both_feet(human, body),

@@ -129,7 +129,7 @@ def _figures(printed: Walk, plan: Walk, people: Walk) -> list[str]:
             10,
             "ZMP",
             f"""Yellow: feet on the ground; dotted: CoM. By equation (1) the printed ZMP is off the feet
-            {100 * np.mean(outside != 0):.0f} % of the time, by up to {100 * outside.max():.0f} cm before the toes
+            {100 * np.mean(outside != 0):.0f} % of the time, by up to {100 * outside.max():.0f} cm ahead of the toes
             ({TIME[outside.argmax()]:.2f} s, heel strike) and {-100 * outside.min():.0f} cm behind the heel
             ({TIME[outside.argmin()]:.2f} s), each foot counted whole from heel strike to toe-off. The thesis saw it
             follow the CoM "under the plantar": its program divides two rows by `/`, in MATLAB one least-squares

@@ -212,6 +212,7 @@ class _Run(BaseCallback):
         returns, seconds, fell = evaluate_returns(self._evaluation, policy, EVALUATION_SEED)
         entry = {
             "timesteps": self._trained,
+            "seconds": round(self._seconds(), 1),
             "return_mean": float(returns.mean()),
             "return_sd": float(returns.std()),
             "episodes": len(returns),
@@ -228,11 +229,14 @@ class _Run(BaseCallback):
         self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {len(returns)} fell")
         self._save()
 
+    def _seconds(self) -> float:
+        """Wall time of this sitting and those before it [s]."""
+        return self._seconds_before + monotonic() - self._began
+
     def _save(self, policies: bool = True) -> None:
         """Writes the newest policy, the state and the record; without `policies` the record only."""
         best = max(self._record["evaluations"], key=lambda entry: entry["return_mean"], default=None)
-        seconds = self._seconds_before + monotonic() - self._began
-        self._record |= {"timesteps": self._trained, "seconds": round(seconds, 1), "best": best}
+        self._record |= {"timesteps": self._trained, "seconds": round(self._seconds(), 1), "best": best}
         if policies:
             save_policy(self._out / LAST, self.learner.policy(self._fingerprint))
             header = {"springfoot-training": json.dumps({"timesteps": self._trained})}

@@ -151,6 +151,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `push_seconds`        | `0.1`          | duration of each push [s]                                         |
     | `push_interval`       | `4.0`          | one push at a random time in each interval [s]                    |
     | `reward_weights`      | `{}`           | weights that differ from the table above                          |
+    | `human`               | `None`         | own gait data in people's place: `read_gait(FILE).to_json()`      |
 
     and `render_mode`: `"human"`, `"rgb_array"` or None.
 

@@ -9,7 +9,7 @@ from numbers import Real
 from typing import Any, Literal, get_args
 
 from springfoot.gait.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
-from springfoot.gait.errors import SpringfootError, require_number, require_within
+from springfoot.gait.errors import SpringfootError, as_float, require_number, require_within
 from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
@@ -177,14 +177,14 @@ def check_start(start: Any) -> None:
 def _plain(value: Any) -> Any:
     """Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
     if isinstance(value, Real) and not isinstance(value, bool):
-        return float(value)
+        return as_float(value)
     if isinstance(value, (list, tuple)):
         return tuple(_plain(item) for item in value)
     return deepcopy(value)
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
+    return isfinite(as_float(value))
 
 
 def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:

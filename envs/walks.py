@@ -45,7 +45,7 @@ def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None
     """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first.
 
     `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
-    walk that cannot be planned. A plan takes a tenth of a second, and is kept for the next batch.
+    walk that cannot be planned.
     """
     return tuple(walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
 
@@ -59,7 +59,11 @@ def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] 
         body=body,
         speed=speed,
         human=human,
-        plan=_plan(body, speed, settings.cadence, own_step_time(settings, human)),
+        plan=(
+            _plan(body, speed, settings.cadence)
+            if settings.human is None
+            else plan_walk(body, speed, settings.cadence, human=human)
+        ),
         constants=tuple(
             legs or [leg_constants(settings.equilibrium, settings.cadence, speed / sqrt(body.length_scale))]
         ),
@@ -90,16 +94,7 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     return np.array(sorted({*grid, speed}))
 
 
-def own_step_time(settings: BipedSettings, human: HumanGait) -> float | None:
-    """Step time [s] of own data, None where the plan takes people's or the thesis's.
-
-    Step length and rate share, as in `plan_walk`, what is left between the data and the commanded speed.
-    """
-    if settings.human is None or settings.cadence == "thesis":
-        return None
-    return human.stride_time / 2 / sqrt(settings.speed * human.stride_time / (2 * human.step_length))
-
-
 @lru_cache(maxsize=256)
-def _plan(body: Body, speed: float, cadence: Cadence, step_time: float | None) -> WalkPlan:
-    return plan_walk(body, speed, cadence, step_time=step_time)
+def _plan(body: Body, speed: float, cadence: Cadence) -> WalkPlan:
+    """People's, kept: planning takes a tenth of a second."""
+    return plan_walk(body, speed, cadence)

@@ -6,7 +6,10 @@ and Figure 4.1 (segment lengths). All ratios of masses are of body mass, all rat
 """
 
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import cos, hypot, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .errors import require_within
 
@@ -24,6 +27,11 @@ MASS_RANGE = (20.0, 250.0)
 """Body masses accepted [kg]."""
 BMI_RANGE = (10.0, 80.0)
 """Body-mass indices accepted [kg/m^2]."""
+
+
+def gravity(slope: float) -> NDArray:
+    """Acceleration of gravity (2,) [m/s^2] in a frame that leans with a `slope` [rad], uphill positive."""
+    return -GRAVITY * np.array([sin(slope), cos(slope)])
 
 
 @dataclass(frozen=True)

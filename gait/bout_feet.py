@@ -10,10 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
 from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
-from .plan import WalkPlan
+from .plan import Point, WalkPlan
 from .posture import STRAIGHTEST_KNEE, Legs, full_reach, legs_under, toe_angle
-
-Point = tuple[NDArray, NDArray]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,9 +107,9 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
 def _out_of_ground(stride: FootPath) -> FootPath:
     """Its swing raised to where it is no deeper in the ground than `FLOOR_TOLERANCE`, if it is."""
     before_landing = 0.005, 0.9
-    heights = stride._heights(before_landing)
+    heights = stride.swing_heights(before_landing)
     # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
-    gain = replace(stride, lift=stride.lift + 1)._heights(before_landing) - heights
+    gain = replace(stride, lift=stride.lift + 1).swing_heights(before_landing) - heights
     lacking = (-FLOOR_TOLERANCE - heights) / gain
     return replace(stride, lift=stride.lift + max(0.0, float(lacking.max())))
 

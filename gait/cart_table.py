@@ -7,14 +7,14 @@ p = x - z (x'' + g sin a) / (z'' + g cos a).
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import cos, pi, sin, sqrt
+from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly, PPoly
 
-from .body import GRAVITY
+from .body import gravity
 
 SAMPLES = 240
 """Knots a step of the tabulated CoM path; quintics between them, so that its error stays that of the integration."""
@@ -27,7 +27,7 @@ def zmp(
 
     On a `slope` [rad], uphill positive, x is along the ground and z at right angles to it.
     """
-    back, down = _gravity(slope)
+    back, down = -gravity(slope)
     return np.asarray(x) - np.asarray(z) * (np.asarray(x_acceleration) + back) / (np.asarray(z_acceleration) + down)
 
 
@@ -129,7 +129,7 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
     exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
     """
-    back, down = _gravity(slope)
+    back, down = -gravity(slope)
     rate = sqrt(down / height)
     coefficients = np.array(zmp.c, float)
     for order in range(2, len(coefficients), 2):
@@ -164,7 +164,7 @@ def _integrated(
 ) -> PPoly:
     """`periodic_com` by superposing one particular and two homogeneous solutions: periodic at the cost of 2 x 2."""
     step_time = zmp_times[-1]
-    back, down = _gravity(slope)
+    back, down = -gravity(slope)
 
     def pull(t: ArrayLike) -> NDArray:
         z = height + _bob(t, step_time, amplitude, lowest_at)
@@ -195,11 +195,6 @@ def _integrated(
     acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
     quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
     return PPoly.from_bernstein_basis(quintics)
-
-
-def _gravity(slope: float) -> tuple[float, float]:
-    """Gravity (back along the ground, down into it) [m/s^2]."""
-    return GRAVITY * sin(slope), GRAVITY * cos(slope)
 
 
 def _bob(t: ArrayLike, step_time: float, amplitude: float, lowest_at: float, derivative: int = 0) -> NDArray:

@@ -1,6 +1,6 @@
 """The one exception of springfoot, and the checks that raise it most."""
 
-from math import inf, isfinite, nan
+from math import inf, isfinite, isinf, isnan, nan
 from numbers import Integral, Real
 
 
@@ -8,12 +8,22 @@ class SpringfootError(ValueError):
     """Bad input or an impossible request: one line saying what was wrong and what is allowed."""
 
 
+def as_float(value: object) -> float:
+    """A number as a float, infinite if too large for one; NaN for what is no number."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return nan
+    try:
+        return float(value)
+    except OverflowError:
+        return -inf if value < 0 else inf
+
+
 def require_within(name: str, value: object, allowed: tuple[float, float], unit: str = "") -> float:
     """`value` as a float, or `SpringfootError` if it is not a finite number in [low, high] of `unit`."""
     low, high = allowed
-    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else None
-    if number is None or not low <= number <= high:
-        given = repr(value) if number is None else f"{number:.4g}"
+    number = as_float(value)
+    if not low <= number <= high:
+        given = repr(value) if isnan(number) else f"{number:.4g}"
         raise SpringfootError(f"{name} must be in [{low:g}, {high:g}] {unit}".rstrip() + f", got {given}")
     return number
 
@@ -21,11 +31,12 @@ def require_within(name: str, value: object, allowed: tuple[float, float], unit:
 def require_number(
     name: str, value: object, low: float, high: float = inf, unit: str = "", *, above: bool = False
 ) -> float:
-    """`value`, or `SpringfootError` if it is not a finite number in [low, high], or in (low, high] with `above`."""
-    number = value if isinstance(value, (int, float)) and not isinstance(value, bool) else nan
+    """`value` as a float, or `SpringfootError` if it is not finite and in [low, high], (low, high] with `above`."""
+    number = as_float(value)
     if not (isfinite(number) and low <= number <= high) or (above and number == low):
         bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == inf else f" and <= {high:.4g}")
-        raise SpringfootError(f"{name} must be a finite number {bounds} {unit}".rstrip() + f", got {value!r}")
+        given = "infinity" if isinf(number) else repr(value)
+        raise SpringfootError(f"{name} must be a finite number {bounds} {unit}".rstrip() + f", got {given}")
     return number
 
 
@@ -34,5 +45,6 @@ def require_count(name: str, value: object, least: int = 1, most: float = inf) -
     count = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if count is None or not least <= count <= most:
         bounds = f">= {least}" + ("" if most == inf else f" and <= {most}")
-        raise SpringfootError(f"{name} must be a whole number {bounds}, got {value!r}")
+        given = "infinity" if isinf(as_float(value)) else repr(value)
+        raise SpringfootError(f"{name} must be a whole number {bounds}, got {given}")
     return count

@@ -99,7 +99,7 @@ class FootPath:
     @property
     def clearance(self) -> float:
         """Least height [m] of ball and heel above the floor in `MID_SWING`."""
-        return float(self._heights(MID_SWING).min())
+        return float(self.swing_heights(MID_SWING).min())
 
     def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Rear and front end (x, x) [m] of what is on the ground in stance: heel, sole, then toe joint to toe tip."""
@@ -109,7 +109,7 @@ class FootPath:
             phase >= self.foot_flat, joint + self.body.toe_length, heel
         )
 
-    def _heights(self, part: tuple[float, float]) -> NDArray:
+    def swing_heights(self, part: tuple[float, float]) -> NDArray:
         """(2, 200) ball and heel above the floor [m] over a part of the swing."""
         phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
         return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
@@ -193,9 +193,9 @@ def feet_under_zmp(
     )
     if clearance is not None:
         clearance = require_within("clearance", clearance, (0.0, body.leg_length), "m")
-        flattest = feet._heights(MID_SWING)
+        flattest = feet.swing_heights(MID_SWING)
         # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
-        gain = replace(feet, lift=1.0)._heights(MID_SWING) - flattest
+        gain = replace(feet, lift=1.0).swing_heights(MID_SWING) - flattest
         feet = replace(feet, lift=float(((clearance - flattest) / gain).max()))
     return feet
 
@@ -206,7 +206,7 @@ def refuse_swing_in_ground(feet: FootPath) -> None:
     The tip of the toe is not looked at: early in swing the toe bends back to people's posture, which at 1.2 m/s would
     take its tip 20 mm into the floor; a sprung toe gives way.
     """
-    lowest = float(feet._heights((0.005, 0.995)).min())
+    lowest = float(feet.swing_heights((0.005, 0.995)).min())
     if lowest < -FLOOR_TOLERANCE:
         raise SpringfootError(
             f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "

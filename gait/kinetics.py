@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .body import GRAVITY, Body
+from .body import GRAVITY, Body, gravity
 from .errors import SpringfootError
 from .feet import turned
 from .human import ANGLES, HumanGait, human_cop
@@ -17,7 +17,6 @@ from .leg import (
     JOINTS,
     FootLoad,
     LegMotion,
-    gravity,
     inverse_dynamics,
     joint_positions,
     load_at,
@@ -28,6 +27,7 @@ from .leg import (
 )
 from .plan import WalkPlan
 from .posture import GRID
+from .scores import correlation
 
 ZMP_TOLERANCE = 1e-6
 """A ZMP this far [m] outside the two centres of pressure is rounding."""
@@ -179,12 +179,12 @@ def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[Le
         turn=leg.turn,
         rate=leg.rate,
         acceleration=leg.acceleration,
-        hip=ankle - joint_positions(body, leg)["ankle"],
+        hip=ankle - joint_positions(body, leg.turn, leg.hip)["ankle"],
         hip_acceleration=com_acceleration - swinging,
     )
     cop = body.foot_length * human_cop(phase / gait.toe_off)
     force = body.mass * GRAVITY * forces(phase)
-    toe_joint = joint_positions(body, motion)["toe"]
+    toe_joint = joint_positions(body, motion.turn, motion.hip)["toe"]
     return motion, load_at(force, np.stack([cop, np.zeros(cop.shape)], -1), toe_joint[..., 0])
 
 
@@ -205,14 +205,13 @@ def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float
             ours, exact = projection[joint][where] / body.mass, dynamics[joint][where] / body.mass
             if not len(ours):
                 continue
-            vary = min(float(np.ptp(ours)), float(np.ptp(exact))) > 0
             rows.append(
                 ProjectionError(
                     joint=joint,
                     part=part,
                     rms=float(np.sqrt(np.mean((ours - exact) ** 2))),
                     peak=float(np.abs(ours - exact).max()),
-                    r=float(np.corrcoef(ours, exact)[0, 1]) if vary else None,
+                    r=correlation(ours, exact),
                 )
             )
     return rows

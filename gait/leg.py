@@ -9,13 +9,12 @@ masses, centres and inertias are `Body`'s. All arrays share their leading axes, 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, sin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from .body import GRAVITY, Body
+from .body import Body, gravity
 from .errors import SpringfootError, require_number
 from .feet import turned
 from .human import ANGLES
@@ -75,11 +74,6 @@ class JointLoads:
 # Motion and load ------------------------------------------------------------------------------------------
 
 
-def gravity(slope: float) -> NDArray:
-    """Acceleration of gravity (2,) [m/s^2] in a frame that leans with a `slope` [rad], uphill positive."""
-    return -GRAVITY * np.array([sin(slope), cos(slope)])
-
-
 def segment_turns(angles: Mapping[str, ArrayLike], slope: float = 0.0) -> NDArray:
     """Segment turns (..., 4) [rad] from the angles thigh (to the true vertical), knee, ankle, toe [rad].
 
@@ -111,11 +105,11 @@ def leg_motion(angles: Mapping[str, ArrayLike], hip: ArrayLike, tick: float, slo
     return motion_of(*(spline(spline.x, derivative) for derivative in range(3)))
 
 
-def joint_positions(body: Body, motion: LegMotion) -> dict[str, NDArray]:
-    """Joints (..., 2) (x, z) [m] by name."""
-    joints = [motion.hip]
+def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArray]:
+    """Joints (..., 2) (x, z) [m] by name, from segment turns (..., 4) [rad] and the hip (..., 2) [m]."""
+    joints = [hip]
     for index, offset in enumerate(_far_ends(body)):
-        joints.append(joints[-1] + np.stack(turned(motion.turn[..., index], *offset), -1))
+        joints.append(joints[-1] + np.stack(turned(turn[..., index], *offset), -1))
     return dict(zip(JOINTS, joints, strict=True))
 
 
@@ -132,7 +126,7 @@ def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion
 
 def mass_acceleration(body: Body, motion: LegMotion) -> NDArray:
     """Sum of mass times acceleration (..., 2) [N] over the segments of a leg."""
-    joints = list(joint_positions(body, motion).values())
+    joints = list(joint_positions(body, motion.turn, motion.hip).values())
     return np.sum([mass * _com(body, motion, joints, i)[1] for i, (mass, _) in enumerate(_inertial(body))], axis=0)
 
 
@@ -176,7 +170,7 @@ def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[st
     the joint, which is the torque with which the joint holds the load: the internal moment.
     """
     moments = {}
-    for index, (name, joint) in enumerate(joint_positions(body, motion).items()):
+    for index, (name, joint) in enumerate(joint_positions(body, motion.turn, motion.hip).items()):
         turning = -_cross(load.point - joint[..., None, :], load.force)
         moments[name] = _MOMENT_SIGN[index] * (turning[..., 1] if index == TOE else turning.sum(-1))
     return moments
@@ -189,7 +183,7 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     forces on it, and the moment is I times the turn's acceleration less the other moments about the CoM, that of F
     included (Winter 2009, section 5.1).
     """
-    joints = list(joint_positions(body, motion).values())
+    joints = list(joint_positions(body, motion.turn, motion.hip).values())
     force, turning = np.zeros(motion.hip.shape), np.zeros(motion.hip.shape[:-1])
     moments, forces = {}, {}
     for index in reversed(range(len(SEGMENTS))):

@@ -246,7 +246,7 @@ def _series(kind: str, rows: object) -> dict[str, NDArray]:
             raise SpringfootError(f"human {kind} has no curve {name!r:.40}; there are {', '.join(COLUMNS)}")
         try:
             array = np.array(values, float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             array = np.empty(0)
         shape_fits = array.ndim == 1 if name in FORCES else array.ndim == 2 and array.shape[1:] == (2,)
         if not shape_fits or not 0 < len(array) <= _MOST_COEFFICIENTS or not (np.abs(array) < _LARGEST).all():

@@ -71,7 +71,7 @@ class WalkPlan:
     feet: FootPath
     """The path of either foot over its stride, with the phases of foot flat, heel-off and toe-off."""
     human: HumanGait
-    """People's gait at this speed and height."""
+    """People's gait at this speed and height, or what `plan_walk` was given in its place."""
     joint_table: PchipInterpolator = field(repr=False)
     """thigh, knee, ankle, toe [rad] over stride phase, a little beyond 0..1."""
     hip_table: PchipInterpolator = field(repr=False)
@@ -151,6 +151,7 @@ def plan_walk(
     zmp_travel: tuple[float, float] | None = None,
     slope: float = 0.0,
     clearance: float | None = None,
+    human: HumanGait | None = None,
 ) -> WalkPlan:
     """Plans a walk of `body` at `speed` [m/s] along the ground.
 
@@ -163,6 +164,7 @@ def plan_walk(
     `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
     (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
     rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
+    `human` stands in people's place (`human_gait`): its step length and time, and its toe in swing.
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
     is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's.
     Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
@@ -172,7 +174,7 @@ def plan_walk(
     if cadence not in get_args(Cadence):
         raise SpringfootError(f"cadence must be 'people' or 'thesis', got {cadence!r}")
     slope = require_within("slope", slope, SLOPE_RANGE, "rad")
-    human = human_gait(speed, body.height)
+    human = human_gait(speed, body.height) if human is None else human
     if step_time is None:
         step_time, step_length = _step(body, speed, cadence, human)
     else:

@@ -121,7 +121,7 @@ def _gains(
 def _row(zmp_reference: ArrayLike) -> NDArray:
     try:
         reference = np.asarray(zmp_reference, float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SpringfootError("zmp_reference must be a row of numbers [m]") from error
     if reference.ndim != 1 or len(reference) < FEWEST_SAMPLES:
         raise SpringfootError(

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from .body import GRAVITY, Body
 from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .errors import SpringfootError
+from .feet import turned
 from .human import COLUMNS, FORCES
+from .leg import FOOT, joint_positions, segment_turns
 from .motion_files import Curves, Trial, refuse_absurd
 
 FEWEST_STRIDES = 2
@@ -161,11 +163,10 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
 
     body = Body()
     thigh, knee, ankle = (_smooth(angle, tick) for angle in (thigh, knee, ankle))
-    shank = thigh - knee
-    foot = shank + ankle
-    x = body.thigh_length * np.sin(thigh) + body.shank_length * np.sin(shank) + body.ankle_height * np.sin(foot)
-    heel = x - body.heel_to_ankle * np.cos(foot)
-    toe = x + (body.ankle_to_toe_joint + body.toe_length) * np.cos(foot)
+    turn = segment_turns({"thigh": thigh, "knee": knee, "ankle": ankle, "toe": 0.0})
+    x = joint_positions(body, turn, np.zeros((len(turn), 2)))["ankle"][:, 0]
+    heel = x + turned(turn[:, FOOT], -body.heel_to_ankle, -body.ankle_height)[0]
+    toe = x + turned(turn[:, FOOT], body.ankle_to_toe_joint + body.toe_length, -body.ankle_height)[0]
 
     def peaks(values: NDArray) -> NDArray:
         # Half of the excursion stands out once a stride, whatever the cadence.

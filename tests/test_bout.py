@@ -10,13 +10,14 @@ from springfoot.gait import GRAVITY, Body, SpringfootError
 from springfoot.gait.bout import plan_bout
 from springfoot.gait.bout_com import STANDING_COM, zmp_knots
 from springfoot.gait.feet import turned
+from springfoot.gait.plan import Cadence
 from springfoot.gait.posture import STRAIGHTEST_KNEE
 
 SIDES = ("left", "right")
 
 
 @cache
-def bout_of(speed=1.2, steps=6, cadence="people", height=1.70, **settings):
+def bout_of(speed=1.2, steps=6, cadence: Cadence = "people", height=1.70, **settings):
     return plan_bout(Body(height, 22 * height**2), speed, steps, cadence, **settings)
 
 
@@ -95,12 +96,13 @@ def test_com_solves_the_cart_table_at_moving_height_with_the_shifts_as_unknowns(
         pull = (GRAVITY + bout.com_acceleration(t)[1]) / bout.com(t)[1]
         return np.stack([state[1], pull * (state[0] - driven(t, shifts))])
 
+    first, last = columns[[0, -1], 0]
+
     def at_rest(start, end, shifts):
-        first, last = columns[[0, -1], 0]
         return np.array([start[0] - first, start[1], end[0] - last, end[1]])
 
     grid = np.unique(np.round(np.union1d(np.linspace(0, bout.duration, 601), knots), 9))
-    guess = np.stack([np.linspace(*columns[[0, -1], 0], len(grid)), np.zeros(len(grid))])
+    guess = np.stack([np.linspace(first, last, len(grid)), np.zeros(len(grid))])
     solution = solve_bvp(motion, at_rest, grid, guess, p=[0.0, 0.0], tol=1e-8, max_nodes=50_000)
     assert solution.success
     assert np.abs(bout.com(grid)[0] - solution.sol(grid)[0]).max() < 1e-6

@@ -107,7 +107,7 @@ def test_legs_of_a_plan_carry_its_trunk(cadence, speed, slope):
     error = np.abs(hips + needed) / (body.mass * GRAVITY)
     assert np.sqrt(np.mean(error**2)) < 0.02
     # The leg stands where the plan has it.
-    ankle = joint_positions(body, motion)["ankle"]
+    ankle = joint_positions(body, motion.turn, motion.hip)["ankle"]
     np.testing.assert_allclose(ankle, np.stack(plan.ankle_position(PHASE), -1), atol=3e-3)
 
 
@@ -158,7 +158,7 @@ def test_peoples_measured_curves_give_their_measured_ankle_moment():
         "toe": np.zeros(len(rows)),
     }
     motion = leg_motion(angles, np.zeros((len(rows), 2)), 0.01 * 1.098)
-    pitch, ankle = motion.turn[:, 2], joint_positions(body, motion)["ankle"]
+    pitch, ankle = motion.turn[:, 2], joint_positions(body, motion.turn, motion.hip)["ankle"]
     # The foot turns about the heel while its toes point up, about the ball of the foot while they point down.
     pivot = np.where(pitch > 0, -body.heel_to_ankle, body.ankle_to_toe_joint)
     x, z = turned(pitch, 0.0, body.ankle_height)

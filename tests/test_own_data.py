@@ -232,6 +232,7 @@ def test_json_gives_the_same_gait_to_the_bit(tmp_path):
         (lambda v: v | {"mean": None}, "human mean must map"),
         (lambda v: v | {"mean": {"elbow": [[1, 0]]}}, "no curve 'elbow'"),
         (lambda v: v | {"mean": {"knee": [1.0, 2.0]}}, "human mean knee must be"),
+        (lambda v: v | {"mean": {"knee": [[10**400, 0]]}}, "human mean knee must be"),
         (lambda v: v | {"sd": {"knee": [[float("nan"), 0]]}}, "human sd knee must be"),
         (lambda v: v | {"sd": {"grf_vertical": [["x"]]}}, "human sd grf_vertical must be"),
     ],

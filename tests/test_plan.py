@@ -1,11 +1,12 @@
 """The plan against its own physics (cart-table, rockers, kinematics) and against people."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from springfoot.gait import GRAVITY, Body, SpringfootError, plan_walk
+from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait, plan_walk
 from springfoot.gait.feet import turned
 from springfoot.gait.plan import Cadence
 from springfoot.gait.posture import leg_angles
@@ -169,6 +170,19 @@ def test_angles_are_like_peoples_at_1_2(cadence, double_support):
 def test_step_time_replaces_the_cadence_and_the_step_follows_from_the_speed():
     plan = plan_of(step_time=0.6)
     assert plan.step_time == 0.6 and plan.step_length == pytest.approx(0.72) and plan.stride_time == 1.2
+
+
+def test_step_and_swing_toe_follow_a_gait_given_in_peoples_place():
+    people = human_gait(1.0)
+    toe = {**people.mean_series, "toe": np.array([0.2 + 0j])}
+    own = replace(people, speed=1.0, stride_time=1.25, step_length=0.625, mean_series=toe)
+    plan = plan_walk(Body(), 1.2, human=own)
+    # Step length and rate each take the square root of 1.2 m/s for 1.0.
+    assert plan.step_length == pytest.approx(0.625 * np.sqrt(1.2))
+    assert plan.step_time == pytest.approx(1.25 / 2 / np.sqrt(1.2))
+    late_swing = plan.joint_angles(np.linspace((2 + plan.feet.toe_off) / 3, 0.99, 50))
+    np.testing.assert_allclose(late_swing["toe"], 0.2, atol=1e-12)
+    assert plan_walk(Body(), 1.2, "thesis", human=own).step_time == 0.5
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.017, 0.05, 0.15])

@@ -5,6 +5,7 @@ import pytest
 
 from springfoot.agents.bundle import find_policy
 from springfoot.agents.evaluation import measure
+from springfoot.agents.learning_curves import unmet
 from springfoot.agents.recording import prepare, record
 
 
@@ -28,17 +29,10 @@ def test_it_is_small():
     assert find_policy("pretrained").stat().st_size <= 1_000_000
 
 
-def test_it_walks_at_the_commanded_speed(pretrained):
-    assert pretrained["falls"] == 0
-    assert pretrained["speed_m_s"]["mean"] == pytest.approx(1.2, abs=0.03)
-
-
-def test_it_walks_like_people(pretrained):
-    for joint, limit_deg in (("thigh", 3.5), ("knee", 4.5), ("ankle", 4.0)):
-        assert pretrained["joints"][joint]["rmse_deg"] <= limit_deg, joint
+def test_it_walks_like_people_and_at_the_commanded_speed(pretrained):
+    assert unmet(pretrained) == []
     grf = pretrained["grf"]
-    assert 0.8 < grf["vertical_peak1_bw"] <= 1.3 and 0.8 < grf["vertical_peak2_bw"] <= 1.3
-    assert grf["vertical_r"] >= 0.93
+    assert min(grf["vertical_peak1_bw"], grf["vertical_peak2_bw"]) > 0.8
 
 
 def test_over_its_strides_braking_and_propulsion_cancel(gait):

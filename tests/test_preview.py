@@ -77,6 +77,7 @@ def test_a_longer_horizon_comes_nearer_to_a_walk_that_goes_on():
         ([0.0], TICK, HEIGHT, {}, "T >= 2"),
         ([0.0, np.nan, 1.0], TICK, HEIGHT, {}, "nan at sample 1"),
         (["a", "b"], TICK, HEIGHT, {}, "row of numbers"),
+        ([0.0, 10**400], TICK, HEIGHT, {}, "row of numbers"),
         ([0.0, 1.0], 0.0, HEIGHT, {}, "tick"),
         ([0.0, 1.0], TICK, -1.0, {}, "height"),
         ([0.0, 1.0], TICK, HEIGHT, {"horizon": 0.0}, "horizon"),

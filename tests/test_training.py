@@ -43,6 +43,19 @@ def learner():
     environments.close()
 
 
+def test_a_policy_does_not_read_what_never_varied_in_its_training(run):
+    policy = load_policy(run[0])
+    biped = Biped(policy.settings, 1)
+    biped.reset(np.arange(1), [0])
+    seen = biped.observe()
+    other = seen.copy()
+    for name in ("command_speed", "height_ratio", "mass_ratio"):
+        other[:, biped.observation_names.index(name)] += 0.3
+    np.testing.assert_allclose(policy(other), policy(seen), atol=1e-5)
+    other[:, biped.observation_names.index("hip_height")] += 0.3
+    assert np.abs(policy(other) - policy(seen)).max() > 1e-3
+
+
 def test_configuration_survives_json():
     assert config_from_json(json.loads(json.dumps(config_to_json(SHORT)))) == SHORT
 
