@@ -24,6 +24,7 @@ from springfoot.envs.biped import Biped
 from springfoot.envs.equilibrium import foot_curves
 from springfoot.envs.legs import leg_curves
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.envs.walks import rows
 from springfoot.gait.errors import SpringfootError
 
 FORMAT_VERSION = 1
@@ -102,17 +103,21 @@ class Policy:
 def fingerprint(biped: Biped) -> dict[str, str]:
     """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
 
-    The legs are the constants of hips, knees and foot springs and the curves they follow. Numbers count to six
+    The legs are the constants of hips, knees and foot springs and the curves they follow, at every speed there is.
+    Numbers count to six
     significant digits, so that compilers and processors agree.
     """
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
-    legs, walk = biped.constants[0], (biped.body, biped.human, biped.plan.stride_time)
-    curves = (leg_curves(legs, *walk), *foot_curves(biped.settings, legs, *walk))
+    numbers: list[Any] = []
+    for legs, walk in rows(biped.walks):
+        course = (walk.body, walk.human, walk.plan.stride_time)
+        curves = (leg_curves(legs, *course), *foot_curves(biped.settings, legs, *course))
+        numbers += [*asdict(legs).values(), *(curve[::50] for curve in curves)]
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
-        "legs": _digest(asdict(legs), *asdict(legs).values(), *(curve[::50] for curve in curves)),
+        "legs": _digest(asdict(biped.constants[0]), *numbers),
     }
 
 

@@ -159,6 +159,7 @@ def _metavar(kind: Any) -> str:
         return "|".join(map(str, parts))
     if get_origin(kind) is tuple:
         return f"{_metavar(parts[0])} ..." if parts[1:] == (...,) else " ".join(map(_metavar, parts))
+    parts = [part for part in parts if part is not type(None)]
     return "|".join(map(_metavar, parts)) if parts else kind.__name__.upper()
 
 

@@ -1,8 +1,8 @@
 """Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,14 @@ from zipfile import BadZipFile
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from springfoot.envs.actuation import FEET
 from springfoot.envs.biped import WINDOWS, Biped, Tick
 from springfoot.envs.model import CONTACTS, JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.envs.walkers import DRAWN
+from springfoot.envs.walks import walk_at
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.plan import WalkPlan
@@ -23,7 +25,10 @@ from springfoot.gait.plan import WalkPlan
 from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
-CONDITIONS = {name: getattr(BipedSettings, name) for name in ("height", "mass", "speed", "push_newton", "start_noise")}
+_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval")
+CONDITIONS = {
+    name: getattr(BipedSettings, name) for name in ("height", "mass", "speed", *_RANGES, "push_newton", "start_noise")
+}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -141,18 +146,82 @@ def record(
         threads: of the physics; any number gives the same bits.
         model: the body's with other options, as for `envs.simulation.Simulation`.
         progress: told the simulated time [s] of all episodes together after every step.
+
+    Raises `SpringfootError` for settings that draw bodies or speeds.
     """
+    if any(getattr(settings, name) is not None for name in _RANGES):
+        raise SpringfootError(f"a recording is of one body at one speed: {', '.join(_RANGES)} must be None")
+    ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, model, progress)
+    return Recording(
+        policy=name,
+        settings=settings,
+        seed=seed,
+        ticks=ticks,
+        returns=returns,
+        fall_reason=reason,
+        plan_com=planned_com(walk_at(settings, settings.speed).plan),
+        series=series,
+    )
+
+
+def record_each(
+    policy: Policy,
+    settings: BipedSettings,
+    who: Mapping[str, ArrayLike],
+    *,
+    name: str,
+    seed: int = 0,
+    threads: int = 2,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> list[Recording]:
+    """As `record`, one episode for each of E bodies and speeds, side by side; a recording each, with its own settings.
+
+    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from.
+    """
+    columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
+    given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
+    ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, None, progress)
+    recordings = []
+    for index in range(episodes):
+        own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(_RANGES)
+        alone, row = replace(settings, **own), slice(index, index + 1)
+        recordings.append(
+            Recording(
+                policy=name,
+                settings=alone,
+                seed=seed + index,
+                ticks=ticks[row],
+                returns=returns[row],
+                fall_reason=reason[row],
+                plan_com=planned_com(walk_at(alone, alone.speed).plan),
+                series={key: values[row] for key, values in series.items()},
+            )
+        )
+    return recordings
+
+
+def _walk(
+    policy: Policy,
+    settings: BipedSettings,
+    given: Mapping[str, NDArray],
+    episodes: int,
+    seed: int,
+    threads: int,
+    model: mujoco.MjModel | None,
+    progress: Callable[[float], object],
+) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
+    """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`."""
     length = WINDOWS * ceil(round(settings.episode_seconds / Biped.dt, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
     reason = np.full(episodes, "", dtype="U64")
     series: dict[str, NDArray] = {}
-    plan_com = np.empty((len(PERCENT), 2))
     for first in range(0, episodes, BATCH):
         rows = slice(first, min(first + BATCH, episodes))
         count = rows.stop - first
         biped = Biped(settings, num_envs=count, num_threads=threads, model=model)
-        biped.reset(np.arange(count), [seed + first + i for i in range(count)])
-        plan_com = planned_com(biped.plan)
+        biped.reset(
+            np.arange(count), [seed + first + i for i in range(count)], None, {k: v[rows] for k, v in given.items()}
+        )
 
         def keep(tick: Tick, rows: slice = rows) -> None:
             index = int(ticks[rows].max())
@@ -174,16 +243,7 @@ def record(
             reason[rows][fell] = outcome.info["termination"][fell]
             progress(float(active.sum()) * biped.dt)
             active &= ~(outcome.terminated | outcome.truncated)
-    return Recording(
-        policy=name,
-        settings=settings,
-        seed=seed,
-        ticks=ticks,
-        returns=returns,
-        fall_reason=reason,
-        plan_com=plan_com,
-        series=series,
-    )
+    return ticks, returns, reason, series
 
 
 def planned_com(plan: WalkPlan) -> NDArray:

@@ -10,6 +10,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 
 from springfoot.envs.model import ACTIONS
 from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.envs.walkers import DRAWN
 from springfoot.gait.errors import SpringfootError
 
 
@@ -33,9 +34,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
     def reset(self) -> np.ndarray:
         """First observations (N, D) of new episodes, with the seeds given to `seed` since the last reset."""
-        options = self._options[0]
-        if any(other != options for other in self._options):
-            raise SpringfootError("reset options must be the same for all: the batch is one simulation")
+        options = _merged(self._options)
         observation, _ = self.env.reset(seed=self._seeds, options=options or None)
         self._reset_seeds()
         self._reset_options()
@@ -98,6 +97,20 @@ class SegmentedFootBipedVecEnv(VecEnv):
     def _require_all(self, indices: VecEnvIndices, what: str) -> None:
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise SpringfootError(f"cannot {what} for some environments only: the batch is one simulation")
+
+
+def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The options of one reset from those of every environment, whose bodies and speeds may differ."""
+    options, *others = ({name: value for name, value in own.items() if name not in DRAWN} for own in each)
+    if any(other != options for other in others):
+        raise SpringfootError(f"reset options but {', '.join(DRAWN)} must be the same for all environments")
+    for name in DRAWN:
+        given = [own[name] for own in each if name in own]
+        if 0 < len(given) < len(each):
+            raise SpringfootError(f"reset option {name!r} must be given to all environments, or to none")
+        if given:
+            options[name] = given
+    return options
 
 
 def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:

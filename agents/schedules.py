@@ -5,15 +5,15 @@ in N m/rad through the inverse of the environment's own log scale, hence need `a
 """
 
 from collections.abc import Callable
-from math import inf, nan
+from math import inf, nan, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from springfoot.envs.actuation import action_of
+from springfoot.envs.constants import leg_constants
 from springfoot.envs.equilibrium import fixed_stiffness
-from springfoot.envs.legs import leg_constants
 from springfoot.envs.model import ACTIONS
 from springfoot.envs.phase import GRID, PhaseTable, leg_phases
 from springfoot.envs.settings import BipedSettings
@@ -60,7 +60,9 @@ def schedule(settings: BipedSettings) -> Policy:
     body = Body(settings.height, settings.mass)
     if settings.schedule is not None:
         return _follow(StiffnessSchedule.from_json(settings.schedule).at(GRID)[0], settings, body)
-    return _follow(fixed_stiffness(leg_constants(settings.equilibrium, settings.cadence), body), settings, body)
+    speed = settings.speed / sqrt(body.length_scale)
+    constants = leg_constants(settings.equilibrium, settings.cadence, speed)
+    return _follow(fixed_stiffness(constants, body), settings, body)
 
 
 def _follow(stiffness: NDArray, settings: BipedSettings, body: Body) -> Policy:

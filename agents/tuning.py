@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from springfoot.envs.actuation import action_of
 from springfoot.envs.biped import Biped, Tick
+from springfoot.envs.constants import LegConstants, constants_from, constants_name
 from springfoot.envs.equilibrium import foot_curves
-from springfoot.envs.legs import LegConstants, constants_from, constants_name
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.body import GRAVITY, Body

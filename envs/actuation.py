@@ -12,6 +12,7 @@ from .kernel import kernel
 from .model import ANKLE
 from .phase import PhaseTable
 from .settings import BipedSettings
+from .walkers import Walkers
 
 FEET = slice(ANKLE, None)
 """Ankle and toe along the joint axis: the joints whose stiffness is the action."""
@@ -46,11 +47,10 @@ class FootSprings:
     """The state of N bodies' ankle and toe springs, and the work done on them by changing them.
 
     Args:
-        settings, body: ranges and action mode.
-        equilibrium: (V, SAMPLES, 2) rest angles over the stride [rad].
-        schedule: (V, SAMPLES, 2) stiffness [N m/rad] that a residual action multiplies.
-        num: N.
-        variant: (N,) which of the V curves each body has.
+        settings, body: ranges and action mode, for the body of the tables.
+        equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], a row of the walkers' tables each.
+        schedule: (R, SAMPLES, 2) stiffness [N m/rad] that a residual action multiplies.
+        walkers: bodies and speeds.
     """
 
     def __init__(
@@ -59,13 +59,14 @@ class FootSprings:
         body: Body,
         equilibrium: NDArray,
         schedule: NDArray,
-        num: int,
-        variant: NDArray | None = None,
+        walkers: Walkers,
     ):
+        num = len(walkers.place)
         self._residual = settings.action_mode == "residual"
-        self._middle, self._factor = _log_scale(settings, body)
-        self._equilibrium = PhaseTable(equilibrium, variant)
-        self._schedule = PhaseTable(schedule, variant)
+        self._own_middle, self._factor = _log_scale(settings, body)
+        self._middle = np.tile(self._own_middle, (num, 1, 1))
+        self._walkers = walkers
+        self._equilibrium, self._schedule = PhaseTable(equilibrium), PhaseTable(schedule)
         self.stiffness = np.zeros((num, 2, 2))
         """(N, side, 2) K [N m/rad]; changed in place."""
         self.equilibrium = np.zeros((num, 2, 2))
@@ -77,9 +78,13 @@ class FootSprings:
         """The next change of springs `ids` costs no work."""
         self._fresh[ids] = True
 
+    def fit(self) -> None:
+        """Take the walkers' bodies as they are now."""
+        self._middle = self._own_middle * self._walkers.scale["torque"][:, None, None]
+
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
-        return self._schedule.at(leg_phase)
+        return self._schedule.at(leg_phase, self._walkers.place) * self._walkers.scale["torque"][:, None, None]
 
     def set_stiffness(
         self, action: NDArray, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None
@@ -100,7 +105,7 @@ class FootSprings:
 
     def move_equilibrium(self, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None) -> NDArray:
         """Take the rest angles of the legs' phases; returns the work put in, 1/2 K (x'^2 - x^2) [J]."""
-        equilibrium = self._equilibrium.at(leg_phase)
+        equilibrium = self._equilibrium.at(leg_phase, self._walkers.place)
         running = self._everyone if running is None else running
         work = np.empty(self.stiffness.shape)
         _move(equilibrium, self.stiffness, angle, self._fresh, running, self.equilibrium, work)

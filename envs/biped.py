@@ -5,7 +5,7 @@ equilibrium and the hips and knees follow the phase. Row i of everything depends
 operations for any N, so a batch of N gives the same bits as N batches of one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -13,21 +13,23 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import ANGLES
-from springfoot.gait.plan import plan_walk
 
 from .actuation import FEET, FootSprings
+from .constants import LegConstants
 from .equilibrium import foot_curves
 from .kernel import kernel
-from .legs import LegConstants, Legs, leg_constants
+from .legs import Legs
 from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
 from .outcome import Outcome, report
 from .phase import GRID, PhaseTable, leg_phases
-from .settings import STEP_SECONDS, BipedSettings, reference_gait
+from .pushes import Pushes
+from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
 from .task import ALIVE, Task
+from .walkers import Walkers
+from .walks import Walk, rows, walks_of
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
 """Control windows in one step."""
@@ -85,24 +87,23 @@ class Biped:
     ):
         self.settings = settings
         self.num_envs = num_envs
-        self.body = Body(settings.height, settings.mass)
-        self.human = reference_gait(settings)
-        self.plan = plan_walk(self.body, settings.speed, settings.cadence, human=self.human)
         self.on_tick: Callable[[Tick], None] | None = None
-
-        self.constants = tuple(legs or [leg_constants(settings.equilibrium, settings.cadence)])
-        stride_time = self.plan.stride_time
-        self._legs = Legs(self.constants, self.body, self.human, stride_time, settings.speed, num_envs, variant)
-        curves = [foot_curves(settings, c, self.body, self.human, stride_time) for c in self.constants]
+        self.walks = walks_of(settings, legs)
+        own = next(walk for walk in self.walks if walk.speed == settings.speed)
+        self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
+        table = list(rows(self.walks))
+        speeds = np.array([walk.speed for walk in self.walks])
+        self.walkers = Walkers(settings, speeds, num_envs, variant)
+        self._legs = Legs(table, self.walkers)
+        curves = [foot_curves(settings, c, w.body, w.human, w.plan.stride_time) for c, w in table]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
-        rest = planned if rest is None else rest
-        self._springs = FootSprings(settings, self.body, rest, stiffness, num_envs, variant)
-        self._start = self._start_curves(self.constants[0].period_factor * stride_time)
-        self._trunk_pitch = np.deg2rad(self.constants[0].trunk_pitch_deg)
-        self._passive_damping = passive_damping(self.body)
+        rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
+        self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers)
+        self._start = PhaseTable(np.stack([_start_curves(walk) for _, walk in table]))
+        self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
         self._simulation = Simulation(self.body, num_envs, num_threads, model)
-        self._task = Task(settings, self.body, self.plan, self.human)
+        self._task = Task(settings, table, self.walkers)
         self.observation_names = self._task.names
         self.observation_low, self.observation_high = self._task.low, self._task.high
 
@@ -114,15 +115,19 @@ class Biped:
         self._last_action = np.zeros((num_envs, len(ACTIONS)))
         self._windows = np.zeros((WINDOWS, num_envs, len(SIDES), len(CONTACTS), 2))
         self._force = np.zeros(self._windows.shape[1:])
-        self._pushes = _Pushes(settings, num_envs)
+        self._pushes = Pushes(settings, num_envs)
         self._stiffness = np.zeros((num_envs, len(SIDES), len(JOINTS)))
         self._drive = np.zeros_like(self._stiffness)
         self._now = self._simulation.measure()
 
     @property
     def model(self) -> mujoco.MjModel:
-        """The compiled model, the same for all N."""
+        """The compiled model of the settings' body."""
         return self._simulation.model
+
+    def model_of(self, index: int) -> mujoco.MjModel:
+        """The compiled model of environment `index`'s body."""
+        return self._simulation.models[index]
 
     @property
     def measurement(self) -> Measurement:
@@ -137,8 +142,16 @@ class Biped:
         """(N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
         return self._springs.scheduled(self._legs.phase)
 
+    def command(self, ids: NDArray, speed: NDArray) -> None:
+        """Have environments `ids` (K,) go to `speed` (K,) [m/s], at the settings' `speed_rate`."""
+        self.walkers.command(ids, speed)
+
     def reset(
-        self, ids: NDArray, seeds: Sequence[int | np.random.Generator | None], start: float | str | None = None
+        self,
+        ids: NDArray,
+        seeds: Sequence[int | np.random.Generator | None],
+        start: float | str | None = None,
+        given: Mapping[str, NDArray] | None = None,
     ) -> None:
         """Start environments `ids` anew, at people's posture in single support.
 
@@ -146,11 +159,13 @@ class Biped:
             ids: (K,) which.
             seeds: K seeds, or generators to draw from; None goes on with the environment's own.
             start: stride phase of the left leg [0, 1) or "random", in place of the setting.
+            given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of what is set or drawn.
         """
         if len(ids) == 0:
             return
         start = self.settings.start if start is None else start
         phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
+        randoms: list[np.random.Generator] = []
         for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
             random = self._random[index]
             if seed is not None or random is None:
@@ -160,6 +175,8 @@ class Biped:
             if self.settings.start_noise:
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
             self._pushes.reset(index, random)
+            randoms.append(random)
+        self._fit(self.walkers.reset(ids, randoms, given))
         self._legs.reset(ids, phase)
         self._springs.reset(ids)
         self._steps[ids] = 0
@@ -167,6 +184,16 @@ class Biped:
         self._force[ids] = 0.0
         self._place(ids, phase, noise)
         self._now = self._simulation.measure()
+
+    def _fit(self, ids: list[int]) -> None:
+        """Give environments `ids` the walkers' bodies, and all of them their speeds."""
+        if ids:
+            bodies = [self.walkers.bodies[index] for index in ids]
+            self._simulation.fit(ids, bodies)
+            self._task.fit(ids)
+            self._springs.fit()
+            self._passive_damping[ids, 0] = [passive_damping(body) for body in bodies]
+        self._legs.follow()
 
     def observe(self) -> NDArray:
         """(N, D) float32 observation of the present."""
@@ -179,6 +206,8 @@ class Biped:
         if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
             action = np.where(running[:, None], action, self._last_action)
+        if self.walkers.advance(self._steps * STEP_SECONDS, self._random, running):
+            self._legs.follow()
         springs, phase = self._springs, self._legs.phase
         work_stiffness = springs.set_stiffness(action, phase, self._now.angle[..., FEET], running)
         work_equilibrium = np.zeros(work_stiffness.shape)
@@ -252,53 +281,32 @@ class Biped:
             active=running.copy(),
         )
 
-    def _start_curves(self, period: float) -> PhaseTable:
-        """People's joint angles, hip as thigh to the vertical [rad], and their rates [rad/s] over the stride."""
-        angles = [self.human.mean(name, GRID) for name in ANGLES]
-        rates = [self.human.rate(name, GRID) / period for name in ANGLES]
-        return PhaseTable(np.stack(angles + rates, axis=-1))
-
     def _place(self, ids: NDArray, left_phase: NDArray, noise: NDArray) -> None:
         """People's posture at the phase, at the commanded speed, the lowest contact point in the floor."""
-        angle, velocity = np.split(self._start.at(leg_phases(left_phase)), 2, axis=-1)
-        angle, velocity = angle * (1.0 + noise[:, 0]), velocity * (1.0 + noise[:, 1])
-        angle[..., HIP] += self._trunk_pitch
+        place, scale = self.walkers.place[ids], self.walkers.scale[ids]
+        curves = self._start.at(leg_phases(left_phase), place)
+        (angle, velocity), pitch = np.split(curves[..., :-1], 2, axis=-1), curves[:, 0, -1]
+        angle = angle * (1.0 + noise[:, 0])
+        velocity = velocity / scale["root"][:, None, None] * (1.0 + noise[:, 1])
+        angle[..., HIP] += pitch[:, None]
         root, rate = np.zeros((2, len(ids), 3))
-        root[:, 2], rate[:, 0] = self._trunk_pitch, self.settings.speed
+        root[:, 2], rate[:, 0] = pitch, self.walkers.speed[ids]
         self._simulation.reset(ids, root, rate, angle, velocity)
         lowest = self._simulation.measure().contact[ids, ..., 1].min(axis=(1, 2))
-        root[:, 1] = -lowest - START_DEPTH * self.body.length_scale
+        root[:, 1] = -lowest - START_DEPTH * self.body.length_scale * scale["length"]
         self._simulation.reset(ids, root, rate, angle, velocity)
 
 
-class _Pushes:
-    """When each environment is pushed: once at a random time in each interval, forward or backward at random."""
+def _start_curves(walk: Walk) -> NDArray:
+    """(SAMPLES, 9) people's joint angles, hip as thigh to the vertical [rad], their rates [rad/s], trunk pitch [rad].
 
-    def __init__(self, settings: BipedSettings, num: int):
-        self._size, self._latest = settings.push_newton, settings.push_interval - settings.push_seconds
-        self._interval, self._duration = settings.push_interval, settings.push_seconds
-        self._ends = np.zeros(num)
-        self._begin = np.zeros(num)
-        self._force = np.zeros(num)
-
-    def reset(self, index: int, random: np.random.Generator) -> None:
-        self._ends[index] = 0.0
-        self._draw(index, random)
-
-    def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
-        """(N,) push [N] at these step counts; only those running draw their next one."""
-        time = steps * STEP_SECONDS
-        for index in np.flatnonzero(running & (time >= self._ends)).tolist():
-            generator = random[index]
-            if generator is not None:
-                self._draw(index, generator)
-        since = time - self._begin
-        return np.where((since >= 0) & (since < self._duration), self._force, 0.0)
-
-    def _draw(self, index: int, random: np.random.Generator) -> None:
-        self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)
-        self._force[index] = self._size * (-1.0, 1.0)[random.integers(2)]
-        self._ends[index] += self._interval
+    Variants of the leg constants start alike, as the first.
+    """
+    first = walk.constants[0]
+    period = first.period_factor * walk.plan.stride_time
+    angles = [walk.human.mean(name, GRID) for name in ANGLES]
+    rates = [walk.human.rate(name, GRID) / period for name in ANGLES]
+    return np.stack([*angles, *rates, np.full(len(GRID), np.deg2rad(first.trunk_pitch_deg))], axis=-1)
 
 
 @kernel

@@ -7,7 +7,8 @@ from springfoot.gait.body import Body
 from springfoot.gait.human import HumanGait
 from springfoot.gait.stiffness import StiffnessSchedule
 
-from .legs import LegConstants, knot_curve
+from .constants import LegConstants
+from .legs import knot_curve
 from .model import ANKLE, damping_times
 from .phase import GRID
 from .settings import BipedSettings

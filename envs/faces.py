@@ -13,6 +13,7 @@ from .biped import Biped
 from .outcome import INFO
 from .rendering import RENDER_MODES, Camera
 from .settings import STEP_SECONDS, check_start, settings_from
+from .walkers import DRAWN
 
 METADATA: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": round(1 / STEP_SECONDS)}
 
@@ -108,6 +109,11 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at
     the commanded speed, with `start_noise`. `reset(options={"start": phase})` sets the left leg's phase once.
 
+    With `height_range`, `mass_range` or `speed_range` every episode draws its own body or speed; `options` may set them
+    once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. Everything scales with the body as mechanics do, and is linear
+    between walks tabulated every 0.1 m/s. With `speed_interval` the commanded speed goes, at `speed_rate`, to a new
+    one now and then; the observation tells the speed commanded now.
+
     ## Episode end
     Termination: the hip is lower than 0.65 m (x height / 1.70 m), the trunk is tilted by more than 0.8 rad, or the
     simulation diverges; `info["termination"]` says which ("" while walking).
@@ -126,6 +132,11 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `height`              | `1.7`          | standing height [m]                                               |
     | `mass`                | `63.0`         | body mass [kg]                                                    |
     | `speed`               | `1.2`          | commanded speed [m/s]                                             |
+    | `height_range`        | `None`         | heights drawn at each reset [m], in place of `height`             |
+    | `mass_range`          | `None`         | body masses drawn at each reset [kg], in place of `mass`          |
+    | `speed_range`         | `None`         | speeds drawn at each reset [m/s], in place of `speed`             |
+    | `speed_interval`      | `None`         | mean time between changes of the commanded speed [s]              |
+    | `speed_rate`          | `0.25`         | rate at which it goes to a new one [m/s^2]                        |
     | `cadence`             | `"people"`     | step length and time of `"people"` or of the `"thesis"`           |
     | `equilibrium`         | `"planned"`    | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                  |
     | `action_mode`         | `"absolute"`   | `"absolute"` or `"residual"`                                      |
@@ -161,10 +172,10 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray, dict[str, Any]]:
-        """Start an episode; `options={"start": phase}` sets the left leg's stride phase, or "random"."""
-        start = check_options(options, ("start",)).get("start")
+        """Start an episode; `options` may set its `start`, `height`, `mass` and `speed` (see Starting state)."""
+        chosen = check_options(options)
         super().reset(seed=seed)
-        self.biped.reset(np.array([0]), [self.np_random], start)
+        self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), bodies_and_speeds(chosen, 1))
         self._over = False
         if self.render_mode == "human":
             self.render()
@@ -189,7 +200,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         """A frame, uint8 (480, 640, 3), or None after drawing the window ("human"); `SpringfootError` without GL."""
         mode = check_can_render(self.render_mode)
         self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
-        return self._camera.show(self.biped.data(0))
+        return self._camera.show(self.biped.data(0), self.biped.model_of(0))
 
     def close(self) -> None:
         """Close the window, if any."""
@@ -203,15 +214,30 @@ def spaces_of(biped: Biped) -> tuple[Box, Box]:
     return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
 
 
-def check_options(options: dict[str, Any] | None, allowed: tuple[str, ...]) -> dict[str, Any]:
+def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
     """The options of a reset; refuses unknown ones and a start that is neither a phase nor "random"."""
-    options = options or {}
+    options, allowed = options or {}, ("start", *DRAWN, *more)
     for name in options:
         if name not in allowed:
             raise SpringfootError(f"unknown reset option {name!r}; valid: {', '.join(allowed)}")
     if "start" in options:
         check_start(options["start"])
     return options
+
+
+def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
+    """What the options of a reset say of the N environments' bodies and speeds, (N,) by the names of `DRAWN`."""
+    given = {}
+    for name in DRAWN:
+        if name in options:
+            try:
+                given[name] = np.broadcast_to(np.asarray(options[name], float), (num,))
+            except (TypeError, ValueError):
+                raise SpringfootError(
+                    f"reset option {name!r} must be a number, or one for each of {num} environments, "
+                    f"got {options[name]!r:.60}"
+                ) from None
+    return given
 
 
 def check_render_mode(mode: str | None) -> str | None:

@@ -1,5 +1,7 @@
 """What a policy sees: the entries of the observation, dimensionless and bounded."""
 
+from collections.abc import Iterable
+from functools import lru_cache
 from math import cos, pi, sin, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,6 +12,7 @@ from springfoot.gait.body import GRAVITY, Body
 
 from .kernel import kernel
 from .model import ACTIONS, CONTACTS, JOINTS, LEFT, SIDES
+from .walkers import Walkers
 
 if TYPE_CHECKING:
     from .simulation import Measurement
@@ -89,24 +92,24 @@ SEEN = np.dtype(
 
 
 class Observer:
-    """Sees bodies of one kind, commanded one speed [m/s]."""
+    """Sees N bodies, commanded a speed each."""
 
-    def __init__(self, body: Body, speed: float) -> None:
-        leg = body.leg_length
+    def __init__(self, walkers: Walkers) -> None:
+        self._walkers = walkers
         self.low = np.array([entry.low for entry in OBSERVATION], np.float32)
         self.high = np.array([entry.high for entry in OBSERVATION], np.float32)
-        unit = {
-            "1": 1.0,
-            "rad": 1.0,
-            "leg length": leg,
-            "sqrt(g l)": sqrt(GRAVITY * leg),
-            "sqrt(g/l)": sqrt(GRAVITY / leg),
-            "body weight": body.mass * GRAVITY,
-        }
-        self._units = np.array([unit[entry.unit] for entry in OBSERVATION])
+        self._units = np.empty((len(walkers.bodies), len(OBSERVATION)))
+        self._ratios = np.empty((len(walkers.bodies), 2))
         self._row = np.zeros(1, SEEN)  # the body that is being looked at
-        self._row["command"] = speed, body.length_scale, body.mass_scale
         self._entries = self._row.view(float)
+        self.fit(range(len(walkers.bodies)))
+
+    def fit(self, ids: Iterable[int]) -> None:
+        """Take the bodies of environments `ids` as they are now."""
+        for index in ids:
+            body = self._walkers.bodies[index]
+            self._units[index] = _units(body)
+            self._ratios[index] = body.length_scale, body.mass_scale
 
     def observe(
         self,
@@ -124,8 +127,23 @@ class Observer:
         """
         observation = np.empty((len(leg_phase), len(OBSERVATION)), np.float32)
         state = m.root, m.root_velocity, m.angle, m.velocity, leg_phase, error, planned_ankle, last_action, force
-        _observe(*state, self._row, self._entries, self._units, self.low, self.high, observation)
+        who = self._walkers.speed, self._ratios, self._units
+        _observe(*state, *who, self._row, self._entries, self.low, self.high, observation)
         return observation
+
+
+@lru_cache(maxsize=256)
+def _units(body: Body) -> NDArray:
+    leg = body.leg_length
+    unit = {
+        "1": 1.0,
+        "rad": 1.0,
+        "leg length": leg,
+        "sqrt(g l)": sqrt(GRAVITY * leg),
+        "sqrt(g/l)": sqrt(GRAVITY / leg),
+        "body weight": body.mass * GRAVITY,
+    }
+    return np.array([unit[entry.unit] for entry in OBSERVATION])
 
 
 @kernel
@@ -139,9 +157,11 @@ def _observe(
     planned_ankle,
     last_action,
     force,
+    speed,
+    ratios,
+    units,
     seen,
     entries,
-    units,
     low,
     high,
     observation,
@@ -154,6 +174,7 @@ def _observe(
         row.cycle[0], row.cycle[1], row.cycle[2], row.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
         row.leading_leg = 1.0 if left < 0.5 else -1.0
         row.root[0], row.root[1] = root[i, 1], root[i, 2]
+        row.command[0], row.command[1], row.command[2] = speed[i], ratios[i, 0], ratios[i, 1]
         for k in range(3):
             row.root_velocity[k], row.error[k] = root_velocity[i, k], error[i, k]
         for k in range(4):
@@ -165,7 +186,7 @@ def _observe(
             for contact in range(3):
                 row.load[side, contact] = force[i, side, contact, 1]
         for k in range(len(entries)):
-            value = entries[k] / units[k]
+            value = entries[k] / units[i, k]
             if not value <= high[k]:  # nor is what is not a number
                 value = high[k]
             observation[i, k] = max(value, low[k])

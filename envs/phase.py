@@ -16,38 +16,47 @@ def leg_phases(left: NDArray) -> NDArray:
     return np.stack([left, (left + 0.5) % 1.0], axis=-1)
 
 
+PLACE = np.dtype([("row", np.int64), ("weight", float)])
+"""Where an environment reads tables of several rows: between a row and the next, whose weight is in [0, 1)."""
+_FIRST = np.zeros(1, PLACE)
+
+
 class PhaseTable:
     """Periodic curves on `GRID`.
 
     Args:
-        curves: (SAMPLES, C), or (V, SAMPLES, C) for V variants.
-        variant: (N,) which of the V curves row i of the phases asked for takes; all take the first without it.
+        curves: (SAMPLES, C), or (R, SAMPLES, C) for R rows.
     """
 
-    def __init__(self, curves: NDArray, variant: NDArray | None = None):
+    def __init__(self, curves: NDArray):
         curves = curves.reshape(-1, SAMPLES, curves.shape[-1])
         rise = np.roll(curves, -1, axis=1) - curves
-        self._table = np.stack([curves, rise], axis=2).astype(float)  # (V, SAMPLES, value and rise, C)
-        self._variant = np.zeros(1, np.int64) if variant is None else np.asarray(variant, np.int64)
+        self._table = np.stack([curves, rise], axis=2).astype(float)  # (R, SAMPLES, value and rise, C)
 
-    def at(self, phase: ArrayLike) -> NDArray:
-        """Curves at `phase` in [0, 1) of any shape, (N, ...) where variants differ: (..., C)."""
+    def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
+        """Curves at `phase` in [0, 1) of any shape, (N, ...) with the (N,) `PLACE` of each: (..., C)."""
         phase = np.asarray(phase, float)
         curves = np.empty((*phase.shape, self._table.shape[-1]))
-        _read(self._table, self._variant, phase.reshape(-1), curves.reshape(-1, curves.shape[-1]))
+        _read(self._table, place, phase.reshape(-1), curves.reshape(-1, curves.shape[-1]))
         return curves
 
 
 @kernel
-def _read(table, variant, phase, curves):
-    each = max(len(phase) // len(variant), 1)
+def _read(table, place, phase, curves):
+    each = max(len(phase) // len(place), 1)
     for i in range(len(phase)):
-        place = phase[i] * SAMPLES
+        spot = phase[i] * SAMPLES
         index = 0
-        if place >= SAMPLES - 1:
+        if spot >= SAMPLES - 1:
             index = SAMPLES - 1
-        elif place > 0.0:
-            index = int(place)
-        row = table[variant[i // each], index]
+        elif spot > 0.0:
+            index = int(spot)
+        where = place[i // each]
+        row = table[where.row, index]
         for column in range(row.shape[1]):
-            curves[i, column] = row[0, column] + (place - index) * row[1, column]
+            curves[i, column] = row[0, column] + (spot - index) * row[1, column]
+        if where.weight > 0.0:
+            above = table[where.row + 1, index]
+            for column in range(row.shape[1]):
+                value = above[0, column] + (spot - index) * above[1, column]
+                curves[i, column] += where.weight * (value - curves[i, column])

@@ -22,25 +22,35 @@ NO_GL = (
 
 
 class Camera:
-    """Draws bodies of one model, in a window ("human") or into arrays ("rgb_array").
+    """Draws bodies, one model at a time, in a window ("human") or into arrays ("rgb_array").
 
     Raises `SpringfootError` with a hint where there is no OpenGL, or no screen for a window.
     """
 
     def __init__(self, model: mujoco.MjModel, mode: str, frames_per_second: float) -> None:
-        self._model = model
+        self._mode = mode
         self._period = 1 / frames_per_second
         self._next_frame = 0.0
         self._window: Any = None
         self._renderer: Any = None
-        if mode == "human":
+        self._open(model)
+
+    def _open(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        if self._mode == "human":
             self._data = mujoco.MjData(model)
             self._window = _open_window(model, self._data)
         else:
             self._renderer = _renderer(model)
 
-    def show(self, data: mujoco.MjData) -> NDArray | None:
-        """One frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time."""
+    def show(self, data: mujoco.MjData, model: mujoco.MjModel | None = None) -> NDArray | None:
+        """One frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time.
+
+        `model` is that of `data`, the last one without it; another one opens window or renderer anew.
+        """
+        if model is not None and model is not self._model:
+            self.close()
+            self._open(model)
         if self._renderer is not None:
             self._renderer.update_scene(data, camera=CAMERA)
             return self._renderer.render()
@@ -57,7 +67,7 @@ class Camera:
         for drawing in (self._window, self._renderer):
             if drawing is not None:
                 drawing.close()
-        self._window = None
+        self._window = self._renderer = None
 
 
 def _renderer(model: mujoco.MjModel) -> Any:

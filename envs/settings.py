@@ -8,7 +8,7 @@ from math import isfinite
 from numbers import Real
 from typing import Any, Literal, get_args
 
-from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from springfoot.gait.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError, as_float, require_number, require_within
 from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.own_data import OwnGait
@@ -44,6 +44,16 @@ class BipedSettings:
     """Body mass [kg]."""
     speed: float = 1.2
     """Commanded walking speed [m/s]."""
+    height_range: tuple[float, float] | None = None
+    """Heights drawn at each reset in place of `height` [m], evenly; with the mass anew if they make no body."""
+    mass_range: tuple[float, float] | None = None
+    """Body masses drawn at each reset in place of `mass` [kg], evenly and whatever the height."""
+    speed_range: tuple[float, float] | None = None
+    """Walking speeds drawn at each reset in place of `speed` [m/s], evenly."""
+    speed_interval: float | None = None
+    """Mean time between changes of the commanded speed within an episode, drawn from `speed_range` [s]."""
+    speed_rate: float = 0.25
+    """Rate at which the commanded speed goes to a new one [m/s^2]."""
     cadence: Cadence = "people"
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
     equilibrium: Equilibrium = "planned"
@@ -79,14 +89,15 @@ class BipedSettings:
     def __post_init__(self) -> None:
         Body(self.height, self.mass)  # refuses impossible ones
         require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
+        self._check_draws()
         for name, choices in (
             ("cadence", Cadence),
             ("equilibrium", Equilibrium),
             ("action_mode", ActionMode),
         ):
             _check_choice(name, getattr(self, name), get_args(choices))
-        _check_range("ankle_stiffness_range", self.ankle_stiffness_range)
-        _check_range("toe_stiffness_range", self.toe_stiffness_range)
+        _check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
+        _check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
         self._check_schedule()
         if self.human is not None:
             OwnGait.from_json(self.human)
@@ -97,6 +108,28 @@ class BipedSettings:
         require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
         require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         _check_weights(self.reward_weights)
+
+    def _check_draws(self) -> None:
+        for name, allowed, unit in (
+            ("height_range", HEIGHT_RANGE, "m"),
+            ("mass_range", MASS_RANGE, "kg"),
+            ("speed_range", PLAN_SPEED_RANGE, "m/s"),
+        ):
+            if getattr(self, name) is not None:
+                _check_range(name, getattr(self, name), unit)
+                for value in getattr(self, name):
+                    require_within(name, value, allowed, unit)
+        (short, tall), (light, heavy) = self.height_range or 2 * (self.height,), self.mass_range or 2 * (self.mass,)
+        if light / tall**2 > BMI_RANGE[1] or heavy / short**2 < BMI_RANGE[0]:
+            raise SpringfootError(
+                "height_range and mass_range must have a body with a body-mass index in "
+                f"[{BMI_RANGE[0]:g}, {BMI_RANGE[1]:g}] kg/m^2, got {light / tall**2:.3g} to {heavy / short**2:.3g}"
+            )
+        if self.speed_interval is not None:
+            require_number("speed_interval", self.speed_interval, STEP_SECONDS, unit="s")
+            if self.speed_range is None:
+                raise SpringfootError("speed_interval needs a speed_range to draw from, got None")
+        require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
 
     def _check_schedule(self) -> None:
         if self.schedule is None:
@@ -159,10 +192,10 @@ def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
         raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
 
 
-def _check_range(name: str, value: Any) -> None:
+def _check_range(name: str, value: Any, unit: str) -> None:
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
     if not numbers or not 0 < value[0] < value[1]:
-        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high N m/rad, got {value!r}")
+        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {value!r}")
 
 
 def _check_weights(weights: Any) -> None:

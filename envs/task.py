@@ -4,6 +4,8 @@ Row i of every result depends on row i of the arguments alone, by the same opera
 gives the same bits as N batches of one.
 """
 
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from math import exp, sqrt
 from typing import TYPE_CHECKING
 
@@ -14,11 +16,14 @@ from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.human import ANGLES, HumanGait
 from springfoot.gait.plan import WalkPlan
 
+from .constants import LegConstants
 from .kernel import kernel
 from .model import ANKLE, HIP, JOINTS, KNEE, LEFT, RIGHT, TOE
 from .observation import OBSERVATION, Observer
 from .phase import GRID, PhaseTable
 from .settings import DEFAULT_WEIGHTS, STEP_SECONDS, BipedSettings
+from .walkers import Walkers
+from .walks import Walk
 
 if TYPE_CHECKING:
     from .simulation import Measurement
@@ -56,13 +61,13 @@ CURVES = np.dtype(
         ("force_sd", float, 2),  # its standard deviation
         ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
         ("speed", float),  # the plan's forward speed of the CoM [m/s]
+        ("stride_length", float),  # of the plan [m], the same at every phase
     ]
 )
 """What people and the plan do at a phase of one leg's stride; `com` and `speed` where its stance began last."""
 SCALES = np.dtype(
     [
         ("min_hip_height", float),  # [m]
-        ("stride_length", float),  # of the plan [m]
         ("tolerance", float, 3),  # of the CoM's x, z [m] and forward speed [m/s]
         ("pose_share", float, len(JOINTS)),
         ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
@@ -70,32 +75,38 @@ SCALES = np.dtype(
         ("weight", float),  # of the body [N]
     ]
 )
-"""What one body in one task is measured by."""
+"""What one body is measured by."""
 TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
 """The reward's terms, in the order in which they are summed."""
 ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
 
 
 class Task:
-    """What is seen, what is rewarded and what counts as a fall, for one body and plan."""
+    """What is seen, what is rewarded and what counts as a fall.
 
-    def __init__(self, settings: BipedSettings, body: Body, plan: WalkPlan, human: HumanGait) -> None:
-        length = body.length_scale
+    Args:
+        settings: the weights.
+        rows: constants and walk of each row of the walkers' tables (`envs.walks.rows`).
+        walkers: bodies and speeds.
+    """
+
+    def __init__(self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, Walk]], walkers: Walkers) -> None:
         self.names = tuple(entry.name for entry in OBSERVATION)
-        self._observer = Observer(body, settings.speed)
+        self._walkers = walkers
+        self._observer = Observer(walkers)
         self.low, self.high = self._observer.low, self._observer.high
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
 
         self._weights = np.array([self.weights[name] for name in TERMS])
-        self._curves = PhaseTable(_curves(plan, human).view(float).reshape(len(GRID), -1))
-        self._scales = np.zeros(1, SCALES)
-        self._scales["min_hip_height"] = MIN_HIP_HEIGHT * length
-        self._scales["stride_length"] = 2 * plan.step_length
-        self._scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
-        self._scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
-        self._scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
-        self._scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
-        self._scales["weight"] = body.mass * GRAVITY
+        curves = {walk: _curves(walk.plan, walk.human) for _, walk in rows}
+        self._curves = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows]))
+        self._scales = np.concatenate([_scales(body) for body in walkers.bodies])
+
+    def fit(self, ids: Iterable[int]) -> None:
+        """Take the bodies of environments `ids` as they are now."""
+        self._observer.fit(ids)
+        for index in ids:
+            self._scales[index] = _scales(self._walkers.bodies[index])[0]
 
     def observe(self, m: "Measurement", leg_phase: NDArray, last_action: NDArray, force: NDArray) -> NDArray:
         """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
@@ -140,7 +151,18 @@ class Task:
         terms = np.empty((len(leg_phase), len(TERMS)))
         state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged == ""
         curves = self._at(leg_phase)
-        _judge(self._scales, curves, *state, leg_phase, action, last_action, stiffness, force_windows, terms)
+        _judge(
+            self._scales,
+            self._walkers.scale,
+            curves,
+            *state,
+            leg_phase,
+            action,
+            last_action,
+            stiffness,
+            force_windows,
+            terms,
+        )
         return terms
 
     def reward(self, terms: NDArray) -> NDArray:
@@ -156,12 +178,26 @@ class Task:
 
     def _error(self, m: "Measurement", leg_phase: NDArray, curves: NDArray) -> NDArray:
         error = np.empty((len(leg_phase), 3))
-        _track(self._scales, curves, m.com, m.com_velocity, m.ankle, leg_phase, error)
+        _track(self._walkers.scale, curves, m.com, m.com_velocity, m.ankle, leg_phase, error)
         return error
 
     def _at(self, leg_phase: NDArray) -> NDArray:
         """(N, side) of `CURVES`."""
-        return self._curves.at(leg_phase).view(CURVES)[..., 0]
+        return self._curves.at(leg_phase, self._walkers.place).view(CURVES)[..., 0]
+
+
+@lru_cache(maxsize=256)
+def _scales(body: Body) -> NDArray:
+    """(1,) of `SCALES`."""
+    length = body.length_scale
+    scales = np.zeros(1, SCALES)
+    scales["min_hip_height"] = MIN_HIP_HEIGHT * length
+    scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
+    scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
+    scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
+    scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
+    scales["weight"] = body.mass * GRAVITY
+    return scales
 
 
 def _curves(plan: WalkPlan, human: HumanGait) -> NDArray:
@@ -175,28 +211,31 @@ def _curves(plan: WalkPlan, human: HumanGait) -> NDArray:
     x, z = plan.com(step)
     curves["com"] = np.stack((x - plan.step_length * step, z), -1)
     curves["speed"], _ = plan.com_velocity(step)
+    curves["stride_length"] = 2 * plan.step_length
     return curves
 
 
 @kernel
-def _track(scales, curves, com, com_velocity, ankle, leg_phase, error):
+def _track(ratios, curves, com, com_velocity, ankle, leg_phase, error):
     for i in range(len(error)):
-        x, z, speed = _error(scales[0], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
         error[i, 0], error[i, 1], error[i, 2] = x, z, speed
 
 
 @kernel
-def _error(scale, curves, com, com_velocity, ankle, leg_phase):
+def _error(ratio, curves, com, com_velocity, ankle, leg_phase):
     """CoM minus plan: x, z, forward speed. The plan counts x from the ankle of the leg whose stance began last."""
     leader = LEFT if leg_phase[LEFT] < 0.5 else RIGHT
     planned = curves[leader]
-    planned_x = ankle[leader, 0] + scale.stride_length * leg_phase[leader] + planned.com[0]
-    return com[0] - planned_x, com[1] - planned.com[1], com_velocity[0] - planned.speed
+    planned_x = ankle[leader, 0] + ratio.length * planned.stride_length * leg_phase[leader]
+    planned_x += ratio.length * planned.com[0]
+    return com[0] - planned_x, com[1] - ratio.length * planned.com[1], com_velocity[0] - ratio.root * planned.speed
 
 
 @kernel
 def _judge(
     scales,
+    ratios,
     curves,
     root,
     angle,
@@ -211,11 +250,11 @@ def _judge(
     windows,
     terms,
 ):
-    scale = scales[0]
     for i in range(len(root)):
+        scale = scales[i]
         upright = root[i, 1] >= scale.min_hip_height and abs(root[i, 2]) <= MAX_PITCH  # a NaN is not
         terms[i, ALIVE] = 1.0 if upright and well[i] else 0.0
-        x, z, speed = _error(scale, curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
         terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
         terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
         terms[i, SPEED] = exp(-((speed / scale.tolerance[2]) ** 2))

@@ -1,6 +1,6 @@
 """`SegmentedFootBiped` N times over in one batched simulation, as a Gymnasium `VectorEnv`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from springfoot.gait.errors import SpringfootError, require_count
 
 from .biped import Biped
-from .faces import METADATA, check_can_render, check_options, check_render_mode, spaces_of
+from .faces import METADATA, bodies_and_speeds, check_can_render, check_options, check_render_mode, spaces_of
 from .outcome import INFO, Outcome
 from .rendering import Camera
 from .settings import STEP_SECONDS, BipedSettings, settings_from
@@ -78,15 +78,17 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
     ) -> tuple[NDArray, dict[str, Any]]:
         """Start episodes in all environments, or in those of `options["reset_mask"]`, a bool array (N,).
 
-        `seed` s gives environment i the seed s + i; a list gives each its own. `options["start"]` as in the Env.
+        `seed` s gives environment i the seed s + i; a list gives each its own. `options` else as in the Env, `height`,
+        `mass` and `speed` also as (N,) arrays.
         """
-        chosen = check_options(options, ("start", "reset_mask"))
+        chosen = check_options(options, ("reset_mask",))
+        given = bodies_and_speeds(chosen, self.num_envs)
         ids = np.flatnonzero(self._reset_mask(chosen.get("reset_mask")))
         seeds = self._spread(seed)
         for index in ids.tolist():
             if seeds[index] is not None or self._generators[index] is None:
                 self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
-        self._restart(ids, chosen.get("start"))
+        self._restart(ids, chosen.get("start"), given)
         self._over[ids] = False
         if self.render_mode == "human":
             self.render()
@@ -123,16 +125,20 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         mode = check_can_render(self.render_mode)
         self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
         if mode == "human":
-            return self._camera.show(self.biped.data(0))
-        return tuple(self._camera.show(self.biped.data(index)) for index in range(self.num_envs))
+            return self._camera.show(self.biped.data(0), self.biped.model_of(0))
+        biped, camera = self.biped, self._camera
+        return tuple(camera.show(biped.data(index), biped.model_of(index)) for index in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:
         """Close the window, if any."""
         if self._camera is not None:
             self._camera.close()
 
-    def _restart(self, ids: NDArray, start: float | str | None = None) -> None:
-        self.biped.reset(ids, [self._generators[index] for index in ids], start)
+    def _restart(
+        self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
+    ) -> None:
+        given = {name: values[ids] for name, values in (given or {}).items()}
+        self.biped.reset(ids, [self._generators[index] for index in ids], start, given)
 
     def _check_running(self) -> None:
         """Refuses a step of environments that someone should have reset before."""

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from springfoot.envs.actuation import FootSprings, action_of, stiffness_of, stiffness_ranges
-from springfoot.envs.phase import GRID, SAMPLES, PhaseTable
+from springfoot.envs.phase import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.settings import ActionMode, BipedSettings
+from springfoot.envs.walkers import Walkers
 from springfoot.gait.body import Body
 
 
@@ -32,7 +33,8 @@ def test_action_of_inverts_the_map_and_stops_at_the_ends():
 def springs(mode: ActionMode = "absolute", num: int = 3) -> FootSprings:
     rest = np.stack([0.3 * np.sin(2 * np.pi * GRID), 0.1 * np.cos(2 * np.pi * GRID)], -1)[None]
     schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
-    return FootSprings(BipedSettings(action_mode=mode), Body(), rest, schedule, num)
+    settings = BipedSettings(action_mode=mode)
+    return FootSprings(settings, Body(), rest, schedule, Walkers(settings, np.array([1.2]), num))
 
 
 def test_a_residual_action_multiplies_the_schedule():
@@ -59,6 +61,16 @@ def test_the_works_add_up_to_the_change_of_the_springs_energy():
     work = work + feet.move_equilibrium(phase + 0.05, angle)
     np.testing.assert_allclose(work, energy() - before, atol=1e-12)
     assert np.abs(work).max() > 1e-3
+
+
+def test_phase_tables_are_linear_between_rows_and_each_environment_reads_its_own():
+    rows = np.stack([np.stack([np.sin(2 * np.pi * GRID) * k, GRID + k], -1) for k in range(4)])
+    place = np.zeros(3, PLACE)
+    place["row"], place["weight"] = [0, 2, 3], [0.25, 0.5, 0.0]
+    phase = np.array([[0.1234, 0.6], [0.3, 0.8], [0.5, 0.0]])
+    single = np.stack([PhaseTable(row).at(phase) for row in rows])
+    expected = [0.75 * single[0, 0] + 0.25 * single[1, 0], (single[2, 1] + single[3, 1]) / 2, single[3, 2]]
+    np.testing.assert_allclose(PhaseTable(rows).at(phase, place), expected, atol=1e-12)
 
 
 def test_phase_tables_are_periodic_and_linear_between_samples():

@@ -10,7 +10,7 @@ from safetensors.numpy import load, save
 
 from springfoot.agents.bundle import Policy, fingerprint, load_policy, save_policy, write_atomically
 from springfoot.envs.biped import Biped
-from springfoot.envs.legs import leg_constants
+from springfoot.envs.constants import leg_constants
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait.errors import SpringfootError
 

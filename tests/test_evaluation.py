@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springfoot.agents.evaluation import CURVES, measure
-from springfoot.agents.recording import SERIES, Recording, load_recording
+from springfoot.agents.recording import SERIES, Recording, load_recording, prepare, record, record_each
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT
@@ -188,6 +188,28 @@ def test_numbers_can_be_recomputed_from_the_saved_series(tmp_path):
         assert not any(values.dtype.hasobject for values in file.values())
         assert set(SERIES) < set(file)
     assert measure(load_recording(tmp_path / "strides.npz")).metrics == measure(recording).metrics
+
+
+def test_a_recording_is_of_one_body_at_one_speed():
+    policy, settings = prepare("untrained", {"mass_range": (50.0, 80.0)})
+    with pytest.raises(SpringfootError, match="mass_range"):
+        record(policy, settings, name="untrained", episodes=1)
+
+
+def test_bodies_side_by_side_are_measured_each_in_its_own_units():
+    ranges = {"height_range": (1.5, 1.9), "mass_range": (50.0, 100.0), "speed_range": (1.0, 1.3)}
+    policy, settings = prepare("untrained", ranges | {"episode_seconds": 5.0})
+    who = {"height": [1.7, 1.9], "mass": [63.0, 100.0], "speed": [1.2, 1.2 * np.sqrt(1.9 / 1.7)]}
+    own, other = record_each(policy, settings, who, name="untrained", seed=3)
+    alone = record(*prepare("untrained", {"episode_seconds": 5.0}), name="untrained", episodes=1, seed=3)
+    for key, values in alone.series.items():
+        np.testing.assert_array_equal(own.series[key], values, err_msg=key)
+    assert measure(own).metrics == measure(alone).metrics
+    assert (other.settings.height, other.settings.mass, other.settings.height_range) == (1.9, 100.0, None)
+    assert other.fall_reason[0] == ""
+    metrics = measure(other).metrics
+    assert metrics["reference"]["speed_m_s"] == pytest.approx(who["speed"][1])
+    assert 0.8 < metrics["grf"]["vertical_peak1_bw"] < 1.5
 
 
 @pytest.mark.parametrize("content", [b"", b"not an archive", b"PK\x03\x04 half an archive", b"\x80\x04K\x01."])

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from springfoot.agents.schedules import baseline
 from springfoot.envs.biped import Biped
-from springfoot.envs.legs import leg_constants
+from springfoot.envs.constants import leg_constants
 from springfoot.envs.model import ANKLE, LEFT, TOE, damping_times
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import SpringfootError

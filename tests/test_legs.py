@@ -8,8 +8,9 @@ import pytest
 
 from springfoot.envs import legs
 from springfoot.envs.biped import Biped
+from springfoot.envs.constants import constants_at, constants_from, constants_name, leg_constants
 from springfoot.envs.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
-from springfoot.envs.legs import constants_name, knot_curve, leg_constants
+from springfoot.envs.legs import knot_curve
 from springfoot.envs.phase import GRID
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.body import Body
@@ -28,6 +29,29 @@ def test_every_set_of_constants_says_what_found_it():
 def test_angle_and_phase_share_the_planned_constants():
     assert leg_constants("angle", "people") == leg_constants("phase", "people") == leg_constants("planned", "people")
     assert leg_constants("neutral", "people") != leg_constants("planned", "people")
+
+
+def test_constants_are_linear_between_speeds_and_the_nearest_beyond():
+    slow, fast = leg_constants("planned", "people"), leg_constants("neutral", "people")
+    sets = {0.8: slow, 1.2: fast}
+    assert constants_at(sets, 0.8) == constants_at(sets, 0.5) == slow
+    assert constants_at(sets, 1.2) == constants_at(sets, 1.9) == constants_at({1.2: fast}, 0.8) == fast
+    between = vars(constants_at(sets, 0.9))
+    for name, value in between.items():
+        low, high = (np.array(vars(each)[name]) for each in (slow, fast))
+        np.testing.assert_allclose(value, 0.75 * low + 0.25 * high, rtol=1e-12, atol=1e-12)
+        assert type(value) is type(vars(slow)[name])
+
+
+def test_every_committed_speed_has_its_own_constants():
+    """A set whose name tells a speed is what a walk at that speed gets."""
+    table = json.loads(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
+    sets = {constants_name("planned", "people", speed): speed for speed in np.round(np.arange(0.4, 2.0, 0.1), 9)}
+    for name in set(sets) & set(table["constants"]):
+        expected = constants_from(table["constants"][name])
+        assert leg_constants("planned", "people", sets[name]) == expected
+        biped = Biped(BipedSettings(height=1.9, mass=70.0, speed=sets[name] * np.sqrt(1.9 / 1.7)), 1)
+        np.testing.assert_allclose(biped.constants[0].hip_knots_deg, expected.hip_knots_deg, rtol=1e-9)
 
 
 def test_a_setting_without_constants_is_refused():
@@ -49,7 +73,7 @@ def test_knots_are_met_and_periodic():
 def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
     body, human = Body(), human_gait(1.2)
     plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
-    constants = legs.constants_from({**vars(leg_constants("planned", "people")), **plain})
+    constants = constants_from({**vars(leg_constants("planned", "people")), **plain})
     rest = planned(constants, body, human, human.stride_time)[:, 0]
     rate = human.rate("ankle", GRID) / (constants.period_factor * human.stride_time)
     torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - human.mean("ankle", GRID) - 0.02 * rate)

@@ -7,6 +7,8 @@ from springfoot.envs.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
 from springfoot.envs.simulation import Measurement
 from springfoot.envs.task import EXCESS_SHARE, FORCE_TOLERANCE, OBSERVATION, TERMS, TOO_LOW, TOO_TILTED, Task
+from springfoot.envs.walkers import Walkers
+from springfoot.envs.walks import rows, walks_of
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
@@ -21,7 +23,11 @@ class Setup:
         self.body = Body(self.settings.height, self.settings.mass)
         self.human = human_gait(self.settings.speed, self.settings.height)
         self.plan = plan_walk(self.body, self.settings.speed)
-        self.task = Task(self.settings, self.body, self.plan, self.human)
+        self.walks = walks_of(self.settings)
+
+    def task(self, num) -> Task:
+        """For so many environments."""
+        return Task(self.settings, list(rows(self.walks)), Walkers(self.settings, np.array([self.settings.speed]), num))
 
     def measurement(self, left_phase, **other) -> Measurement:
         """The body on its plan with people's joint angles, trunk upright, the leading ankle at x = 10 m."""
@@ -62,7 +68,7 @@ class Setup:
             "stiffness": np.tile([300.0, 60.0], (n, 2, 1)) * self.body.mass_scale * self.body.length_scale,
             "force_windows": self.people_force(left_phase),
         }
-        terms = self.task.terms(measurement, leg_phases(np.atleast_1d(left_phase)), **(values | other))
+        terms = self.task(n).terms(measurement, leg_phases(np.atleast_1d(left_phase)), **(values | other))
         return dict(zip(TERMS, terms.T, strict=True))
 
 
@@ -93,7 +99,7 @@ def test_planned_speed_is_the_derivative_of_the_planned_com(thesis_body):
     ahead, behind = (thesis_body.plan.com(2 * (phase + sign * 1e-4))[0] for sign in (1, -1))
     speed = (ahead - behind) / (4e-4 * step)
     measured = thesis_body.measurement(phase, com_velocity=np.stack([speed, 0 * speed], -1))
-    np.testing.assert_allclose(thesis_body.task.tracking(measured, leg_phases(phase)), 0.0, atol=2e-4)
+    np.testing.assert_allclose(thesis_body.task(len(phase)).tracking(measured, leg_phases(phase)), 0.0, atol=2e-4)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +111,7 @@ def test_tracking_falls_to_one_over_e_at_its_tolerance(term, field, offset, heig
     setup = Setup(height=height, mass=45, speed=1.0)
     ratio = height / 1.7
     exact = setup.measurement(PHASES)
-    error = setup.task.tracking(exact, leg_phases(PHASES))
+    error = setup.task(len(PHASES)).tracking(exact, leg_phases(PHASES))
     exact = setup.measurement(
         PHASES,
         com=exact.com - error[:, :2],
@@ -204,7 +210,7 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     assert set(terms) == set(weights)
     expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
     expected[0] = 0.0
-    np.testing.assert_allclose(setup.task.reward(np.stack([*terms.values()], -1)), expected, rtol=1e-12)
+    np.testing.assert_allclose(setup.task(len(PHASES)).reward(np.stack([*terms.values()], -1)), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("height", [1.7, 1.2])
@@ -215,7 +221,7 @@ def test_a_fall_is_a_low_hip_or_a_tilted_trunk(height):
     measured.root[:, 1] = [limit * 1.001, limit * 0.999, 1.0, 1.0, np.nan, 1.0]
     measured.root[:, 2] = [0.0, 0.0, 0.799, -0.801, 0.0, np.nan]
     expected = ["", TOO_LOW, "", TOO_TILTED, TOO_LOW, TOO_TILTED]
-    assert list(setup.task.fallen(measured)) == expected
+    assert list(setup.task(6).fallen(measured)) == expected
     alive = setup.terms(measured, np.full(6, 0.2))["alive"]
     np.testing.assert_array_equal(alive, [reason == "" for reason in expected])
 
@@ -231,7 +237,7 @@ def observe(setup, measured, left_phase, **other):
         "last_action": np.zeros((n, 4)),
         "force": np.zeros((n, 2, 3, 2)),
     }
-    return setup.task.observe(measured, leg_phases(left_phase), **(values | other))
+    return setup.task(n).observe(measured, leg_phases(left_phase), **(values | other))
 
 
 def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
@@ -246,7 +252,7 @@ def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
     action = np.tile([0.1, 0.2, 0.3, 0.4], (2, 1))
     planned = setup.human.mean("ankle", np.array([0.1, 0.6]))
     seen = observe(setup, measured, [0.1, 0.7], last_action=action, force=force)
-    row, other = (dict(zip(setup.task.names, values, strict=True)) for values in seen)
+    row, other = (dict(zip(setup.task(2).names, values, strict=True)) for values in seen)
 
     leg = setup.body.leg_length
     froude, rate = np.sqrt(GRAVITY * leg), np.sqrt(leg / GRAVITY)
@@ -287,7 +293,7 @@ def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
 
 
 def test_observation_is_finite_and_within_bounds_whatever_happens(thesis_body):
-    task = thesis_body.task
+    task = thesis_body.task(3)
     measured = thesis_body.measurement([0.2, 0.3, 0.4])
     for values, wild in ((measured.angle, 1e9), (measured.velocity, -1e9), (measured.root_velocity, np.nan)):
         values[:] = wild
@@ -322,11 +328,12 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
     force = rng.uniform(-500, 1000, (2, n, 2, 3, 2))
 
     def results(rows):
+        task = setup.task(len(left[rows]))
         measured = Measurement(diverged=base.diverged[rows], **{name: value[rows] for name, value in numbers.items()})
         legs = leg_phases(left[rows])
-        seen = setup.task.observe(measured, legs, last[rows], force[0, rows])
-        terms = setup.task.terms(measured, legs, action[rows], last[rows], stiffness[rows], force[:, rows])
-        return np.column_stack([seen, setup.task.reward(terms), terms])
+        seen = task.observe(measured, legs, last[rows], force[0, rows])
+        terms = task.terms(measured, legs, action[rows], last[rows], stiffness[rows], force[:, rows])
+        return np.column_stack([seen, task.reward(terms), terms])
 
     together = results(slice(None))
     alone = np.concatenate([results(slice(i, i + 1)) for i in range(n)])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from springfoot.agents import tuning
-from springfoot.envs.legs import leg_constants
+from springfoot.envs.constants import leg_constants
 from springfoot.envs.settings import BipedSettings
 
 COMMITTED = leg_constants("planned", "people")

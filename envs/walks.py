@@ -1,0 +1,100 @@
+"""What a body is asked to do at each speed: people, plan and leg constants, at a few speeds of one body.
+
+The body is the settings' own. Between two tabulated speeds everything is linear in speed, and since mechanics scale
+exactly (`envs.model`), another body at a Froude-equal speed does the same in its own units (`envs.walkers`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+from math import ceil, floor, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+from springfoot.gait.human import HumanGait
+from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
+
+from .constants import LegConstants, leg_constants
+from .settings import BipedSettings, reference_gait
+
+SPACING = 0.1
+"""Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
+the one planned for that speed, most of it where people's measured speeds meet."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Walk:
+    """One speed of the settings' body."""
+
+    body: Body
+    """The settings' body."""
+    speed: float
+    """[m/s]."""
+    human: HumanGait
+    """Whom it is held to."""
+    plan: WalkPlan
+    """Its CoM and the time of its strides."""
+    constants: tuple[LegConstants, ...]
+    """Leg constants: one set, or several variants."""
+
+
+def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[Walk, ...]:
+    """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first.
+
+    `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
+    walk that cannot be planned.
+    """
+    return tuple(walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
+
+
+def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None) -> Walk:
+    """The walk of the settings' body at `speed` [m/s]."""
+    body = Body(settings.height, settings.mass)
+    settings = replace(settings, speed=speed)
+    human = reference_gait(settings)
+    return Walk(
+        body=body,
+        speed=speed,
+        human=human,
+        plan=(
+            _plan(body, speed, settings.cadence)
+            if settings.human is None
+            else plan_walk(body, speed, settings.cadence, human=human)
+        ),
+        constants=tuple(
+            legs or [leg_constants(settings.equilibrium, settings.cadence, speed / sqrt(body.length_scale))]
+        ),
+    )
+
+
+def rows(walks: Sequence[Walk]) -> Iterator[tuple[LegConstants, Walk]]:
+    """The rows of a table over variants and speeds, in order: speeds within variants."""
+    for variant, walk in product(range(len(walks[0].constants)), walks):
+        yield walk.constants[variant], walk
+
+
+def tabulated_speeds(settings: BipedSettings) -> NDArray:
+    """(G,) ascending speeds [m/s] of the settings' body that are Froude-equal to all that the settings may ask for.
+
+    Without ranges it is the settings' speed alone; with them, the multiples of `SPACING` around and the settings'
+    speed among them.
+    """
+    height, speed = settings.height, settings.speed
+    lowest, highest = (sqrt(height / other) for other in reversed(settings.height_range or (height, height)))
+    slow, fast = settings.speed_range or (speed, speed)
+    slow, fast = min(slow * lowest, speed), max(fast * highest, speed)
+    if slow == fast:
+        return np.array([speed])
+    unit = sqrt(Body(settings.height, settings.mass).length_scale)
+    first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
+    grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # 1.2, and not 12 x 0.1
+    return np.array(sorted({*grid, speed}))
+
+
+@lru_cache(maxsize=256)
+def _plan(body: Body, speed: float, cadence: Cadence) -> WalkPlan:
+    """People's, kept: planning takes a tenth of a second."""
+    return plan_walk(body, speed, cadence)
