@@ -244,9 +244,11 @@ class Biped:
 
     def _reasons(self, terminated: NDArray) -> NDArray:
         """Why those `terminated` (N,) are, "" for the others."""
-        diverged = self._now.diverged
-        reasons = np.where(diverged == "", self._task.fallen(self._now), np.char.add("diverged: ", diverged))
-        return np.where(terminated, reasons, "")
+        reasons = np.where(terminated, self._task.fallen(self._now), "").astype(object)
+        for index in np.flatnonzero(terminated & (self._now.diverged >= 0)):
+            warning = mujoco.mjtWarning(int(self._now.diverged[index]))
+            reasons[index] = f"diverged: {warning.name.removeprefix('mjWARN_')}"
+        return reasons
 
     def _decode(self, actions: NDArray) -> NDArray:
         action = np.array(actions, float, order="C")

@@ -67,7 +67,7 @@ class Measurement:
     force: NDArray
     """(N, side, contact, 2) ground reaction force (forward, up) on each, mean over the window [N]."""
     diverged: NDArray
-    """(N,) name of the first MuJoCo warning raised since the episode began, "" where all is well."""
+    """(N,) number of the first MuJoCo warning raised since the episode began (`mjtWarning`), -1 where all is well."""
 
 
 class Simulation:
@@ -98,10 +98,7 @@ class Simulation:
         self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
         self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._segments = np.repeat(_segments(body), num)
-        self._everyone = np.arange(num)
-        self._no_torque = np.zeros((num, len(SIDES), len(JOINTS)))
-        self._no_warning = np.full(num, "", dtype=_NAME)
-        self._no_warning.flags.writeable = False
+        self._no_control = np.zeros_like(self._ctrl)
 
     def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
         """Simulate `bodies` (K,) in `ids` (K,) from their next reset on; compiling a model takes about 1.5 ms."""
@@ -142,12 +139,12 @@ class Simulation:
                 self._record["sensordata"][ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)[
                     "sensordata"
                 ]
-        return self._measure(stiffness, drive)
+        return self._measure(self._ctrl)
 
     def measure(self) -> Measurement:
         """The state as it stands, with no torque and no force: what is known right after a reset."""
         self._sensors[:] = 0.0
-        return self._measure(self._no_torque, self._no_torque)
+        return self._measure(self._no_control)
 
     def data(self, index: int) -> mujoco.MjData:
         """A copy of one simulation's state after `mj_forward`, to render or to inspect."""
@@ -155,7 +152,7 @@ class Simulation:
         mujoco.mj_forward(self.models[index], data)
         return data
 
-    def _measure(self, stiffness: NDArray, drive: NDArray) -> Measurement:
+    def _measure(self, control: NDArray) -> Measurement:
         legs, feet = (self.num, len(SIDES), len(JOINTS)), (self.num, len(SIDES), len(CONTACTS), 2)
         m = Measurement(
             time=self._time.copy(),
@@ -169,58 +166,68 @@ class Simulation:
             ankle=np.empty((self.num, len(SIDES), 2)),
             contact=np.empty(feet),
             force=np.empty(feet),
-            diverged=_names(self._warnings) if _any_raised(self._warnings) else self._no_warning,
+            diverged=np.empty(self.num, int),
         )
-        _read_joints(self._segments, self._qpos, self._qvel, stiffness, drive, m.angle, m.velocity, m.torque)
-        _average(self._sensors, m.force)
-        state = self._qpos, self._qvel, m.root, m.root_velocity
-        _locate(self._segments, *state, m.com, m.com_velocity, m.ankle, m.contact)
+        state = self._segments, self._qpos, self._qvel, control, self._sensors, self._warnings
+        legs = m.root, m.root_velocity, m.angle, m.velocity, m.torque
+        _measure(*state, *legs, m.com, m.com_velocity, m.ankle, m.contact, m.force, m.diverged)
         return m
 
 
-_NAME = "U32"
-
-
-def _names(warnings: NDArray) -> NDArray:
-    """(N, warning) counters -> (N,) the first raised one's name without its prefix, or ""."""
-    names = np.full(len(warnings), "", dtype=_NAME)
-    for index in np.flatnonzero(warnings.any(axis=1)):
-        names[index] = mujoco.mjtWarning(int(warnings[index].argmax())).name.removeprefix("mjWARN_")
-    return names
-
-
 @kernel
-def _any_raised(warnings):
-    for i in range(warnings.shape[0]):
-        for kind in range(warnings.shape[1]):
+def _measure(
+    segments,
+    position,
+    rate,
+    control,
+    sensors,
+    warnings,
+    root,
+    root_velocity,
+    angle,
+    velocity,
+    torque,
+    com,
+    com_velocity,
+    ankle,
+    contact,
+    force,
+    diverged,
+):
+    for i in range(len(root)):
+        for k in range(3):
+            root[i, k], root_velocity[i, k] = position[i, k], rate[i, k]
+        _read_joints(segments[i], position[i], rate[i], control[i], angle[i], velocity[i], torque[i])
+        _locate(segments[i], position[i], rate[i], com[i], com_velocity[i], ankle[i], contact[i])
+        _average(sensors[i], force[i])
+        diverged[i] = -1
+        for kind in range(warnings.shape[1] - 1, -1, -1):
             if warnings[i, kind] > 0:
-                return True
-    return False
+                diverged[i] = kind
 
 
 @kernel
-def _read_joints(segments, position, rate, stiffness, drive, angle, velocity, torque):
-    for i in range(len(torque)):
-        beta, limit = segments[i].beta, segments[i].limit
-        for side in range(2):
-            for joint in range(4):
-                theta, theta_rate = position[i, 3 + 4 * side + joint], rate[i, 3 + 4 * side + joint]
-                spring = drive[i, side, joint] - stiffness[i, side, joint] * (theta + beta[joint] * theta_rate)
-                angle[i, side, joint], velocity[i, side, joint] = theta, theta_rate
-                torque[i, side, joint] = min(max(spring, -limit[joint]), limit[joint])
+def _read_joints(segments, position, rate, control, angle, velocity, torque):
+    beta, limit = segments.beta, segments.limit
+    for side in range(2):
+        for joint in range(4):
+            theta, theta_rate = position[3 + 4 * side + joint], rate[3 + 4 * side + joint]
+            stiffness, drive = control[side, joint]
+            spring = drive - stiffness * (theta + beta[joint] * theta_rate)
+            angle[side, joint], velocity[side, joint] = theta, theta_rate
+            torque[side, joint] = min(max(spring, -limit[joint]), limit[joint])
 
 
 @kernel
 def _average(sensors, force):
-    steps = sensors.shape[1]
-    for i in range(len(force)):
-        for side in range(2):
-            for contact in range(3):
-                forward = up = 0.0
-                for step in range(steps):
-                    forward += sensors[i, step, side, contact, 0]
-                    up += sensors[i, step, side, contact, 2]
-                force[i, side, contact, 0], force[i, side, contact, 1] = forward / steps, up / steps
+    steps = len(sensors)
+    for side in range(2):
+        for contact in range(3):
+            forward = up = 0.0
+            for step in range(steps):
+                forward += sensors[step, side, contact, 0]
+                up += sensors[step, side, contact, 2]
+            force[side, contact, 0], force[side, contact, 1] = forward / steps, up / steps
 
 
 SEGMENTS = np.dtype(
@@ -269,39 +276,35 @@ def _segments(body: Body) -> NDArray:
 
 
 @kernel
-def _locate(segments, position, rate, root, root_velocity, com, com_velocity, ankle, contact):
+def _locate(segments, position, rate, com, com_velocity, ankle, contact):
     """Planar forward kinematics.
 
     A segment turned up-forward by s (a thigh's flexion, a foot's toes-up pitch) carries the offset (u, w) in its frame
     to (u cos s - w sin s, u sin s + w cos s), and spinning at ds/dt moves it at ds/dt (-z, x).
     """
-    for i in range(len(root)):
-        body = segments[i]
-        for k in range(3):
-            root[i, k], root_velocity[i, k] = position[i, k], rate[i, k]
-        hip_x, hip_z, pitch = position[i, 0], position[i, 1], position[i, 2]
-        x, z = _turned(body.trunk, cos(-pitch), sin(-pitch))
-        com_x, com_z = hip_x + x, hip_z + z
-        com_rate_x, com_rate_z = rate[i, 0] + z * rate[i, 2], rate[i, 1] - x * rate[i, 2]
-        for side in range(2):
-            joint_x, joint_z, turn, spin = hip_x, hip_z, -pitch, -rate[i, 2]
-            for joint in range(4):
-                sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
-                turn += sign * position[i, 3 + 4 * side + joint]
-                spin += sign * rate[i, 3 + 4 * side + joint]
-                c, s = cos(turn), sin(turn)
-                x, z = _turned(body.part[joint], c, s)
-                com_x, com_z = com_x + x, com_z + z
-                com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
-                if joint == ANKLE:
-                    ankle[i, side, 0], ankle[i, side, 1] = joint_x, joint_z
-                for k in range(3):
-                    if joint == (TOE if k == 2 else ANKLE):  # heel and ball are on the foot
-                        x, z = _turned(body.contact[k], c, s)
-                        contact[i, side, k, 0], contact[i, side, k, 1] = joint_x + x, joint_z + z - body.radius[k]
-                x, z = _turned(body.end[joint], c, s)
-                joint_x, joint_z = joint_x + x, joint_z + z
-        com[i, 0], com[i, 1], com_velocity[i, 0], com_velocity[i, 1] = com_x, com_z, com_rate_x, com_rate_z
+    hip_x, hip_z, pitch = position[0], position[1], position[2]
+    x, z = _turned(segments.trunk, cos(-pitch), sin(-pitch))
+    com_x, com_z = hip_x + x, hip_z + z
+    com_rate_x, com_rate_z = rate[0] + z * rate[2], rate[1] - x * rate[2]
+    for side in range(2):
+        joint_x, joint_z, turn, spin = hip_x, hip_z, -pitch, -rate[2]
+        for joint in range(4):
+            sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
+            turn += sign * position[3 + 4 * side + joint]
+            spin += sign * rate[3 + 4 * side + joint]
+            c, s = cos(turn), sin(turn)
+            x, z = _turned(segments.part[joint], c, s)
+            com_x, com_z = com_x + x, com_z + z
+            com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
+            if joint == ANKLE:
+                ankle[side, 0], ankle[side, 1] = joint_x, joint_z
+            for k in range(3):
+                if joint == (TOE if k == 2 else ANKLE):  # heel and ball are on the foot
+                    x, z = _turned(segments.contact[k], c, s)
+                    contact[side, k, 0], contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
+            x, z = _turned(segments.end[joint], c, s)
+            joint_x, joint_z = joint_x + x, joint_z + z
+    com[0], com[1], com_velocity[0], com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
 
 
 @kernel

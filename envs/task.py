@@ -149,7 +149,7 @@ class Task:
         (W, N, 2, 3, 2) on the body [N] in the W control windows of the step.
         """
         terms = np.empty((len(leg_phase), len(TERMS)))
-        state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged == ""
+        state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged
         curves = self._at(leg_phase)
         _judge(
             self._scales,
@@ -242,7 +242,7 @@ def _judge(
     com,
     com_velocity,
     ankle,
-    well,
+    diverged,
     leg_phase,
     action,
     last_action,
@@ -253,7 +253,7 @@ def _judge(
     for i in range(len(root)):
         scale = scales[i]
         upright = root[i, 1] >= scale.min_hip_height and abs(root[i, 2]) <= MAX_PITCH  # a NaN is not
-        terms[i, ALIVE] = 1.0 if upright and well[i] else 0.0
+        terms[i, ALIVE] = 1.0 if upright and diverged[i] < 0 else 0.0
         x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
         terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
         terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))

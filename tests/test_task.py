@@ -48,7 +48,7 @@ class Setup:
             "ankle": np.stack([np.where(legs < 0.5, 10.0, 9.0), np.full((n, 2), 0.1)], -1),
             "contact": np.zeros((n, 2, 3, 2)),
             "force": np.zeros((n, 2, 3, 2)),
-            "diverged": np.full(n, ""),
+            "diverged": np.full(n, -1),
         }
         return Measurement(**(values | other))
 
@@ -205,7 +205,6 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     measured = setup.measurement(PHASES)
     measured.angle[:] += 0.03
     measured.root[0, 1] = 0.5
-    measured.diverged[:] = ""
     terms = setup.terms(measured, PHASES, action=np.full((len(PHASES), 4), 0.1))
     assert set(terms) == set(weights)
     expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
@@ -227,7 +226,7 @@ def test_a_fall_is_a_low_hip_or_a_tilted_trunk(height):
 
 
 def test_a_diverged_simulation_is_not_alive(thesis_body):
-    measured = thesis_body.measurement([0.2, 0.2], diverged=np.array(["", "BADQACC"]))
+    measured = thesis_body.measurement([0.2, 0.2], diverged=np.array([-1, 2]))
     np.testing.assert_array_equal(thesis_body.terms(measured, [0.2, 0.2])["alive"], [1.0, 0.0])
 
 
