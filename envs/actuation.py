@@ -63,14 +63,18 @@ class FootSprings:
     ):
         num = len(walkers.place)
         self._residual = settings.action_mode == "residual"
-        self._own_middle, self._factor = _log_scale(settings, body)
-        self._middle = np.tile(self._own_middle, (num, 1, 1))
+        middle, self._factor = _log_scale(settings, body)
+        self._middle = np.tile(middle, (num, 2, 1))
         self._walkers = walkers
         self._equilibrium, self._schedule = PhaseTable(equilibrium), PhaseTable(schedule)
         self.stiffness = np.zeros((num, 2, 2))
         """(N, side, 2) K [N m/rad]; changed in place."""
         self.equilibrium = np.zeros((num, 2, 2))
         """(N, side, 2) rest angle [rad]; changed in place."""
+        self.work_stiffness = np.zeros((num, 2, 2))
+        """(N, side, 2) work put in by the last change of stiffness [J]; changed in place."""
+        self.work_equilibrium = np.zeros((num, 2, 2))
+        """(N, side, 2) work put in by moving the rest angle since then [J]; changed in place."""
         self._fresh = np.ones(num, bool)
         self._everyone = np.ones(num, bool)
 
@@ -78,78 +82,70 @@ class FootSprings:
         """The next change of springs `ids` costs no work."""
         self._fresh[ids] = True
 
-    def fit(self) -> None:
-        """Take the walkers' bodies as they are now."""
-        self._middle = self._own_middle * self._walkers.scale["torque"][:, None, None]
-
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
         return self._schedule.at(leg_phase, self._walkers.place) * self._walkers.scale["torque"][:, None, None]
 
     def set_stiffness(
         self, action: NDArray, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None
-    ) -> NDArray:
-        """Take new stiffness from an action (N, 4) at foot angles (N, side, 2); returns the work put in [J].
+    ) -> None:
+        """Take new stiffness from an action (N, 4) at joint angles (N, side, joint).
 
         Changing K under a deflection x puts 1/2 (K' - K) x^2 into the spring. Without `running` (N,), all change.
         """
         action = action.reshape(self.stiffness.shape)
         if self._residual:
-            stiffness = self.scheduled(leg_phase) * np.exp(action)
+            middle, factor = self._schedule.at(leg_phase, self._walkers.place), np.exp(action)
         else:
-            stiffness = self._middle * self._factor**action
+            middle, factor = self._middle, self._factor**action
         running = self._everyone if running is None else running
-        work = np.empty(self.stiffness.shape)
-        _stiffen(stiffness, self.equilibrium, angle, self._fresh, running, self.stiffness, work)
-        return work
+        works = self.work_stiffness, self.work_equilibrium
+        _stiffen(
+            middle, factor, self._walkers.scale, angle, self.equilibrium, self._fresh, running, self.stiffness, *works
+        )
 
-    def move_equilibrium(self, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None) -> NDArray:
-        """Take the rest angles of the legs' phases; returns the work put in, 1/2 K (x'^2 - x^2) [J]."""
+    def move_equilibrium(
+        self, leg_phase: NDArray, angle: NDArray, control: NDArray, running: NDArray | None = None
+    ) -> None:
+        """Take the rest angles of the legs' phases, and put K and K theta_eq into `control` (N, side, joint, 2).
+
+        Moving the rest angle from deflection x to x' puts 1/2 K (x'^2 - x^2) into the spring.
+        """
         equilibrium = self._equilibrium.at(leg_phase, self._walkers.place)
         running = self._everyone if running is None else running
-        work = np.empty(self.stiffness.shape)
-        _move(equilibrium, self.stiffness, angle, self._fresh, running, self.equilibrium, work)
-        return work
-
-    def command(self, stiffness: NDArray, drive: NDArray) -> None:
-        """Put K [N m/rad] and the drive torque K theta_eq [N m] into their places in two arrays (N, side, joint)."""
-        _command(self.stiffness, self.equilibrium, stiffness, drive)
+        _move(
+            equilibrium, angle, self._fresh, running, self.stiffness, self.equilibrium, self.work_equilibrium, control
+        )
 
 
 @kernel
-def _stiffen(wanted, equilibrium, angle, fresh, running, stiffness, work):
+def _stiffen(
+    middle, factor, scale, angle, equilibrium, fresh, running, stiffness, work_stiffness, work_equilibrium
+):
     for i in range(len(stiffness)):
         for side in range(2):
             for joint in range(2):
-                before, after = stiffness[i, side, joint], wanted[i, side, joint]
-                deflection = equilibrium[i, side, joint] - angle[i, side, joint]
-                work[i, side, joint] = 0.0
+                work_stiffness[i, side, joint] = work_equilibrium[i, side, joint] = 0.0
                 if running[i]:
+                    before = stiffness[i, side, joint]
+                    after = middle[i, side, joint] * scale[i].torque * factor[i, side, joint]
+                    deflection = equilibrium[i, side, joint] - angle[i, side, ANKLE + joint]
                     stiffness[i, side, joint] = after
                     if not fresh[i]:
-                        work[i, side, joint] = 0.5 * (after - before) * deflection**2
+                        work_stiffness[i, side, joint] = 0.5 * (after - before) * deflection**2
 
 
 @kernel
-def _move(wanted, stiffness, angle, fresh, running, equilibrium, work):
+def _move(wanted, angle, fresh, running, stiffness, equilibrium, work, control):
     for i in range(len(equilibrium)):
         for side in range(2):
             for joint in range(2):
-                before = equilibrium[i, side, joint] - angle[i, side, joint]
-                after = wanted[i, side, joint] - angle[i, side, joint]
-                work[i, side, joint] = 0.0
+                k, theta = stiffness[i, side, joint], angle[i, side, ANKLE + joint]
                 if running[i]:
+                    before, after = equilibrium[i, side, joint] - theta, wanted[i, side, joint] - theta
                     equilibrium[i, side, joint] = wanted[i, side, joint]
                     if not fresh[i]:
-                        work[i, side, joint] = 0.5 * stiffness[i, side, joint] * (after * after - before * before)
+                        work[i, side, joint] += 0.5 * k * (after * after - before * before)
+                control[i, side, ANKLE + joint, 0] = k
+                control[i, side, ANKLE + joint, 1] = k * equilibrium[i, side, joint]
         fresh[i] = fresh[i] and not running[i]
-
-
-@kernel
-def _command(spring_stiffness, equilibrium, stiffness, drive):
-    for i in range(len(stiffness)):
-        for side in range(2):
-            for joint in range(2):
-                k = spring_stiffness[i, side, joint]
-                stiffness[i, side, ANKLE + joint] = k
-                drive[i, side, ANKLE + joint] = k * equilibrium[i, side, joint]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import ANGLES
 
-from .actuation import FEET, FootSprings
+from .actuation import FootSprings
 from .constants import LegConstants
 from .equilibrium import foot_curves
 from .kernel import kernel
@@ -109,15 +109,13 @@ class Biped:
 
         self._random: list[np.random.Generator | None] = [None] * num_envs
         self._everyone = np.ones(num_envs, bool)
-        self._no_reason = np.full(num_envs, "")
+        self._no_reason = np.full(num_envs, "", object)
         self._no_reason.flags.writeable = False
         self._steps = np.zeros(num_envs, int)
         self._last_action = np.zeros((num_envs, len(ACTIONS)))
         self._windows = np.zeros((WINDOWS, num_envs, len(SIDES), len(CONTACTS), 2))
         self._force = np.zeros(self._windows.shape[1:])
         self._pushes = Pushes(settings, num_envs)
-        self._stiffness = np.zeros((num_envs, len(SIDES), len(JOINTS)))
-        self._drive = np.zeros_like(self._stiffness)
         self._now = self._simulation.measure()
 
     @property
@@ -191,7 +189,6 @@ class Biped:
             bodies = [self.walkers.bodies[index] for index in ids]
             self._simulation.fit(ids, bodies)
             self._task.fit(ids)
-            self._springs.fit()
             self._passive_damping[ids, 0] = [passive_damping(body) for body in bodies]
         self._legs.follow()
 
@@ -201,46 +198,42 @@ class Biped:
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
         """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
-        action = self._decode(actions)
         running, ids = self._everyone, None
-        if active is not None and not active.all():
+        if active is not None and np.count_nonzero(active) < self.num_envs:
             running, ids = active, np.flatnonzero(active)
-            action = np.where(running[:, None], action, self._last_action)
-        if self.walkers.advance(self._steps * STEP_SECONDS, self._random, running):
+        action = self._decode(actions, running)
+        if self.walkers.advance(self._steps, self._random, running):
             self._legs.follow()
         springs, phase = self._springs, self._legs.phase
-        work_stiffness = springs.set_stiffness(action, phase, self._now.angle[..., FEET], running)
-        work_equilibrium = np.zeros(work_stiffness.shape)
+        springs.set_stiffness(action, phase, self._now.angle, running)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
         for window in range(WINDOWS):
-            work_equilibrium += self._window(running, ids)
+            self._window(running, ids)
             self._windows[window] = self._now.force
-        m = self._now
-        terms = self._task.terms(m, phase, action, self._last_action, springs.stiffness, self._windows)
+        terms = self._task.terms(self._now, phase, action, self._last_action, springs.stiffness, self._windows)
         reward = self._task.reward(terms)
-        terminated, truncated = self._end(running, terms, reward)
-        values = report(
-            *(springs.stiffness, m.torque[..., FEET], springs.equilibrium, work_stiffness, work_equilibrium),
-            *(terms, phase, self._steps * STEP_SECONDS, m.com_velocity[:, 0]),
-        )
-        _average(self._windows, running, self._force)
+        terminated, truncated, termination = self._end(running, terms, reward)
         self._last_action = action
         return Outcome(
             observation=self.observe(),
             reward=reward,
             terminated=terminated,
             truncated=truncated,
-            values=values,
-            termination=self._reasons(terminated) if terminated.any() else self._no_reason,
+            values=report(springs, self._now, terms, phase, self._steps),
+            termination=termination,
         )
 
-    def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray]:
-        """Count the step; which episodes it terminates and truncates. Who did not take it gets no reward."""
-        terminated, truncated = np.empty((2, self.num_envs), bool)
+    def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Count the step and average its forces; which episodes it terminates, truncates, and why the former.
+
+        Who did not take it gets no reward.
+        """
+        terminated, truncated = np.empty(self.num_envs, bool), np.empty(self.num_envs, bool)
         limit = self.settings.episode_seconds / STEP_SECONDS - 0.5  # times are sums of steps
-        _end(limit, running, terms[:, ALIVE], self._steps, reward, terminated, truncated)
-        return terminated, truncated
+        state = terms, self._windows, self._steps, self._force, reward
+        falls = _end(limit, running, *state, terminated, truncated)
+        return terminated, truncated, self._reasons(terminated) if falls else self._no_reason
 
     def _reasons(self, terminated: NDArray) -> NDArray:
         """Why those `terminated` (N,) are, "" for the others."""
@@ -250,34 +243,33 @@ class Biped:
             reasons[index] = f"diverged: {warning.name.removeprefix('mjWARN_')}"
         return reasons
 
-    def _decode(self, actions: NDArray) -> NDArray:
+    def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
+        """Actions clipped to [-1, 1]; who is not `running` keeps the last one."""
         action = np.array(actions, float, order="C")
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
-        if not _clip(action):
+        if not _clip(running, self._last_action, action):
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         return action
 
-    def _window(self, running: NDArray, ids: NDArray | None) -> NDArray:
-        """One control window; returns the work of moving the foot springs' equilibrium, (N, side, 2) [J]."""
-        springs, legs, m = self._springs, self._legs, self._now
+    def _window(self, running: NDArray, ids: NDArray | None) -> None:
+        """One control window."""
+        legs, m, control = self._legs, self._now, self._simulation.control
         phase = None if self.on_tick is None else legs.phase.copy()
-        work = springs.move_equilibrium(legs.phase, m.angle[..., FEET], running)
-        legs.command(m, self._stiffness, self._drive)
-        springs.command(self._stiffness, self._drive)
-        self._now = self._simulation.advance(self._stiffness, self._drive, ids)
+        self._springs.move_equilibrium(legs.phase, m.angle, control, running)
+        legs.command(m, control)
+        self._now = self._simulation.advance(ids)
         legs.advance(self._now, running)
         if self.on_tick is not None and phase is not None:
             self.on_tick(self._tick(phase, running))
-        return work
 
     def _tick(self, phase: NDArray, running: NDArray) -> Tick:
-        m = self._now
+        m, (stiffness, drive) = self._now, np.moveaxis(self._simulation.control, -1, 0)
         return Tick(
             measurement=m,
             phase=phase,
-            stiffness=self._stiffness.copy(),
-            equilibrium=self._drive / self._stiffness,
+            stiffness=stiffness.copy(),
+            equilibrium=drive / stiffness,
             passive_torque=-self._passive_damping * m.velocity,
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),
@@ -312,10 +304,12 @@ def _start_curves(walk: Walk) -> NDArray:
 
 
 @kernel
-def _clip(action):
+def _clip(running, last_action, action):
     """Clip to [-1, 1] in place; False, and nothing is sure, where one is not a finite number."""
     for i in range(action.shape[0]):
         for k in range(action.shape[1]):
+            if not running[i]:
+                action[i, k] = last_action[i, k]
             if not isfinite(action[i, k]):
                 return False
             action[i, k] = min(max(action[i, k], -1.0), 1.0)
@@ -323,23 +317,26 @@ def _clip(action):
 
 
 @kernel
-def _average(windows, running, force):
-    for i in range(len(force)):
+def _end(limit, running, terms, windows, steps, force, reward, terminated, truncated):
+    falls = 0
+    for i in range(len(running)):
+        terminated[i] = running[i] and terms[i, ALIVE] == 0.0
+        falls += terminated[i]
+        truncated[i] = running[i] and not terminated[i] and steps[i] + 1 >= limit
         if running[i]:
-            for side in range(2):
-                for contact in range(3):
-                    for axis in range(2):
-                        total = 0.0
-                        for window in range(len(windows)):
-                            total += windows[window, i, side, contact, axis]
-                        force[i, side, contact, axis] = total / len(windows)
+            steps[i] += 1
+            _average(windows[:, i], force[i])
+        else:
+            reward[i] = 0.0
+    return falls
 
 
 @kernel
-def _end(limit, running, alive, steps, reward, terminated, truncated):
-    for i in range(len(running)):
-        terminated[i] = running[i] and alive[i] == 0.0
-        steps[i] += running[i]
-        truncated[i] = running[i] and not terminated[i] and steps[i] >= limit
-        if not running[i]:
-            reward[i] = 0.0
+def _average(windows, force):
+    for side in range(2):
+        for contact in range(3):
+            for axis in range(2):
+                total = 0.0
+                for window in range(len(windows)):
+                    total += windows[window, side, contact, axis]
+                force[side, contact, axis] = total / len(windows)

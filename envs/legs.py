@@ -73,14 +73,13 @@ class Legs:
         with the one that lands."""
         _advance(self._gains, self._walkers.speed, m.com_velocity, m.force, running, self.phase)
 
-    def command(self, m: Measurement, stiffness: NDArray, drive: NDArray) -> None:
+    def command(self, m: Measurement, control: NDArray) -> None:
         """Put hip and knee stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] into their places in
-        two arrays (N, side, joint)."""
+        `control` (N, side, joint, 2)."""
         walkers = self._walkers
         curves = self._table.at(self.phase, walkers.place)
-        _command(
-            self._gains, walkers.speed, walkers.scale, curves, m.root, m.root_velocity, m.com_velocity, stiffness, drive
-        )
+        state = m.root, m.root_velocity, m.com_velocity
+        _command(self._gains, walkers.speed, walkers.scale, curves, *state, control)
 
 
 GAINS = np.dtype(
@@ -156,7 +155,7 @@ def _load(force):
 
 
 @kernel
-def _command(gains, speed, scale, curves, root, root_velocity, com_velocity, stiffness, drive):
+def _command(gains, speed, scale, curves, root, root_velocity, com_velocity, control):
     for i in range(len(gains)):
         gain = gains[i]
         too_fast = com_velocity[i, 0] - speed[i]
@@ -166,9 +165,9 @@ def _command(gains, speed, scale, curves, root, root_velocity, com_velocity, sti
         placement = gain.swing_gain * too_fast  # a faster body puts its foot further ahead
         for side in range(2):
             stance, hip, knee = curves[i, side, 0], torque * curves[i, side, 1], torque * curves[i, side, 2]
-            stiffness[i, side, HIP], stiffness[i, side, KNEE] = hip, knee
-            drive[i, side, HIP] = torque * curves[i, side, 3] + (stance * on_trunk + (1.0 - stance) * hip * placement)
-            drive[i, side, KNEE] = torque * curves[i, side, 4]
+            own = stance * on_trunk + (1.0 - stance) * hip * placement
+            control[i, side, HIP, 0], control[i, side, HIP, 1] = hip, torque * curves[i, side, 3] + own
+            control[i, side, KNEE, 0], control[i, side, KNEE, 1] = knee, torque * curves[i, side, 4]
 
 
 def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .actuation import FootSprings
 from .kernel import kernel
-from .model import ACTIONS, SIDES
+from .model import ACTIONS, ANKLE, SIDES
+from .settings import STEP_SECONDS
+from .simulation import Measurement
 from .task import TERMS
 
 REPORT = np.dtype(
@@ -62,35 +65,39 @@ class Outcome:
         return dict(zip(INFO, self.values.T, strict=True)) | {"termination": self.termination}
 
 
-def report(
-    stiffness: NDArray,
-    torque: NDArray,
-    equilibrium: NDArray,
-    work_stiffness: NDArray,
-    work_equilibrium: NDArray,
-    terms: NDArray,
-    leg_phase: NDArray,
-    time: NDArray,
-    speed: NDArray,
-) -> NDArray:
-    """`Outcome.values` of (N, side, 2) five times, (N, len(TERMS)), (N, side), (N,) and (N,)."""
-    rows = np.empty(len(time), REPORT)
-    per_action = stiffness, torque, equilibrium, work_stiffness, work_equilibrium
-    _report(*per_action, terms, leg_phase, time, speed, rows)
-    return rows.view(float).reshape(len(time), len(INFO))
+def report(springs: FootSprings, m: Measurement, terms: NDArray, leg_phase: NDArray, steps: NDArray) -> NDArray:
+    """`Outcome.values` of a step, with its `terms` (N, len(TERMS)), `leg_phase` (N, side) and `steps` (N,) so far."""
+    values = np.empty((len(terms), len(INFO)))
+    works = springs.work_stiffness, springs.work_equilibrium
+    state = springs.stiffness, m.torque, springs.equilibrium, *works, terms, leg_phase
+    _report(*state, steps, STEP_SECONDS, m.com_velocity, values.view(REPORT))
+    return values
 
 
 @kernel
-def _report(stiffness, torque, equilibrium, work_stiffness, work_equilibrium, terms, leg_phase, time, speed, rows):
+def _report(
+    stiffness,
+    torque,
+    equilibrium,
+    work_stiffness,
+    work_equilibrium,
+    terms,
+    leg_phase,
+    steps,
+    seconds,
+    com_velocity,
+    rows,
+):
     for i in range(len(rows)):
-        row = rows[i]
-        row.time, row.speed = time[i], speed[i]
+        row = rows[i, 0]
+        row.time, row.speed = seconds * steps[i], com_velocity[i, 0]
         for term in range(terms.shape[1]):
             row.reward[term] = terms[i, term]
         for side in range(2):
             row.phase[side] = leg_phase[i, side]
             for joint in range(2):
-                row.stiffness[side, joint], row.torque[side, joint] = stiffness[i, side, joint], torque[i, side, joint]
+                row.stiffness[side, joint] = stiffness[i, side, joint]
+                row.torque[side, joint] = torque[i, side, ANKLE + joint]
                 row.equilibrium[side, joint] = equilibrium[i, side, joint]
                 row.work_stiffness[side, joint] = work_stiffness[i, side, joint]
                 row.work_equilibrium[side, joint] = work_equilibrium[i, side, joint]

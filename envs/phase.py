@@ -35,14 +35,15 @@ class PhaseTable:
 
     def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
         """Curves at `phase` in [0, 1) of any shape, (N, ...) with the (N,) `PLACE` of each: (..., C)."""
-        phase = np.asarray(phase, float)
+        phase = np.asarray(phase, float, order="C")
         curves = np.empty((*phase.shape, self._table.shape[-1]))
-        _read(self._table, place, phase.reshape(-1), curves.reshape(-1, curves.shape[-1]))
+        _read(self._table, place, phase, curves)
         return curves
 
 
 @kernel
-def _read(table, place, phase, curves):
+def _read(table, place, phases, all_curves):
+    phase, curves = phases.reshape(-1), all_curves.reshape(-1, table.shape[-1])
     each = max(len(phase) // len(place), 1)
     for i in range(len(phase)):
         spot = phase[i] * SAMPLES

@@ -1,6 +1,6 @@
 """N bodies walking side by side on `mujoco.batch.Batch`: the only owner of MuJoCo data and the only reader of sensors.
 
-One call of `advance` is one control window of 10 ms: it holds the controls, runs the physics steps and returns a
+One call of `advance` is one control window of 10 ms: it holds `control`, runs the physics steps and returns a
 `Measurement`. Kinematics are computed here from joint positions at the window's end (MuJoCo's derived fields lag one
 physics step); contact forces are the mean over the window's physics steps, so that no heel strike is missed.
 """
@@ -91,14 +91,15 @@ class Simulation:
         self._batch = Batch(self.model, num, threads)
         self._qpos = self._batch.bind("qpos")
         self._qvel = self._batch.bind("qvel")
-        self._ctrl = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
+        self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
+        """(N, side, joint, 2) K [N m/rad] and K theta_eq plus any feed-forward torque [N m]; changed in place."""
         self._time = self._batch.bind("time").reshape(num)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
         self._warnings = self._batch.warning[:, :, 1]
         self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
         self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._segments = np.repeat(_segments(body), num)
-        self._no_control = np.zeros_like(self._ctrl)
+        self._no_control = np.zeros_like(self.control)
 
     def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
         """Simulate `bodies` (K,) in `ids` (K,) from their next reset on; compiling a model takes about 1.5 ms."""
@@ -119,18 +120,11 @@ class Simulation:
         """Hold a horizontal force [N], (N,), on the trunk's CoM until told otherwise."""
         self._push[:, 0] = force
 
-    def advance(self, stiffness: NDArray, drive: NDArray, ids: NDArray | None = None) -> Measurement:
-        """Run one control window.
+    def advance(self, ids: NDArray | None = None) -> Measurement:
+        """Run one control window with `control` held; the measurement of all N at its end.
 
-        Args:
-            stiffness: (N, side, joint) K [N m/rad], held.
-            drive: (N, side, joint) K theta_eq plus any feed-forward torque [N m], held.
-            ids: which simulations run; the others stay as they are, and their forces read 0. None: all.
-
-        Returns:
-            The measurement at the window's end, of all N.
+        Only simulations `ids` run, all by default; the others stay as they are, and their forces read 0.
         """
-        self._ctrl[..., 0], self._ctrl[..., 1] = stiffness, drive
         if ids is None:
             self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)
         else:
@@ -139,7 +133,7 @@ class Simulation:
                 self._record["sensordata"][ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)[
                     "sensordata"
                 ]
-        return self._measure(self._ctrl)
+        return self._measure(self.control)
 
     def measure(self) -> Measurement:
         """The state as it stands, with no torque and no force: what is known right after a reset."""

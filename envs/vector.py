@@ -97,23 +97,17 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Hold the stiffnesses that `actions` (N, 4) stand for during 20 ms."""
         self._check_running()
-        if np.shape(actions) != self.action_space.shape:
-            raise SpringfootError(f"actions must have shape {self.action_space.shape}, got {np.shape(actions)}")
-        resetting = self._over
-        if resetting.any():
-            outcome = self.biped.step(np.where(resetting[:, None], 0.0, actions), active=~resetting)
-        else:
-            outcome = self.biped.step(actions)
+        resetting, same_step = self._over, self.autoreset_mode is AutoresetMode.SAME_STEP
+        outcome = self.biped.step(actions, active=~resetting)
         ended = outcome.terminated | outcome.truncated
-        observation, infos = outcome.observation, {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+        if same_step:
             resetting = ended
-            if ended.any():
-                infos = _final(outcome, ended)
         else:
             self._over = ended
-        infos = _masked(outcome, ~resetting) | infos
-        if resetting.any():
+        observation, infos = outcome.observation, _masked(outcome, ~resetting)
+        if np.count_nonzero(resetting):
+            if same_step:
+                infos |= _final(outcome, ended)
             self._restart(np.flatnonzero(resetting))
             observation = self.biped.observe()
         if self.render_mode == "human":
@@ -172,7 +166,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         return mask
 
 
-_MASKS = tuple(f"_{name}" for name in INFO)
+_INFOS = (*INFO, "termination", *(f"_{name}" for name in INFO), "_termination")
 
 
 def _masked(outcome: Outcome, mask: NDArray) -> dict[str, Any]:
@@ -180,14 +174,12 @@ def _masked(outcome: Outcome, mask: NDArray) -> dict[str, Any]:
     chosen = np.count_nonzero(mask)
     if not chosen:
         return {}
-    values = outcome.values.T if chosen == len(mask) else np.where(mask, outcome.values.T, 0.0)
-    masks = np.empty((len(INFO), len(mask)), bool)
-    masks[:] = mask
-    infos: dict[str, Any] = dict(zip(INFO, values, strict=True)) | dict(zip(_MASKS, masks, strict=True))
-    infos["termination"], infos["_termination"] = outcome.termination.astype(object), mask
+    values, reasons = outcome.values.T, outcome.termination.copy()
     if chosen < len(mask):
-        infos["termination"][~mask] = None
-    return infos
+        values, reasons = np.where(mask, values, 0.0), np.where(mask, reasons, None)
+    masks = np.empty((len(INFO) + 1, len(mask)), bool)
+    masks[:] = mask
+    return dict(zip(_INFOS, (*values, reasons, *masks), strict=True))
 
 
 def _final(outcome: Outcome, ended: NDArray) -> dict[str, Any]:

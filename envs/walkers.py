@@ -86,10 +86,11 @@ class Walkers:
         self._target[ids] = speed
         self._changing = True
 
-    def advance(self, time: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
-        """Let a step pass for those `running` (N,), at `time` (N,) [s]; whether any commanded speed changed."""
+    def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
+        """Let a step pass for those `running` (N,), after `steps` (N,); whether any commanded speed changed."""
         settings = self._settings
         if settings.speed_interval is not None:
+            time = steps * STEP_SECONDS
             for index in np.flatnonzero(running & (time >= self._change)).tolist():
                 random = randoms[index]
                 if random is not None and settings.speed_range is not None:
