@@ -211,12 +211,15 @@ class Biped:
         for window in range(WINDOWS):
             self._window(running, ids)
             self._windows[window] = self._now.force
-        terms = self._task.terms(self._now, phase, action, self._last_action, springs.stiffness, self._windows)
+        curves = self._task.at(phase)
+        terms = self._task.terms(
+            self._now, phase, action, self._last_action, springs.stiffness, self._windows, curves
+        )
         reward = self._task.reward(terms)
         terminated, truncated, termination = self._end(running, terms, reward)
         self._last_action = action
         return Outcome(
-            observation=self.observe(),
+            observation=self._task.observe(self._now, phase, action, self._force, curves),
             reward=reward,
             terminated=terminated,
             truncated=truncated,

@@ -108,13 +108,20 @@ class Task:
         for index in ids:
             self._scales[index] = _scales(self._walkers.bodies[index])[0]
 
-    def observe(self, m: "Measurement", leg_phase: NDArray, last_action: NDArray, force: NDArray) -> NDArray:
+    def observe(
+        self,
+        m: "Measurement",
+        leg_phase: NDArray,
+        last_action: NDArray,
+        force: NDArray,
+        curves: NDArray | None = None,
+    ) -> NDArray:
         """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
 
         `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean
-        over the step. What is not a number reads as the upper bound.
+        over the step; `curves` are `at(leg_phase)`, where known. What is not a number reads as the upper bound.
         """
-        curves = self._at(leg_phase)
+        curves = self.at(leg_phase) if curves is None else curves
         error, planned_ankle = self._error(m, leg_phase, curves), curves["pose"][..., ANKLE]
         return self._observer.observe(m, leg_phase, error, planned_ankle, last_action, force)
 
@@ -124,7 +131,7 @@ class Task:
 
     def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
         """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3)."""
-        return self._error(m, leg_phase, self._at(leg_phase))
+        return self._error(m, leg_phase, self.at(leg_phase))
 
     def terms(
         self,
@@ -134,6 +141,7 @@ class Task:
         last_action: NDArray,
         stiffness: NDArray,
         force_windows: NDArray,
+        curves: NDArray | None = None,
     ) -> NDArray:
         """The reward's terms, unweighted and dimensionless, (N, len(TERMS)) in the order of `TERMS`.
 
@@ -146,11 +154,11 @@ class Task:
         [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
 
         `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
-        (W, N, 2, 3, 2) on the body [N] in the W control windows of the step.
+        (W, N, 2, 3, 2) on the body [N] in the W control windows of the step; `curves` as in `observe`.
         """
         terms = np.empty((len(leg_phase), len(TERMS)))
         state = m.root, m.angle, m.com, m.com_velocity, m.ankle, m.diverged
-        curves = self._at(leg_phase)
+        curves = self.at(leg_phase) if curves is None else curves
         _judge(
             self._scales,
             self._walkers.scale,
@@ -181,7 +189,7 @@ class Task:
         _track(self._walkers.scale, curves, m.com, m.com_velocity, m.ankle, leg_phase, error)
         return error
 
-    def _at(self, leg_phase: NDArray) -> NDArray:
+    def at(self, leg_phase: NDArray) -> NDArray:
         """(N, side) of `CURVES`."""
         return self._curves.at(leg_phase, self._walkers.place).view(CURVES)[..., 0]
 

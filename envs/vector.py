@@ -18,6 +18,8 @@ from .outcome import INFO, Outcome
 from .rendering import Camera
 from .settings import STEP_SECONDS, BipedSettings, settings_from
 
+_NAMES = (*INFO, "termination")
+
 
 class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
     """N of `SegmentedFootBiped` in one batched simulation: same settings, spaces, rewards and bits.
@@ -62,6 +64,9 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
         self._started = False
+        everyone = np.ones(num_envs, bool)
+        everyone.flags.writeable = False  # it is handed out at every step at which nobody resets
+        self._all_true: dict[str, Any] = dict.fromkeys((*_NAMES, *(f"_{name}" for name in _NAMES)), everyone)
 
     @property
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -104,12 +109,14 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
             resetting = ended
         else:
             self._over = ended
-        observation, infos = outcome.observation, _masked(outcome, ~resetting)
         if np.count_nonzero(resetting):
-            if same_step:
-                infos |= _final(outcome, ended)
+            infos = _masked(outcome, ~resetting) | (_final(outcome, ended) if same_step else {})
             self._restart(np.flatnonzero(resetting))
             observation = self.biped.observe()
+        else:
+            infos = self._all_true.copy()
+            infos.update(zip(_NAMES, (*outcome.values.T, outcome.termination.copy()), strict=True))
+            observation = outcome.observation
         if self.render_mode == "human":
             self.render()
         return observation, outcome.reward, outcome.terminated, outcome.truncated, infos
@@ -166,20 +173,12 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         return mask
 
 
-_INFOS = (*INFO, "termination", *(f"_{name}" for name in INFO), "_termination")
-
-
 def _masked(outcome: Outcome, mask: NDArray) -> dict[str, Any]:
     """Gymnasium's form of a vector's info: fresh arrays, each with `_name`, the mask of whom it is about."""
-    chosen = np.count_nonzero(mask)
-    if not chosen:
+    if not np.count_nonzero(mask):
         return {}
-    values, reasons = outcome.values.T, outcome.termination.copy()
-    if chosen < len(mask):
-        values, reasons = np.where(mask, values, 0.0), np.where(mask, reasons, None)
-    masks = np.empty((len(INFO) + 1, len(mask)), bool)
-    masks[:] = mask
-    return dict(zip(_INFOS, (*values, reasons, *masks), strict=True))
+    values, reasons = np.where(mask, outcome.values.T, 0.0), np.where(mask, outcome.termination, None)
+    return dict(zip(_NAMES, (*values, reasons), strict=True)) | {f"_{name}": mask.copy() for name in _NAMES}
 
 
 def _final(outcome: Outcome, ended: NDArray) -> dict[str, Any]:
