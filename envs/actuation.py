@@ -119,9 +119,7 @@ class FootSprings:
 
 
 @kernel
-def _stiffen(
-    middle, factor, scale, angle, equilibrium, fresh, running, stiffness, work_stiffness, work_equilibrium
-):
+def _stiffen(middle, factor, scale, angle, equilibrium, fresh, running, stiffness, work_stiffness, work_equilibrium):
     for i in range(len(stiffness)):
         for side in range(2):
             for joint in range(2):

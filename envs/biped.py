@@ -199,7 +199,7 @@ class Biped:
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
         """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
         running, ids = self._everyone, None
-        if active is not None and np.count_nonzero(active) < self.num_envs:
+        if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
         action = self._decode(actions, running)
         if self.walkers.advance(self._steps, self._random, running):
@@ -212,9 +212,7 @@ class Biped:
             self._window(running, ids)
             self._windows[window] = self._now.force
         curves = self._task.at(phase)
-        terms = self._task.terms(
-            self._now, phase, action, self._last_action, springs.stiffness, self._windows, curves
-        )
+        terms = self._task.terms(self._now, phase, action, self._last_action, springs.stiffness, self._windows, curves)
         reward = self._task.reward(terms)
         terminated, truncated, termination = self._end(running, terms, reward)
         self._last_action = action

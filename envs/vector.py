@@ -103,7 +103,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         """Hold the stiffnesses that `actions` (N, 4) stand for during 20 ms."""
         self._check_running()
         resetting, same_step = self._over, self.autoreset_mode is AutoresetMode.SAME_STEP
-        outcome = self.biped.step(actions, active=~resetting)
+        outcome = self.biped.step(actions, active=~resetting if np.count_nonzero(resetting) else None)
         ended = outcome.terminated | outcome.truncated
         if same_step:
             resetting = ended

@@ -41,26 +41,32 @@ def test_a_residual_action_multiplies_the_schedule():
     feet = springs("residual")
     action = np.random.default_rng(1).uniform(-1, 1, (3, 4))
     phase = np.array([[0.1, 0.6], [0.25, 0.75], [0.0, 0.5]])
-    feet.set_stiffness(action, phase, np.zeros((3, 2, 2)))
+    feet.set_stiffness(action, phase, np.zeros((3, 2, 4)))
     expected = np.stack([200 + 100 * phase, np.full((3, 2), 30.0)], -1) * np.exp(action.reshape(3, 2, 2))
     np.testing.assert_allclose(feet.stiffness, expected, rtol=1e-9)
 
 
 def test_the_works_add_up_to_the_change_of_the_springs_energy():
     feet, random = springs(), np.random.default_rng(2)
-    angle = 0.1 * random.normal(size=(3, 2, 2))
+    angle, control = 0.1 * random.normal(size=(3, 2, 4)), np.zeros((3, 2, 4, 2))
     phase = np.array([[0.1, 0.6], [0.2, 0.7], [0.3, 0.8]])
-    assert not feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle).any()  # a new episode costs nothing
-    assert not feet.move_equilibrium(phase, angle).any()
+    feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle)
+    feet.move_equilibrium(phase, angle, control)
+    assert not feet.work_stiffness.any() and not feet.work_equilibrium.any()  # a new episode costs nothing
 
     def energy():
-        return 0.5 * feet.stiffness * (feet.equilibrium - angle) ** 2
+        return 0.5 * feet.stiffness * (feet.equilibrium - angle[..., 2:]) ** 2
 
     before = energy()
-    work = feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle)
-    work = work + feet.move_equilibrium(phase + 0.05, angle)
+    feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle)
+    for later in (0.05, 0.1):
+        feet.move_equilibrium(phase + later, angle, control)
+    work = feet.work_stiffness + feet.work_equilibrium
     np.testing.assert_allclose(work, energy() - before, atol=1e-12)
     assert np.abs(work).max() > 1e-3
+    np.testing.assert_array_equal(control[..., 2:, 0], feet.stiffness)
+    np.testing.assert_array_equal(control[..., 2:, 1], feet.stiffness * feet.equilibrium)
+    assert not control[..., :2, :].any()  # hips and knees are not theirs
 
 
 def test_phase_tables_are_linear_between_rows_and_each_environment_reads_its_own():

@@ -239,16 +239,16 @@ def test_nothing_jumps_as_the_speed_changes():
     biped = Biped(BipedSettings(**ANYBODY), 1)
     biped.reset(np.arange(1), [0], start=0.3)
     m, walkers = biped.measurement, biped.walkers
-    stiffness, drive = np.zeros((2, 1, 2, 4))
+    control = np.zeros((1, 2, 4, 2))
     rows = []
     for speed in np.linspace(0.8, 1.6, 401):
         walkers.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         biped._legs.follow()
-        biped._springs.move_equilibrium(biped._legs.phase, m.angle[..., 2:])
-        biped._legs.command(m, stiffness, drive)
+        biped._springs.move_equilibrium(biped._legs.phase, m.angle, control)
+        biped._legs.command(m, control)
         equilibrium = 100 * biped._springs.equilibrium
         plan = 100 * biped._task.tracking(m, biped._legs.phase)
-        rows.append(np.concatenate([stiffness.ravel(), drive.ravel(), equilibrium.ravel(), plan.ravel()]))
+        rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
     change = np.abs(np.diff(rows, axis=0))
     assert change.max() < 1.0  # [N m, N m/rad, 0.01 rad, cm, cm/s] for 2 mm/s
     assert (np.ptp(rows, axis=0) > 0.5).sum() >= 8
