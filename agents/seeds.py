@@ -171,11 +171,11 @@ def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
 def _main() -> int:
     """One seed, in a process of its own: a folder, and a configuration as JSON text."""
     folder, config = sys.argv[1:]
-    _block(False)
     return exit_code("train.py", lambda: _train(config_from_json(json.loads(config)), folder))
 
 
 def _train(config: TrainingConfig, folder: str) -> int:
+    _block(False)  # a signal that waited strikes here, where `exit_code` catches it
     return 130 if train(config, folder)["status"] == "interrupted" else 0
 
 

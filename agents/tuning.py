@@ -1,6 +1,7 @@
 """Finds the leg constants of `envs/legs.json`: CMA-ES on simulated walks, all candidates in one batch.
 
     python -m springfoot.agents.tuning --equilibrium planned --cadence people
+    python -m springfoot.agents.tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
 
 Every candidate walks from random starts with the fixed schedule, with and without pushes of 150 N, and with two
 constant stiffnesses. It pays for falls, and on its unpushed scheduled walks for the distance from people in speed,
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from springfoot.envs.actuation import action_of
 from springfoot.envs.biped import Biped, Tick
-from springfoot.envs.constants import LegConstants, constants_from, constants_name
+from springfoot.envs.constants import TUNED_SPEED, LegConstants, constants_from, constants_name
 from springfoot.envs.equilibrium import foot_curves
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
 from springfoot.envs.settings import BipedSettings
@@ -72,6 +73,8 @@ class TuningFlags:
     """Which equilibrium the constants are for; angle and phase walk on those of planned."""
     cadence: Cadence = "people"
     """Which cadence they are for."""
+    speed: float = TUNED_SPEED
+    """Which speed they are for [m/s]."""
     start: str = ""
     """Name of the constants to start from; empty: those to be replaced."""
     generations: int = 150
@@ -234,12 +237,14 @@ def tune(flags: TuningFlags) -> None:
     for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0), ("ease", 0)):
         require_count(count, getattr(flags, count), least)
     require_number("sigma", flags.sigma, 0, above=True)
-    name = constants_name(flags.equilibrium, flags.cadence)
+    name = constants_name(flags.equilibrium, flags.cadence, flags.speed)
     constants = _read(flags.out)["constants"]
     if (start := flags.start or name) not in constants:
         raise SpringfootError(f"no constants {start!r} to start from in {flags.out}; --start: {', '.join(constants)}")
     search = Search(constants_from(constants[start]))
-    settings = BipedSettings(equilibrium=flags.equilibrium, cadence=flags.cadence, episode_seconds=SECONDS + 1)
+    settings = BipedSettings(
+        equilibrium=flags.equilibrium, cadence=flags.cadence, speed=flags.speed, episode_seconds=SECONDS + 1
+    )
     options = {"popsize": flags.population, "seed": flags.seed + 1, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), flags.sigma, options)
     for generation in range(flags.generations):

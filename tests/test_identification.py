@@ -116,8 +116,8 @@ def test_noise_on_the_angle_makes_the_spring_too_soft_as_errors_in_variables_do(
         for sd in np.deg2rad([0.25, 0.5, 1.0])
     ]
     assert np.all(np.diff(table, axis=0) < 0) and np.all(np.array(table) < 0)
-    # At 0.5 degrees K is 2 to 32 % too small, most in mid-stance, where the angle moves least by itself.
-    assert -40 < min(table[1]) < -25 and max(table[1]) > -3
+    # At 0.5 degrees K is 2 to 24 % too small, most in mid-stance, where the angle moves least by itself.
+    assert -30 < min(table[1]) < -18 and max(table[1]) > -3
     assert np.argmin(table[1]) == np.argmin([spring.angle_spread for spring in springs])
 
     torque, angle, velocity, where = spring_data(count=2000)
