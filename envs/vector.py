@@ -177,7 +177,8 @@ def _masked(outcome: Outcome, mask: NDArray) -> dict[str, Any]:
     """Gymnasium's form of a vector's info: fresh arrays, each with `_name`, the mask of whom it is about."""
     if not np.count_nonzero(mask):
         return {}
-    values, reasons = np.where(mask, outcome.values.T, 0.0), np.where(mask, outcome.termination, None)
+    values, reasons = np.where(mask, outcome.values.T, 0.0), outcome.termination.copy()
+    reasons[~mask] = None
     return dict(zip(_NAMES, (*values, reasons), strict=True)) | {f"_{name}": mask.copy() for name in _NAMES}
 
 
