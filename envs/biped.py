@@ -14,29 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.human import ANGLES
 
 from .actuation import FootSprings
 from .constants import LegConstants
 from .equilibrium import foot_curves
 from .kernel import kernel
 from .legs import Legs
-from .model import ACTIONS, CONTACTS, HIP, JOINTS, SIDES, passive_damping
+from .model import ACTIONS, CONTACTS, JOINTS, SIDES, passive_damping
 from .outcome import Outcome, report
-from .phase import GRID, PhaseTable, leg_phases
 from .pushes import Pushes
 from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
+from .start import place, random_phase, start_table
 from .task import ALIVE, Task
 from .walkers import Walkers
-from .walks import Walk, rows, walks_of
+from .walks import rows, walks_of
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
 """Control windows in one step."""
-START_PHASES = (0.08, 0.38)
-"""A random start lies in this part of either leg's stance: near double support a planned state falls."""
-START_DEPTH = 0.001
-"""The lowest contact point starts this far in the floor [m at 1.70 m]: about its rest under body weight."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,7 +94,7 @@ class Biped:
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers)
-        self._start = PhaseTable(np.stack([_start_curves(walk) for _, walk in table]))
+        self._start = start_table(table)
         self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
         self._simulation = Simulation(self.body, num_envs, num_threads, model)
@@ -168,7 +163,7 @@ class Biped:
             random = self._random[index]
             if seed is not None or random is None:
                 random = self._random[index] = np.random.default_rng(seed)
-            drawn = (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
+            drawn = random_phase(random)
             phase[row] = drawn if start == "random" else start
             if self.settings.start_noise:
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
@@ -180,7 +175,7 @@ class Biped:
         self._steps[ids] = 0
         self._last_action[ids] = 0.0
         self._force[ids] = 0.0
-        self._place(ids, phase, noise)
+        place(self._simulation, self._start, self.walkers, ids, phase, noise)
         self._now = self._simulation.measure()
 
     def _fit(self, ids: list[int]) -> None:
@@ -275,33 +270,6 @@ class Biped:
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),
         )
-
-    def _place(self, ids: NDArray, left_phase: NDArray, noise: NDArray) -> None:
-        """People's posture at the phase, at the commanded speed, the lowest contact point in the floor."""
-        place, scale = self.walkers.place[ids], self.walkers.scale[ids]
-        curves = self._start.at(leg_phases(left_phase), place)
-        (angle, velocity), pitch = np.split(curves[..., :-1], 2, axis=-1), curves[:, 0, -1]
-        angle = angle * (1.0 + noise[:, 0])
-        velocity = velocity / scale["root"][:, None, None] * (1.0 + noise[:, 1])
-        angle[..., HIP] += pitch[:, None]
-        root, rate = np.zeros((2, len(ids), 3))
-        root[:, 2], rate[:, 0] = pitch, self.walkers.speed[ids]
-        self._simulation.reset(ids, root, rate, angle, velocity)
-        lowest = self._simulation.measure().contact[ids, ..., 1].min(axis=(1, 2))
-        root[:, 1] = -lowest - START_DEPTH * self.body.length_scale * scale["length"]
-        self._simulation.reset(ids, root, rate, angle, velocity)
-
-
-def _start_curves(walk: Walk) -> NDArray:
-    """(SAMPLES, 9) people's joint angles, hip as thigh to the vertical [rad], their rates [rad/s], trunk pitch [rad].
-
-    Variants of the leg constants start alike, as the first.
-    """
-    first = walk.constants[0]
-    period = first.period_factor * walk.plan.stride_time
-    angles = [walk.human.mean(name, GRID) for name in ANGLES]
-    rates = [walk.human.rate(name, GRID) / period for name in ANGLES]
-    return np.stack([*angles, *rates, np.full(len(GRID), np.deg2rad(first.trunk_pitch_deg))], axis=-1)
 
 
 @kernel
