@@ -15,8 +15,9 @@ from springfoot.gait import thesis_schedule
 from springfoot.gait.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
 
 from .command import exit_code
+from .page import table
 from .thesis_figures import PHASE, Walk, as_planned, as_printed, of_people, save_figures
-from .thesis_tables import BODY, SPEED, STRIDE, cart_table, claims, corrected, moments, people_work, springs, table
+from .thesis_tables import BODY, SPEED, STRIDE, cart_table, claims, corrected, moments, people_work, springs
 
 WIDTH = 130
 TIME = np.linspace(0.5, 1.25, 7501)

@@ -1,6 +1,5 @@
 """The sections of docs/thesis.md that are tables; each a function that gives its markdown, every number computed."""
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -19,6 +18,7 @@ from springfoot.gait.scores import correlation, force_features, positive_work
 from springfoot.gait.stiffness import ankle_quasi_stiffness, schedule_from_curves
 from springfoot.gait.thesis import ThesisWalk
 
+from .page import table
 from .thesis_figures import of_people
 
 BODY, SPEED = Body(), 1.2
@@ -37,11 +37,6 @@ PERCENT = np.arange(101) / 100
 def corrected() -> WalkPlan:
     """The plan with the thesis's step: 0.6 m, 0.5 s, T_d = 0.06 s."""
     return plan_walk(BODY, SPEED, "thesis")
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A markdown table."""
-    return "\n".join("| " + " | ".join(line) + " |" for line in (head, ("---",) * len(head), *rows))
 
 
 def claims() -> str:

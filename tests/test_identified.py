@@ -1,0 +1,104 @@
+"""Any stiffness with its rebuilt equilibrium gives the gait's torque, and walks."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from springfoot.agents import identified
+from springfoot.agents.identified import SEGMENTS, STARTS, mean_springs, rebuilt, spring_work, stiffness_named
+from springfoot.agents.recording import prepare, record
+from springfoot.envs.actuation import FEET
+from springfoot.envs.biped import Biped
+from springfoot.envs.model import damping_times
+from springfoot.gait import SpringfootError
+
+
+@pytest.fixture(scope="module")
+def walked():
+    policy, settings = prepare("schedule", {"episode_seconds": 8.0})
+    return record(policy, settings, name="schedule", episodes=4)
+
+
+def test_the_gaits_own_stiffness_has_the_equilibrium_it_walked_with(walked):
+    springs = mean_springs(walked)
+    rest = rebuilt(springs, springs.stiffness).at(STARTS)[1]
+    phase = walked.series["phase"][:, 300:]
+    for column in range(2):
+        order = np.argsort(phase.ravel())
+        known = np.interp(
+            STARTS + 0.5 / SEGMENTS,
+            phase.ravel()[order],
+            walked.series["equilibrium"][:, 300:, :, column].ravel()[order],
+        )
+        stance = (STARTS > 0.05) & (STARTS < 0.6)  # around heel strike phase leaps
+        assert rest[stance, column] == pytest.approx(known[stance], abs=0.02)
+
+
+@pytest.mark.parametrize("name", identified.STIFFNESSES)
+def test_every_stiffness_gives_the_same_torque_on_the_gaits_course(walked, name):
+    springs = mean_springs(walked)
+    schedule = rebuilt(springs, stiffness_named(name, springs))
+    stiffness, rest = schedule.at(STARTS)
+    beta = np.array(damping_times(springs.body))[FEET]
+    torque = stiffness * (rest - springs.angle - beta * springs.velocity)
+    assert torque == pytest.approx(springs.torque, abs=1e-9)
+    assert np.ptp(stiffness[:, 0]) == 0 if name.startswith("flat") else np.ptp(stiffness[:, 0]) > 50
+
+
+def test_work_of_the_springs_is_that_of_the_environments_info(walked):
+    policy, settings = prepare("schedule", {"episode_seconds": 1.0})
+    seconds = record(policy, settings, name="schedule", episodes=2, seed=5)
+    biped = Biped(settings, 2)
+    biped.reset(np.arange(2), [5, 6])
+    observation, sums = biped.observe(), {name: np.zeros(2) for name in ("stiffness", "equilibrium")}
+    for _ in range(50):
+        outcome = biped.step(policy(observation))
+        observation = outcome.observation
+        for name in sums:
+            sums[name] += outcome.info[f"work/{name}/ankle_left"]
+    for name, joules in spring_work(seconds).items():
+        assert np.nansum(joules[:, :, 0, 0], axis=1) == pytest.approx(sums[name], rel=1e-3, abs=1e-3)
+        assert np.abs(sums[name]).min() > 0.1
+
+
+def test_a_flat_stiffness_walks_the_same_gait_without_work_of_its_own(walked):
+    rows, schedules = identified.any_stiffness("schedule", {"episode_seconds": 8.0}, ["flat:250"], episodes=4)
+    own, flat = rows
+    assert schedules["flat:250"].ankle[0].stiffness == 250.0
+    assert flat.work["stiffness"] == 0.0 and own.work["stiffness"] != 0.0
+    ours, theirs = (row.metrics["undisturbed"] for row in rows)
+    assert (ours["falls"], theirs["falls"]) == (0, 0)
+    assert theirs["joints"]["ankle"]["rmse_deg"] == pytest.approx(ours["joints"]["ankle"]["rmse_deg"], abs=0.5)
+    assert theirs["speed_m_s"]["mean"] == pytest.approx(ours["speed_m_s"]["mean"], abs=0.06)
+
+
+def test_the_command_writes_table_and_schedules(monkeypatch, capsys, tmp_path):
+    words = ["schedule", "--stiffness", "times:0.9", "--episodes", "1", "--seconds", "5", "--threads", "1"]
+    page = tmp_path / "results.md"
+    page.write_text("# Results\n\n<!-- ANY-K BEGIN -->\nold\n<!-- ANY-K END -->\n\nMore.\n")
+    words += ["--page", str(page), "--schedules", str(tmp_path / "springs")]
+    monkeypatch.setattr(sys, "argv", ["identified", *words])
+    assert identified.main() == 0
+    assert "| `times:0.9` | 0 of 1 |" in capsys.readouterr().out
+    text = page.read_text()
+    assert text.startswith("# Results\n\n<!-- ANY-K BEGIN -->\n| K |") and text.endswith("END -->\n\nMore.\n")
+    assert "old" not in text
+    _, settings = prepare(
+        "schedule",
+        {"equilibrium": "phase", "schedule": json.loads((tmp_path / "springs/times-0.9.json").read_text())},
+    )
+    assert settings.schedule is not None and len(settings.schedule["ankle"]) == SEGMENTS
+
+
+@pytest.mark.parametrize("name", ["flat", "flat:0", "times:-1", "flat:inf", "times:x", "forwards"])
+def test_unknown_stiffnesses_are_refused_with_one_line(walked, name):
+    with pytest.raises(SpringfootError, match="stiffness must be one of recorded"):
+        stiffness_named(name, mean_springs(walked))
+
+
+def test_a_policy_that_falls_at_once_has_no_springs_to_rebuild():
+    policy, settings = prepare("thesis", {"episode_seconds": 2.0})
+    with pytest.raises(SpringfootError, match="thesis walks no strides"):
+        mean_springs(record(policy, settings, name="thesis", episodes=1))
