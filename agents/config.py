@@ -23,7 +23,7 @@ class TrainingConfig:
     """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
 
     timesteps: int = 1_500_000
-    """Environment steps of 20 ms to learn from, rounded up to whole updates."""
+    """Environment steps to learn from, of 20 ms unless `decisions` says otherwise, rounded up to whole updates."""
     seed: int = 0
     """Seed of weights, action noise and environments."""
     num_envs: int = 64
@@ -41,9 +41,9 @@ class TrainingConfig:
     learning_rate_end: float = 0.1
     """Step size at the end as a share of the start, linear in between [0..1]."""
     gamma: float = 0.98
-    """Discount of reward per step (0..1)."""
+    """Discount of reward per 20 ms (0..1)."""
     gae_lambda: float = 0.95
-    """Lambda of the generalised advantage estimate [0..1]."""
+    """Lambda of the generalised advantage estimate, per 20 ms [0..1]."""
     clip_range: float = 0.2
     """Largest relative change of an action's probability that one update rewards."""
     log_std: float = -0.7

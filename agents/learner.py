@@ -13,6 +13,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
+from springfoot.envs.settings import STEP_SECONDS
 from springfoot.gait.errors import SpringfootError
 
 from .bundle import Policy
@@ -34,7 +35,9 @@ class Learner:
     def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
         torch.set_num_threads(1)  # more of them fight with the physics' own (up to 200 times slower)
         self._environment = config.environment
-        self.normalized = VecNormalize(environments, gamma=config.gamma)
+        share = config.environment.step_seconds / STEP_SECONDS
+        gamma, gae_lambda = config.gamma**share, config.gae_lambda**share
+        self.normalized = VecNormalize(environments, gamma=gamma)
         self.rollout_steps = config.update_steps // config.num_envs
         samples = self.rollout_steps * config.num_envs
         with warnings.catch_warnings():  # a last minibatch smaller by a few samples does no harm
@@ -46,8 +49,8 @@ class Learner:
                 n_steps=self.rollout_steps,
                 batch_size=-(-samples // config.minibatches),
                 n_epochs=config.epochs,
-                gamma=config.gamma,
-                gae_lambda=config.gae_lambda,
+                gamma=gamma,
+                gae_lambda=gae_lambda,
                 clip_range=config.clip_range,
                 policy_kwargs={
                     "net_arch": list(config.hidden),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from springfoot.envs.actuation import FEET
-from springfoot.envs.biped import WINDOWS, Biped, Tick
+from springfoot.envs.biped import Biped, Tick
 from springfoot.envs.model import CONTACTS, JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.walkers import DRAWN
@@ -211,7 +211,8 @@ def _walk(
     progress: Callable[[float], object],
 ) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
     """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`."""
-    length = WINDOWS * ceil(round(settings.episode_seconds / Biped.dt, 6))
+    step = settings.step_seconds
+    length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
     reason = np.full(episodes, "", dtype="U64")
     series: dict[str, NDArray] = {}

@@ -197,7 +197,7 @@ class _Run(BaseCallback):
         if self._ended:
             episodes = [info["episode"] for info in self._ended]
             self.logger.record("episode/return", np.mean([episode["r"] for episode in episodes]))
-            self.logger.record("episode/seconds", np.mean([episode["l"] for episode in episodes]) * Biped.dt)
+            self.logger.record("episode/seconds", np.mean([episode["l"] for episode in episodes]) * self._evaluation.dt)
             falls = [not info["TimeLimit.truncated"] for info in self._ended]
             self.logger.record("episode/falls_share", np.mean(falls))
 

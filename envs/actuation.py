@@ -3,14 +3,18 @@
 Axes: (N, side, 2), the last one ankle and toe; an action's four numbers are these rows in the order of `ACTIONS`.
 """
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from springfoot.gait.body import Body
+from springfoot.gait.human import HumanGait
+from springfoot.gait.stiffness import ankle_events, toe_events
 
 from .kernel import kernel
 from .model import ANKLE
-from .phase import PhaseTable
+from .phase import GRID, PhaseTable
 from .settings import BipedSettings
 from .walkers import Walkers
 
@@ -43,6 +47,39 @@ def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDAr
     return 2.0 * np.log(value / low) / np.log(high / low) - 1.0
 
 
+def gait_events(human: HumanGait) -> NDArray:
+    """(4,) stride phases of people's heel strike, foot flat, heel-off and toe-off, from their angle curves."""
+    ankle = ankle_events(GRID, human.mean("ankle", GRID), human.toe_off)
+    toe = toe_events(GRID, human.mean("toe", GRID), human.toe_off)
+    return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], human.toe_off])
+
+
+class Decisions:
+    """Which actions take effect, and when, of N bodies.
+
+    Of `decisions="event"` the leg's phase tells the events: a touchdown starts it anew, so heel strike is the foot's
+    own, and one that bounces or slaps does not decide again; the others lie where people's do.
+    """
+
+    def __init__(self, settings: BipedSettings, human: HumanGait, num: int):
+        self._events = gait_events(human) if settings.decisions == "event" else np.empty(0)
+        self._decided = np.array([settings.stiffness_joints in ("both", joint) for joint in ("ankle", "toe")])
+        self._stage = np.full((num, 2), -1)  # events since heel strike when each leg's stiffness was decided last
+
+    def reset(self, ids: NDArray) -> None:
+        """Of `ids`, the next actions take effect whatever the phase."""
+        self._stage[ids] = -1
+
+    def take(self, action: NDArray, last_action: NDArray, leg_phase: NDArray, running: NDArray) -> bool:
+        """Clip `action` (N, 4) to [-1, 1] in place, and hold `last_action` of legs at no event and bodies not running.
+
+        False, and nothing is sure, where one is not a finite number.
+        """
+        sides = (len(action), 2, 2)
+        actions = last_action.reshape(sides), action.reshape(sides)
+        return _take(running, self._decided, self._events, leg_phase, self._stage, *actions)
+
+
 class FootSprings:
     """The state of N bodies' ankle and toe springs, and the work done on them by changing them.
 
@@ -63,6 +100,7 @@ class FootSprings:
     ):
         num = len(walkers.place)
         self._residual = settings.action_mode == "residual"
+        self._fixed = [joint for joint, name in enumerate(("toe", "ankle")) if settings.stiffness_joints == name]
         middle, self._factor = _log_scale(settings, body)
         self._middle = np.tile(middle, (num, 2, 1))
         self._walkers = walkers
@@ -98,6 +136,9 @@ class FootSprings:
             middle, factor = self._schedule.at(leg_phase, self._walkers.place), np.exp(action)
         else:
             middle, factor = self._middle, self._factor**action
+            if self._fixed:
+                middle = middle.copy()
+                middle[..., self._fixed] = self._schedule.at(leg_phase, self._walkers.place)[..., self._fixed]
         running = self._everyone if running is None else running
         works = self.work_stiffness, self.work_equilibrium
         _stiffen(
@@ -116,6 +157,28 @@ class FootSprings:
         _move(
             equilibrium, angle, self._fresh, running, self.stiffness, self.equilibrium, self.work_equilibrium, control
         )
+
+
+@kernel
+def _take(running, decided, events, phase, stage, last_action, action):
+    for i in range(len(action)):
+        for side in range(2):
+            now = 0
+            for event in events:
+                now += phase[i, side] >= event
+            held = not running[i] or (len(events) > 0 and now == stage[i, side])
+            if running[i]:
+                stage[i, side] = now
+            for joint in range(2):
+                if running[i] and not isfinite(action[i, side, joint]):
+                    return False
+                if held:
+                    action[i, side, joint] = last_action[i, side, joint]
+                elif not decided[joint]:
+                    action[i, side, joint] = 0.0
+                else:
+                    action[i, side, joint] = min(max(action[i, side, joint], -1.0), 1.0)
+    return True
 
 
 @kernel

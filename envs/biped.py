@@ -1,13 +1,12 @@
 """The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
 
-One step is 20 ms: the action sets the stiffness, which holds for two control windows of 10 ms; in each, the springs'
-equilibrium and the hips and knees follow the phase. Row i of everything depends on environment i alone, by the same
-operations for any N, so a batch of N gives the same bits as N batches of one.
+One step is 20 ms, or what `decisions` says: the action sets the stiffness, which holds for its control windows of 10
+ms; in each, the springs' equilibrium and the hips and knees follow the phase. Row i of everything depends on
+environment i alone, by the same operations for any N, so a batch of N gives the same bits as N batches of one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 
 import mujoco
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from springfoot.gait.errors import SpringfootError
 
-from .actuation import FootSprings
+from .actuation import Decisions, FootSprings
 from .constants import LegConstants
 from .equilibrium import foot_curves
 from .kernel import kernel
@@ -31,7 +30,7 @@ from .walkers import Walkers
 from .walks import rows, walks_of
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
-"""Control windows in one step."""
+"""Control windows in one step of the default 20 ms."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,7 +65,6 @@ class Biped:
         model: as for `Simulation`.
     """
 
-    dt = STEP_SECONDS
     tick_dt = WINDOW
     action_names = ACTIONS
 
@@ -82,6 +80,10 @@ class Biped:
     ):
         self.settings = settings
         self.num_envs = num_envs
+        self.dt = settings.step_seconds
+        """Time of one step [s]."""
+        self.windows = round(self.dt / WINDOW)
+        """Control windows in one step."""
         self.on_tick: Callable[[Tick], None] | None = None
         self.walks = walks_of(settings, legs)
         own = next(walk for walk in self.walks if walk.speed == settings.speed)
@@ -94,6 +96,7 @@ class Biped:
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers)
+        self._decisions = Decisions(settings, self.human, num_envs)
         self._start = start_table(table)
         self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
@@ -108,7 +111,7 @@ class Biped:
         self._no_reason.flags.writeable = False
         self._steps = np.zeros(num_envs, int)
         self._last_action = np.zeros((num_envs, len(ACTIONS)))
-        self._windows = np.zeros((WINDOWS, num_envs, len(SIDES), len(CONTACTS), 2))
+        self._windows = np.zeros((self.windows, num_envs, len(SIDES), len(CONTACTS), 2))
         self._force = np.zeros(self._windows.shape[1:])
         self._pushes = Pushes(settings, num_envs)
         self._now = self._simulation.measure()
@@ -172,6 +175,7 @@ class Biped:
         self._fit(self.walkers.reset(ids, randoms, given))
         self._legs.reset(ids, phase)
         self._springs.reset(ids)
+        self._decisions.reset(ids)
         self._steps[ids] = 0
         self._last_action[ids] = 0.0
         self._force[ids] = 0.0
@@ -192,7 +196,7 @@ class Biped:
         return self._task.observe(self._now, self._legs.phase, self._last_action, self._force)
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
-        """Apply actions (N, 4) for 20 ms; environments not in the mask `active` (N,) stand still, reward 0."""
+        """Apply actions (N, 4) for a step; environments not in the mask `active` (N,) stand still, reward 0."""
         running, ids = self._everyone, None
         if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
@@ -203,8 +207,9 @@ class Biped:
         springs.set_stiffness(action, phase, self._now.angle, running)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        for window in range(WINDOWS):
-            self._window(running, ids)
+        rests = phase.copy() if self.settings.equilibrium == "phase" else phase  # a segment's rest goes with its K
+        for window in range(self.windows):
+            self._window(running, ids, rests)
             self._windows[window] = self._now.force
         curves = self._task.at(phase)
         terms = self._task.terms(self._now, phase, action, self._last_action, springs.stiffness, self._windows, curves)
@@ -216,7 +221,7 @@ class Biped:
             reward=reward,
             terminated=terminated,
             truncated=truncated,
-            values=report(springs, self._now, terms, phase, self._steps),
+            values=report(springs, self._now, terms, phase, self._steps, self.dt),
             termination=termination,
         )
 
@@ -226,7 +231,7 @@ class Biped:
         Who did not take it gets no reward.
         """
         terminated, truncated = np.empty(self.num_envs, bool), np.empty(self.num_envs, bool)
-        limit = self.settings.episode_seconds / STEP_SECONDS - 0.5  # times are sums of steps
+        limit = self.settings.episode_seconds / self.dt - 0.5  # times are sums of steps
         state = terms, self._windows, self._steps, self._force, reward
         falls = _end(limit, running, *state, terminated, truncated)
         return terminated, truncated, self._reasons(terminated) if falls else self._no_reason
@@ -240,19 +245,19 @@ class Biped:
         return reasons
 
     def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
-        """Actions clipped to [-1, 1]; who is not `running` keeps the last one."""
+        """The actions that take effect, in [-1, 1]; who is not `running` keeps the last one."""
         action = np.array(actions, float, order="C")
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
-        if not _clip(running, self._last_action, action):
+        if not self._decisions.take(action, self._last_action, self._legs.phase, running):
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         return action
 
-    def _window(self, running: NDArray, ids: NDArray | None) -> None:
-        """One control window."""
+    def _window(self, running: NDArray, ids: NDArray | None, rests: NDArray) -> None:
+        """One control window, the foot's springs resting as at the phases `rests` (N, side)."""
         legs, m, control = self._legs, self._now, self._simulation.control
         phase = None if self.on_tick is None else legs.phase.copy()
-        self._springs.move_equilibrium(legs.phase, m.angle, control, running)
+        self._springs.move_equilibrium(rests, m.angle, control, running)
         legs.command(m, control)
         self._now = self._simulation.advance(ids)
         legs.advance(self._now, running)
@@ -270,19 +275,6 @@ class Biped:
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),
         )
-
-
-@kernel
-def _clip(running, last_action, action):
-    """Clip to [-1, 1] in place; False, and nothing is sure, where one is not a finite number."""
-    for i in range(action.shape[0]):
-        for k in range(action.shape[1]):
-            if not running[i]:
-                action[i, k] = last_action[i, k]
-            if not isfinite(action[i, k]):
-                return False
-            action[i, k] = min(max(action[i, k], -1.0), 1.0)
-    return True
 
 
 @kernel

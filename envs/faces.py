@@ -24,7 +24,8 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     ## Description
     Trunk, thighs, shanks, feet and toes of a person of given height and mass. Hips and knees follow a phase controller
     with human-like curves; ankles and toes are springs, torque = K (equilibrium - angle - beta x angular rate). The
-    policy sets K and nothing else, 50 times a second. The equilibrium follows the plan (see `equilibrium`).
+    policy sets K and nothing else, 50 times a second (see `decisions`). The equilibrium follows the plan (see
+    `equilibrium`).
 
     ## Action space
     `Box(-1, 1, (4,), float32)`, from -1 to 1 on a log scale over the stiffness range (`action_mode="absolute"`) or as
@@ -102,7 +103,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | com_z          | 0.1    | exp(-(e/0.03)^2), e CoM minus plan, up [m]                                      |
     | pose           | 0.6    | exp(-E/0.02), E squared distance [rad^2] from people's joint angles             |
     | grf            | 0.6    | exp(-D/0.15), D body weights by which the feet's forces leave people's range    |
-    | stiffness_rate | -0.05  | squared change of the action                                                    |
+    | stiffness_rate | -0.05  | squared change of the action, per 20 ms                                         |
     | stiffness      | -0.05  | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
 
     ## Starting state
@@ -140,6 +141,8 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `cadence`             | `"people"`     | step length and time of `"people"` or of the `"thesis"`           |
     | `equilibrium`         | `"planned"`    | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                  |
     | `action_mode`         | `"absolute"`   | `"absolute"` or `"residual"`                                      |
+    | `decisions`           | `"50hz"`       | steps of 10, 20, 40 ms (`"100hz"`, `"50hz"`, `"25hz"`), `"event"` |
+    | `stiffness_joints`    | `"both"`       | joints the action decides: `"both"`, `"ankle"` or `"toe"`         |
     | `ankle_stiffness_range`| `(20.0, 800.0)` | ankle stiffness at action -1 and +1 [N m/rad]                     |
     | `toe_stiffness_range` | `(5.0, 200.0)` | toe stiffness at action -1 and +1 [N m/rad]                       |
     | `schedule`            | `None`         | a stiffness schedule in JSON form                                 |
@@ -165,6 +168,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         self.settings = settings_from(**settings)
         self.render_mode = check_render_mode(render_mode)
         self.biped = Biped(self.settings, 1)
+        self.metadata = METADATA | {"render_fps": round(1 / self.biped.dt)}
         self.observation_space, self.action_space = spaces_of(self.biped)
         self._camera: Camera | None = None
         self._over = True
@@ -182,7 +186,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         return self.biped.observe()[0], {}
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
-        """Hold the stiffness that `action` (4,) stands for during 20 ms."""
+        """Hold the stiffness that `action` (4,) stands for during a step, 20 ms by default."""
         if self._over:
             raise SpringfootError("no episode is running: call reset() before step()")
         if np.shape(action) != self.action_space.shape:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from .actuation import FootSprings
 from .kernel import kernel
 from .model import ACTIONS, ANKLE, SIDES
-from .settings import STEP_SECONDS
 from .simulation import Measurement
 from .task import TERMS
 
@@ -65,12 +64,15 @@ class Outcome:
         return dict(zip(INFO, self.values.T, strict=True)) | {"termination": self.termination}
 
 
-def report(springs: FootSprings, m: Measurement, terms: NDArray, leg_phase: NDArray, steps: NDArray) -> NDArray:
-    """`Outcome.values` of a step, with its `terms` (N, len(TERMS)), `leg_phase` (N, side) and `steps` (N,) so far."""
+def report(
+    springs: FootSprings, m: Measurement, terms: NDArray, leg_phase: NDArray, steps: NDArray, seconds: float
+) -> NDArray:
+    """`Outcome.values` of a step of `seconds`, with its `terms` (N, len(TERMS)), `leg_phase` (N, side) and `steps` (N,)
+    so far."""
     values = np.empty((len(terms), len(INFO)))
     works = springs.work_stiffness, springs.work_equilibrium
     state = springs.stiffness, m.torque, springs.equilibrium, *works, terms, leg_phase
-    _report(*state, steps, STEP_SECONDS, m.com_velocity, values.view(REPORT))
+    _report(*state, steps, seconds, m.com_velocity, values.view(REPORT))
     return values
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .settings import STEP_SECONDS, BipedSettings
+from .settings import BipedSettings
 
 
 class Pushes:
@@ -14,6 +14,7 @@ class Pushes:
     def __init__(self, settings: BipedSettings, num: int):
         self._size, self._latest = settings.push_newton, settings.push_interval - settings.push_seconds
         self._interval, self._duration = settings.push_interval, settings.push_seconds
+        self._step = settings.step_seconds
         self._ends = np.zeros(num)
         self._begin = np.zeros(num)
         self._force = np.zeros(num)
@@ -25,7 +26,7 @@ class Pushes:
 
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
         """(N,) push [N] at these step counts; only those running draw their next one."""
-        time = steps * STEP_SECONDS
+        time = steps * self._step
         for index in np.flatnonzero(running & (time >= self._ends)).tolist():
             generator = random[index]
             if generator is not None:

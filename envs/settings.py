@@ -17,9 +17,12 @@ from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 ActionMode = Literal["absolute", "residual"]
+Decisions = Literal["100hz", "50hz", "25hz", "event"]
+StiffnessJoints = Literal["both", "ankle", "toe"]
 
 STEP_SECONDS = 0.02
-"""Time between two actions [s]: stiffness is decided at 50 Hz (design study; a 40 ms lag on K falls)."""
+"""Time between two actions [s] by default: stiffness is decided at 50 Hz (design study; a 40 ms lag on K falls).
+Rewards and the discount of training are told for this time, whatever a step lasts (`BipedSettings.step_seconds`)."""
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
@@ -61,6 +64,11 @@ class BipedSettings:
     angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     action_mode: ActionMode = "absolute"
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
+    decisions: Decisions = "50hz"
+    """When stiffness is decided: in every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
+    strike and at people's foot flat, heel-off and toe-off, the action being held between them (event)."""
+    stiffness_joints: StiffnessJoints = "both"
+    """Joints whose stiffness the action decides; the other has the fixed schedule, and its actions are read as 0."""
     ankle_stiffness_range: tuple[float, float] = (LOWEST_STIFFNESS[0], 800.0)
     """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     toe_stiffness_range: tuple[float, float] = (LOWEST_STIFFNESS[1], 200.0)
@@ -94,6 +102,8 @@ class BipedSettings:
             ("cadence", Cadence),
             ("equilibrium", Equilibrium),
             ("action_mode", ActionMode),
+            ("decisions", Decisions),
+            ("stiffness_joints", StiffnessJoints),
         ):
             _check_choice(name, getattr(self, name), get_args(choices))
         _check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
@@ -101,13 +111,18 @@ class BipedSettings:
         self._check_schedule()
         if self.human is not None:
             OwnGait.from_json(self.human)
-        require_number("episode_seconds", self.episode_seconds, STEP_SECONDS, unit="s")
+        require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
         require_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
         require_number("push_newton", self.push_newton, 0.0, unit="N")
         require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
         require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         _check_weights(self.reward_weights)
+
+    @property
+    def step_seconds(self) -> float:
+        """Time of one step of the environment [s]."""
+        return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * STEP_SECONDS
 
     def _check_draws(self) -> None:
         for name, allowed, unit in (
@@ -126,7 +141,7 @@ class BipedSettings:
                 f"[{BMI_RANGE[0]:g}, {BMI_RANGE[1]:g}] kg/m^2, got {light / tall**2:.3g} to {heavy / short**2:.3g}"
             )
         if self.speed_interval is not None:
-            require_number("speed_interval", self.speed_interval, STEP_SECONDS, unit="s")
+            require_number("speed_interval", self.speed_interval, self.step_seconds, unit="s")
             if self.speed_range is None:
                 raise SpringfootError("speed_interval needs a speed_range to draw from, got None")
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)

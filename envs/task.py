@@ -98,7 +98,8 @@ class Task:
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
 
         self._weights = np.array([self.weights[name] for name in TERMS])
-        curves = {walk: _curves(walk.plan, walk.human) for _, walk in rows}
+        self._share = settings.step_seconds / STEP_SECONDS
+        curves = {walk: _curves(walk.plan, walk.human, settings.step_seconds) for _, walk in rows}
         self._curves = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows]))
         self._scales = np.concatenate([_scales(body) for body in walkers.bodies])
 
@@ -150,7 +151,7 @@ class Task:
         [rad^2] of thigh (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
         beyond 1.2 (fourfold), both components beyond mean +- SD at the leg's phase.
-        Costs >= 0: `stiffness_rate`, squared change of the action; `stiffness`, mean over legs of
+        Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
         [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
 
         `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
@@ -169,14 +170,15 @@ class Task:
             last_action,
             stiffness,
             force_windows,
+            self._share,
             terms,
         )
         return terms
 
     def reward(self, terms: NDArray) -> NDArray:
-        """Weighted sum of the terms, (N,); 0 where `alive` is 0."""
+        """Weighted sum of the terms, (N,), in proportion to the time of a step, 1 for 20 ms; 0 where `alive` is 0."""
         total = np.empty(len(terms))
-        _sum(self._weights, terms, total)
+        _sum(self._weights, self._share, terms, total)
         return total
 
     def fallen(self, m: "Measurement") -> NDArray:
@@ -208,11 +210,11 @@ def _scales(body: Body) -> NDArray:
     return scales
 
 
-def _curves(plan: WalkPlan, human: HumanGait) -> NDArray:
-    """(SAMPLES,) of `CURVES`."""
+def _curves(plan: WalkPlan, human: HumanGait, step_seconds: float) -> NDArray:
+    """(SAMPLES,) of `CURVES`, for steps of `step_seconds`."""
     curves = np.zeros(len(GRID), CURVES)
     curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
-    middle = (GRID - 0.5 * STEP_SECONDS / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
+    middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
     for axis, name in enumerate(("grf_forward", "grf_vertical")):
         curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
     step = (2 * GRID) % 1.0
@@ -256,6 +258,7 @@ def _judge(
     last_action,
     stiffness,
     windows,
+    share,
     terms,
 ):
     for i in range(len(root)):
@@ -275,7 +278,7 @@ def _judge(
                 k = stiffness[i, side, joint] / scale.stiffness_unit[joint]
                 stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
         for k in range(4):
-            stiffness_rate += (action[i, k] - last_action[i, k]) ** 2
+            stiffness_rate += ((action[i, k] - last_action[i, k]) / share) ** 2
         terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
         terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
         terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
@@ -307,9 +310,9 @@ def _force_distance(scale, windows, people):
 
 
 @kernel
-def _sum(weights, terms, total):
+def _sum(weights, share, terms, total):
     for i in range(len(total)):
         total[i] = 0.0
         for term in range(len(weights)):
             total[i] += weights[term] * terms[i, term]
-        total[i] *= terms[i, ALIVE]
+        total[i] *= share * terms[i, ALIVE]

@@ -16,7 +16,7 @@ from .biped import Biped
 from .faces import METADATA, bodies_and_speeds, check_can_render, check_options, check_render_mode, spaces_of
 from .outcome import INFO, Outcome
 from .rendering import Camera
-from .settings import STEP_SECONDS, BipedSettings, settings_from
+from .settings import BipedSettings, settings_from
 
 _NAMES = (*INFO, "termination")
 
@@ -55,8 +55,8 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self.num_envs = num_envs
         self.render_mode = check_render_mode(render_mode)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        self.metadata = METADATA | {"autoreset_mode": self.autoreset_mode}
         self.biped = Biped(self.settings, num_envs, num_threads)
+        self.metadata = METADATA | {"autoreset_mode": self.autoreset_mode, "render_fps": round(1 / self.biped.dt)}
         self.single_observation_space, self.single_action_space = spaces_of(self.biped)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -100,7 +100,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         return self.biped.observe(), {}
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        """Hold the stiffnesses that `actions` (N, 4) stand for during 20 ms."""
+        """Hold the stiffnesses that `actions` (N, 4) stand for during a step, 20 ms by default."""
         self._check_running()
         resetting, same_step = self._over, self.autoreset_mode is AutoresetMode.SAME_STEP
         outcome = self.biped.step(actions, active=~resetting if np.count_nonzero(resetting) else None)
@@ -207,5 +207,5 @@ def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> Bipe
     """Gymnasium puts no TimeLimit around a vector entry point: the limit goes into the settings."""
     if max_episode_steps is None:
         return settings
-    limit = require_count("max_episode_steps", max_episode_steps) * STEP_SECONDS
+    limit = require_count("max_episode_steps", max_episode_steps) * settings.step_seconds
     return replace(settings, episode_seconds=min(settings.episode_seconds, limit))

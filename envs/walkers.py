@@ -15,7 +15,7 @@ from springfoot.gait.errors import SpringfootError
 
 from .kernel import kernel
 from .phase import PLACE
-from .settings import STEP_SECONDS, BipedSettings
+from .settings import BipedSettings
 
 SCALE = np.dtype([("length", float), ("root", float), ("mass", float), ("torque", float)])
 """Ratios of a body to the settings' own: of height, its square root (of times and speeds), of mass, and mass x height
@@ -90,7 +90,7 @@ class Walkers:
         """Let a step pass for those `running` (N,), after `steps` (N,); whether any commanded speed changed."""
         settings = self._settings
         if settings.speed_interval is not None:
-            time = steps * STEP_SECONDS
+            time = steps * settings.step_seconds
             for index in np.flatnonzero(running & (time >= self._change)).tolist():
                 random = randoms[index]
                 if random is not None and settings.speed_range is not None:
@@ -99,7 +99,7 @@ class Walkers:
                     self._changing = True
         if not self._changing:
             return False
-        self._changing = _approach(settings.speed_rate * STEP_SECONDS, running, self._target, self.speed)
+        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self._target, self.speed)
         self._locate(self._everyone)
         return True
 

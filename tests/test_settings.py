@@ -76,6 +76,8 @@ BAD = [
     ({"equilibrium": ["planned"]}, ["equilibrium", "'planned'"]),
     ({"equilibrium": "phase"}, ["phase", "schedule"]),
     ({"action_mode": "relative"}, ["action_mode", "'absolute'", "'residual'"]),
+    ({"decisions": "30hz"}, ["decisions", "'100hz'", "'event'"]),
+    ({"stiffness_joints": "knee"}, ["stiffness_joints", "'ankle'", "'toe'"]),
     ({"ankle_stiffness_range": (800.0, 20.0)}, ["ankle_stiffness_range", "0 < low < high", "(800.0, 20.0)"]),
     ({"toe_stiffness_range": (0.0, 20.0)}, ["toe_stiffness_range", "(0.0, 20.0)"]),
     ({"toe_stiffness_range": 40.0}, ["toe_stiffness_range", "40.0"]),
