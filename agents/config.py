@@ -73,7 +73,21 @@ class TrainingConfig:
             raise SpringfootError(f"hidden must be one or more positive whole numbers, got {self.hidden!r}")
 
 
-PRESETS: dict[str, TrainingConfig] = {"walk": TrainingConfig()}
+PRESETS: dict[str, TrainingConfig] = {
+    "walk": TrainingConfig(),
+    "any-body": TrainingConfig(
+        timesteps=6_000_000,
+        eval_interval=262_144,
+        environment=BipedSettings(
+            height_range=(1.45, 2.0),
+            mass_range=(40.0, 120.0),
+            speed_range=(0.8, 1.6),
+            speed_interval=4.0,
+            episode_seconds=10.0,
+            push_newton=150.0,
+        ),
+    ),
+}
 """Trainings that are known to work, by name."""
 
 

@@ -15,9 +15,10 @@ from springfoot.envs.actuation import action_of
 from springfoot.envs.constants import leg_constants
 from springfoot.envs.equilibrium import fixed_stiffness
 from springfoot.envs.model import ACTIONS
-from springfoot.envs.phase import GRID, PhaseTable, leg_phases
+from springfoot.envs.phase import GRID, PLACE, PhaseTable, leg_phases
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.task import OBSERVATION
+from springfoot.envs.walks import tabulated_speeds
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import StiffnessSchedule, thesis_schedule
@@ -27,7 +28,9 @@ Policy = Callable[[NDArray], NDArray]
 CONSTANT_STIFFNESS = (300.0, 40.0)
 """Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg."""
 
-_SIN, _COS = ([entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos"))
+_SIN, _COS, _SPEED = (
+    [entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos", "command_speed")
+)
 
 
 def leg_phase(observation: NDArray) -> NDArray:
@@ -39,8 +42,9 @@ def leg_phase(observation: NDArray) -> NDArray:
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> Policy:
     """The same ankle and toe stiffness always: (ankle, toe) [N m/rad], for 1.70 m and 63 kg, scaled with the body."""
     body = Body(settings.height, settings.mass)
+    _require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
-    action = np.tile(_absolute(scaled, settings, body), 2)
+    action = np.tile(action_of(scaled, settings, body).astype(np.float32), 2)
     return lambda observation: np.tile(action, (len(observation), 1))
 
 
@@ -56,25 +60,40 @@ def uniform(settings: BipedSettings, seed: int = 0) -> Policy:
 
 
 def schedule(settings: BipedSettings) -> Policy:
-    """A fixed stiffness over the stride: that of `settings.schedule`, or else the one of the leg tuning."""
-    body = Body(settings.height, settings.mass)
+    """A fixed stiffness over the stride: that of `settings.schedule`, or else the one of the leg tuning.
+
+    The latter is that of the commanded speed, whatever it is at present; both scale with the body.
+    """
+    body, speeds = Body(settings.height, settings.mass), tabulated_speeds(settings)
     if settings.schedule is not None:
-        return _follow(StiffnessSchedule.from_json(settings.schedule).at(GRID)[0], settings, body)
-    speed = settings.speed / sqrt(body.length_scale)
-    constants = leg_constants(settings.equilibrium, settings.cadence, speed)
-    return _follow(fixed_stiffness(constants, body), settings, body)
+        stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
+        return _follow(stiffness[None], speeds[:1], settings, body)
+    root = sqrt(body.length_scale)
+    tuned = [leg_constants(settings.equilibrium, settings.cadence, speed / root) for speed in speeds]
+    return _follow(np.stack([fixed_stiffness(constants, body) for constants in tuned]), speeds, settings, body)
 
 
-def _follow(stiffness: NDArray, settings: BipedSettings, body: Body) -> Policy:
-    """The policy that sets (samples, (ankle, toe)) [N m/rad] over the stride at each leg's phase."""
-    actions = PhaseTable(_absolute(stiffness, settings, body)[None])
-    return lambda observation: actions.at(leg_phase(observation)).reshape(len(observation), -1).astype(np.float32)
+def _follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> Policy:
+    """The policy that sets (speeds, samples, (ankle, toe)) [N m/rad] over the stride at each leg's phase.
+
+    It reads phase and Froude speed; between two of `speeds` [m/s] of `body` stiffness is linear.
+    """
+    _require_absolute(settings)
+    table, froude = PhaseTable(stiffness), np.array([body.froude_speed(speed) for speed in speeds])
+
+    def policy(observation: NDArray) -> NDArray:
+        spot = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
+        place = np.zeros(len(spot), PLACE)
+        place["row"], place["weight"] = spot, spot % 1.0
+        action = action_of(table.at(leg_phase(observation), place), settings, body)
+        return action.reshape(len(observation), -1).astype(np.float32)
+
+    return policy
 
 
-def _absolute(stiffness: NDArray, settings: BipedSettings, body: Body) -> NDArray:
+def _require_absolute(settings: BipedSettings) -> None:
     if settings.action_mode != "absolute":
         raise SpringfootError("a stiffness schedule or constant needs action_mode 'absolute', got 'residual'")
-    return action_of(stiffness, settings, body).astype(np.float32)
 
 
 BASELINES = ("untrained", "random", "constant", "schedule", "thesis")

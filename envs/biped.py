@@ -113,7 +113,7 @@ class Biped:
         self._last_action = np.zeros((num_envs, len(ACTIONS)))
         self._windows = np.zeros((self.windows, num_envs, len(SIDES), len(CONTACTS), 2))
         self._force = np.zeros(self._windows.shape[1:])
-        self._pushes = Pushes(settings, num_envs)
+        self._pushes = Pushes(settings, self.walkers)
         self._now = self._simulation.measure()
 
     @property

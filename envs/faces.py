@@ -150,7 +150,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `episode_seconds`     | `20.0`         | time until truncation [s]                                         |
     | `start`               | `"random"`     | stride phase of the left leg at the start, or `"random"`          |
     | `start_noise`         | `0.0`          | relative spread of joint angles and velocities at the start       |
-    | `push_newton`         | `0.0`          | size of each push on the trunk [N]                                |
+    | `push_newton`         | `0.0`          | size of each push on the trunk [N] for 63 kg, scales with mass    |
     | `push_seconds`        | `0.1`          | duration of each push [s]                                         |
     | `push_interval`       | `4.0`          | one push at a random time in each interval [s]                    |
     | `reward_weights`      | `{}`           | weights that differ from the table above                          |

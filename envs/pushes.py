@@ -1,18 +1,23 @@
-"""Pushes on the trunk."""
+"""Pushes on the trunk, as hard on every body: their force goes with its mass, as its weight does."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from springfoot.gait.body import REFERENCE_MASS
+
 from .settings import BipedSettings
+from .walkers import Walkers
 
 
 class Pushes:
     """When each environment is pushed: once at a random time in each interval, forward or backward at random."""
 
-    def __init__(self, settings: BipedSettings, num: int):
-        self._size, self._latest = settings.push_newton, settings.push_interval - settings.push_seconds
+    def __init__(self, settings: BipedSettings, walkers: Walkers):
+        num, self._scale = len(walkers.bodies), walkers.scale
+        self._size = settings.push_newton * (settings.mass / REFERENCE_MASS)
+        self._latest = settings.push_interval - settings.push_seconds
         self._interval, self._duration = settings.push_interval, settings.push_seconds
         self._step = settings.step_seconds
         self._ends = np.zeros(num)
@@ -32,7 +37,7 @@ class Pushes:
             if generator is not None:
                 self._draw(index, generator)
         since = time - self._begin
-        return np.where((since >= 0) & (since < self._duration), self._force, 0.0)
+        return np.where((since >= 0) & (since < self._duration), self._force * self._scale["mass"], 0.0)
 
     def _draw(self, index: int, random: np.random.Generator) -> None:
         self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)

@@ -86,7 +86,7 @@ class BipedSettings:
     start_noise: float = 0.0
     """Relative spread of the joint angles and velocities at the start [0..1]."""
     push_newton: float = 0.0
-    """Size of each push on the trunk, forward or backward at random [N]; 0 for none."""
+    """Size of each push on the trunk, forward or backward at random [N] for 63 kg; scales with mass; 0 for none."""
     push_seconds: float = 0.1
     """Duration of each push [s]."""
     push_interval: float = 4.0

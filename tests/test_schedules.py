@@ -63,6 +63,23 @@ def test_schedule_sets_the_stiffness_of_the_leg_tuning():
     assert stiffness_of(action, biped.settings, Body()) == pytest.approx(biped.scheduled_stiffness(), rel=1e-4)
 
 
+@pytest.mark.parametrize("own", [{}, {"height": 1.9, "mass": 90.0, "speed": 1.07}])
+def test_schedule_follows_the_body_and_the_speed_of_each_environment(own):
+    settings = BipedSettings(
+        height_range=(1.45, 2.0), mass_range=(40.0, 120.0), speed_range=(0.8, 1.6), speed_rate=2.0, **own
+    )
+    biped, follow = Biped(settings, 16), baseline("schedule", settings)
+    biped.reset(np.arange(16), range(16))
+    biped.command(np.arange(16), np.linspace(0.8, 1.6, 16))
+    for _ in range(20):
+        action = follow(biped.observe())
+        wanted = biped.scheduled_stiffness()
+        biped.step(action)
+        set_to = stiffness_of(action.reshape(16, 2, 2), settings, biped.body)
+        set_to *= biped.walkers.scale["torque"][:, None, None]
+        assert set_to == pytest.approx(wanted, rel=1e-4)
+
+
 def test_thesis_brings_its_schedule_and_swings_at_the_lowest_stiffness():
     settings = settings_of("thesis")
     assert settings.equilibrium == "phase" and settings.schedule is not None

@@ -10,8 +10,9 @@ from safetensors.numpy import load, save
 
 from springfoot.agents import training
 from springfoot.agents.bundle import load_policy
-from springfoot.agents.config import TrainingConfig, config_from_json, config_to_json
+from springfoot.agents.config import PRESETS, TrainingConfig, config_from_json, config_to_json
 from springfoot.agents.learner import Learner
+from springfoot.agents.recording import prepare
 from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
 from springfoot.agents.schedules import baseline
 from springfoot.envs.biped import Biped
@@ -56,8 +57,29 @@ def test_a_policy_does_not_read_what_never_varied_in_its_training(run):
     assert np.abs(policy(other) - policy(seen)).max() > 1e-3
 
 
-def test_configuration_survives_json():
-    assert config_from_json(json.loads(json.dumps(config_to_json(SHORT)))) == SHORT
+def test_a_policy_of_any_body_reads_speed_and_height_and_is_evaluated_on_one_body(tmp_path):
+    preset = PRESETS["any-body"]
+    environment = dataclasses.replace(preset.environment, episode_seconds=1.0)
+    config = dataclasses.replace(SHORT, timesteps=1_024, environment=environment)
+    record = training.train(config, tmp_path / "run")
+    assert [entry["episodes"] for entry in record["evaluations"]] == [2, 2]
+    policy, settings = prepare(str(tmp_path / "run"), {"height": 1.85, "mass": 95.0, "speed": 1.4})
+    assert (settings.height, settings.mass, settings.speed) == (1.85, 95.0, 1.4)
+    assert settings.height_range is settings.mass_range is settings.speed_range is settings.speed_interval is None
+    assert load_policy(tmp_path / "run").settings == environment
+    biped = Biped(settings, 1)
+    biped.reset(np.arange(1), [0])
+    seen = biped.observe()
+    assert np.isfinite(biped.step(policy(seen)).reward).all()
+    for name in ("command_speed", "height_ratio"):
+        other = seen.copy()
+        other[:, biped.observation_names.index(name)] += 0.1
+        assert np.abs(policy(other) - policy(seen)).max() > 1e-4, name
+
+
+@pytest.mark.parametrize("config", [SHORT, *PRESETS.values()])
+def test_configuration_survives_json(config):
+    assert config_from_json(json.loads(json.dumps(config_to_json(config)))) == config
 
 
 @pytest.mark.parametrize(

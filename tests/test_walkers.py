@@ -111,6 +111,19 @@ def test_at_froude_equal_speed_another_body_does_the_same(height, mass):
     np.testing.assert_allclose(*np.mean(force, 0), rtol=0.03)
 
 
+@pytest.mark.parametrize("own", [63.0, 90.0])
+def test_a_push_is_as_hard_on_every_body(own):
+    """150 N for 63 kg, in proportion to the mass: the same acceleration, whoever the settings' own body is."""
+    biped = Biped(BipedSettings(mass=own, mass_range=(40.0, 120.0), push_newton=150.0, push_interval=0.5), 3)
+    trunk, forces = biped.model.body("trunk").id, []
+    biped.on_tick = lambda tick: forces.append([biped.data(i).xfrc_applied[trunk, 0] for i in range(3)])
+    mass = np.array([40.0, 63.0, 120.0])
+    biped.reset(np.arange(3), [0, 1, 2], given=given(mass=mass))
+    for _ in range(25):
+        biped.step(scheduled(biped))
+    np.testing.assert_allclose(np.abs(forces).max(axis=0), 150.0 * mass / 63.0, rtol=1e-12)
+
+
 # The same bits --------------------------------------------------------------------------------------------------
 
 
