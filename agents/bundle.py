@@ -110,8 +110,7 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
     numbers: list[Any] = []
     for legs, walk in rows(biped.walks):
-        course = (walk.body, walk.human, walk.plan.stride_time)
-        curves = (leg_curves(legs, *course), *foot_curves(biped.settings, legs, *course))
+        curves = (leg_curves(legs, walk), *foot_curves(biped.settings, legs, walk))
         numbers += [*asdict(legs).values(), *(curve[::50] for curve in curves)]
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.envs.model import ANKLE, CONTACTS, HIP, KNEE, SIDES, TOE
+from springfoot.envs.model import ANKLE, CONTACTS, HIP, KNEE, SIDES, TOE, contact_material
 from springfoot.envs.settings import reference_gait, settings_to_json
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score
@@ -172,6 +172,7 @@ def _add_episode(gait: Gait, tally: _Tally, series: dict[str, NDArray], body: Bo
         find_contacts(vertical[:, side], TICK, CONTACT_THRESHOLD_BW * weight, first=TICK / 2)
         for side in range(len(SIDES))
     ]
+    material = contact_material(body, series["contact"], series["root"], series["angle"])
     for side, foot in enumerate(contacts):
         strides = foot.strides(after=WARM_UP)
         heel_strike, toe_off, end = strides.T
@@ -189,10 +190,11 @@ def _add_episode(gait: Gait, tally: _Tally, series: dict[str, NDArray], body: Bo
         work = score.stride_work(curves[..., CURVES.index("ankle_power_W_per_kg")], end - heel_strike)
         tally.ankle_positive += list(work[0])
         tally.ankle_negative += list(work[1])
-        contact, loaded = series["contact"][:, side], series["force"][:, side, :, 1] > CONTACT_THRESHOLD_BW * weight
+        contact, load = series["contact"][:, side], series["force"][:, side, :, 1]
         for start, leave, stop in np.floor(strides / TICK).astype(int):
             tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
-            tally.travel.append(score.travel(contact[start : leave + 1, :, 0], loaded[start : leave + 1]))
+            stance = slice(start, leave + 1)
+            tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
             first, last = (round(leave + share * (stop - leave)) for share in MID_SWING)
             tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
     _add_steps(gait, tally, series, contacts)

@@ -92,7 +92,7 @@ class Biped:
         speeds = np.array([walk.speed for walk in self.walks])
         self.walkers = Walkers(settings, speeds, num_envs, variant)
         self._legs = Legs(table, self.walkers)
-        curves = [foot_curves(settings, c, w.body, w.human, w.plan.stride_time) for c, w in table]
+        curves = [foot_curves(settings, c, w) for c, w in table]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers)

@@ -55,23 +55,26 @@ class LegConstants:
     """Fixed toe stiffness [N m/rad]."""
 
 
-def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED) -> str:
+def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people") -> str:
     """Name of the committed constants for a setting; "angle" and "phase" share those of "planned"."""
     name = "neutral" if equilibrium == "neutral" else "planned"
     name = name if cadence == "people" else f"{name}, {cadence} cadence"
+    name = name if feedforward == "people" else f"{name}, {feedforward}'s moments"
     return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
 
 
-def leg_constants(equilibrium: str, cadence: str, speed: float = TUNED_SPEED) -> LegConstants:
+def leg_constants(
+    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people"
+) -> LegConstants:
     """The committed constants for a setting at `speed` [m/s at 1.70 m]; `SpringfootError` where none walk.
 
     Linear between the speeds for which there are some, and those of the nearest beyond.
     """
-    name, table = constants_name(equilibrium, cadence), _committed()
+    name, table = constants_name(equilibrium, cadence, feedforward=feedforward), _committed()
     if name not in table:
         raise SpringfootError(
-            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r}; "
-            "equilibrium 'neutral' needs cadence 'people'"
+            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} with moments of the "
+            f"{feedforward}; there are some for: {', '.join(sorted(table))}"
         )
     prefix, unit = f"{name}, ", " m/s"
     others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]

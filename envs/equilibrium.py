@@ -12,6 +12,7 @@ from .legs import knot_curve
 from .model import ANKLE, damping_times
 from .phase import GRID
 from .settings import BipedSettings
+from .walks import Walk
 
 PLATEAUS = (0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95)
 """Start and end of loading, early stance, late stance, push-off, swing; stiffness is linear between these plateaus."""
@@ -29,19 +30,17 @@ def plateau_curve(values: tuple[float, ...]) -> NDArray:
     return np.interp(GRID, PLATEAUS, np.repeat(values, 2), period=1.0)
 
 
-def foot_curves(
-    settings: BipedSettings, constants: LegConstants, body: Body, human: HumanGait, stride_time: float
-) -> tuple[NDArray, NDArray]:
+def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Walk) -> tuple[NDArray, NDArray]:
     """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
     if settings.schedule is None:
-        stiffness, rest = fixed_stiffness(constants, body), neutral(constants)
+        stiffness, rest = fixed_stiffness(constants, walk.body), neutral(constants)
     else:
         stiffness, rest = StiffnessSchedule.from_json(settings.schedule).at(GRID)
     match settings.equilibrium:
         case "planned":
-            rest = planned(constants, body, human, stride_time)
+            rest = planned(constants, walk)
         case "angle":
-            rest = angle(human)
+            rest = angle(walk.human)
         case "neutral":
             rest = neutral(constants)
     return rest, stiffness
@@ -53,16 +52,16 @@ def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
     return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.stiffness_scale
 
 
-def planned(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds their moment forward through K_ref.
+def planned(constants: LegConstants, walk: Walk) -> NDArray:
+    """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds a moment forward through K_ref.
 
-    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots: on the plan, K = K_ref gives a times people's moment M
+    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots: on the plan, K = K_ref gives a times the walk's moment M
     (plantarflexion positive). The toe rests at 0 from foot flat to toe-off and 10 deg up otherwise.
     """
-    beta, period = damping_times(body)[ANKLE], constants.period_factor * stride_time
+    body, human = walk.body, walk.human
+    beta, period = damping_times(body)[ANKLE], constants.period_factor * walk.plan.stride_time
     quasi = plateau_curve(REFERENCE_STIFFNESS) * body.stiffness_scale
-    moment = human.mean("ankle_moment", GRID) * body.mass * body.length_scale
-    lead = beta * human.rate("ankle", GRID) / period - moment / quasi
+    lead = beta * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
     ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
     return np.stack([ankle, _toe()], axis=-1)
 

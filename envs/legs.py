@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
-from springfoot.gait.human import HumanGait
 
 from .constants import LegConstants
 from .kernel import kernel
@@ -52,9 +51,7 @@ class Legs:
     def __init__(self, rows: Sequence[tuple[LegConstants, Walk]], walkers: Walkers):
         self._walkers = walkers
         self._rows = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
-        self._table = PhaseTable(
-            np.stack([leg_curves(c, walk.body, walk.human, walk.plan.stride_time) for c, walk in rows])
-        )
+        self._table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
         self._gains = np.zeros(len(walkers.place), GAINS)
         self.phase = leg_phases(np.zeros(len(walkers.place)))
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
@@ -170,21 +167,21 @@ def _command(gains, speed, scale, curves, root, root_velocity, com_velocity, con
             control[i, side, KNEE, 0], control[i, side, KNEE, 1] = knee, torque * curves[i, side, 4]
 
 
-def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_time: float) -> NDArray:
+def leg_curves(constants: LegConstants, walk: Walk) -> NDArray:
     """(SAMPLES, 5) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m]."""
+    body, human = walk.body, walk.human
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
-    beta, period = damping_times(body), constants.period_factor * stride_time
-    torque = body.mass * body.length_scale
+    beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
     columns = [stance]
     drives = []
-    for joint, name, moment, knots, (in_stance, in_swing) in (
-        (HIP, "thigh", "hip_moment", constants.hip_knots_deg, constants.hip_stiffness),
-        (KNEE, "knee", "knee_moment", constants.knee_knots_deg, constants.knee_stiffness),
+    for joint, name, knots, (in_stance, in_swing) in (
+        (HIP, "thigh", constants.hip_knots_deg, constants.hip_stiffness),
+        (KNEE, "knee", constants.knee_knots_deg, constants.knee_stiffness),
     ):
         stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
-        feed = -constants.feedforward[joint] * human.mean(moment, GRID) * torque  # people count extension positive
+        feed = -constants.feedforward[joint] * walk.moments[:, joint]  # which count extension positive
         columns.append(stiffness)
         drives.append(stiffness * target + feed)
     return np.stack(columns + drives, axis=-1)

@@ -12,6 +12,7 @@ from math import sqrt
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from springfoot.gait.body import GRAVITY, Body
 
@@ -39,12 +40,15 @@ JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
 
 HEEL_RADIUS = 0.04
 """Radius [m] of the heel's contact sphere at 1.70 m: a rounded heel with a soft pad at most 8 mm deep."""
-SOLE_RADIUS = 0.02
-"""Radius [m] of the contact spheres at the ball and the toe tip at 1.70 m: the toe joint's height above the sole."""
+BALL_RADIUS, TOE_RADIUS = 0.02, 0.012
+"""Radius [m] of the contact spheres at 1.70 m: the ball's is the toe joint's height above the sole, and its sphere sits
+on that joint as part of the toe, so that heel-off neither rolls it nor drags the toe along the floor."""
 FRICTION = 1.0
+FRICTION_RATIO = 10.0
+"""Impedance of friction against that of the normal force: loaded feet creep less (docs/physics.md)."""
 HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
 """Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
-SOLE_CONTACT = {"solref": (0.025, 1.0), "solimp": (0.9, 0.95, 0.003)}
+SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}
 
 _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
 
@@ -72,14 +76,25 @@ def passive_damping(body: Body) -> np.ndarray:
 def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
     """Centre (forward, up) [m] in its segment's frame, and radius [m], of each contact sphere.
 
-    Heel and ball are in the foot's frame (origin: ankle), the toe in the toe's frame (origin: toe joint).
+    The heel is in the foot's frame (origin: ankle), ball and toe tip in the toe's frame (origin: toe joint).
     """
-    heel, sole = HEEL_RADIUS * body.length_scale, SOLE_RADIUS * body.length_scale
+    heel, ball, toe = (radius * body.length_scale for radius in (HEEL_RADIUS, BALL_RADIUS, TOE_RADIUS))
     return {
         "heel": (heel - body.heel_to_ankle, heel - body.ankle_height, heel),
-        "ball": (body.ankle_to_toe_joint, sole - body.ankle_height, sole),
-        "toe": (body.toe_length - sole, sole - body.toe_joint_height, sole),
+        "ball": (0.0, ball - body.toe_joint_height, ball),
+        "toe": (body.toe_length - toe, toe - body.toe_joint_height, toe),
     }
+
+
+def contact_material(body: Body, contact: NDArray, root: NDArray, angle: NDArray) -> NDArray:
+    """Forward coordinate [m] of the sole's material at the contact points, up to a constant: (T, side, contact).
+
+    It changes when a foot slides and stays when its spheres roll. From lowest points `contact` (T, side, contact, 2)
+    [m], `root` (T, 3) and joint angles (T, side, joint) as in `envs.simulation.Measurement`.
+    """
+    foot = angle[..., HIP] - root[..., None, 2] - angle[..., KNEE] + angle[..., ANKLE]  # toes up
+    turn = np.stack([foot, foot + angle[..., TOE], foot + angle[..., TOE]], axis=-1)
+    return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
 def build_spec(body: Body) -> mujoco.MjSpec:
@@ -90,7 +105,8 @@ def build_spec(body: Body) -> mujoco.MjSpec:
     spec.option.timestep = TIMESTEP
     spec.option.gravity = (0.0, 0.0, -GRAVITY)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = FRICTION_RATIO
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     # Islands of constraints and boxes around few spheres: looking for them costs 11 % of a step and finds nothing.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
@@ -219,7 +235,7 @@ def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> Non
     )
     offsets = contact_offsets(body)
     _sphere(foot, geom_name("heel", side), offsets["heel"], HEEL_CONTACT, body, priority=1)
-    _sphere(foot, geom_name("ball", side), offsets["ball"], SOLE_CONTACT, body, priority=0)
+    _sphere(toe, geom_name("ball", side), offsets["ball"], SOLE_CONTACT, body, priority=0)
     _sphere(toe, geom_name("toe", side), offsets["toe"], SOLE_CONTACT, body, priority=0)
     _bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
     _bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)

@@ -16,6 +16,7 @@ from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
+Feedforward = Literal["people", "plan"]
 ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
@@ -62,6 +63,9 @@ class BipedSettings:
     equilibrium: Equilibrium = "planned"
     """Equilibrium angle of ankle and toe: the planned angle with the planned moment fed forward, the planned
     angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
+    feedforward: Feedforward = "people"
+    """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
+    that inverse dynamics give for the plan (a prediction: no force of people's is used)."""
     action_mode: ActionMode = "absolute"
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
     decisions: Decisions = "50hz"
@@ -101,6 +105,7 @@ class BipedSettings:
         for name, choices in (
             ("cadence", Cadence),
             ("equilibrium", Equilibrium),
+            ("feedforward", Feedforward),
             ("action_mode", ActionMode),
             ("decisions", Decisions),
             ("stiffness_joints", StiffnessJoints),

@@ -293,7 +293,7 @@ def _locate(segments, position, rate, com, com_velocity, ankle, contact):
             if joint == ANKLE:
                 ankle[side, 0], ankle[side, 1] = joint_x, joint_z
             for k in range(3):
-                if joint == (TOE if k == 2 else ANKLE):  # heel and ball are on the foot
+                if joint == (ANKLE if k == 0 else TOE):  # the heel is on the foot
                     x, z = _turned(segments.contact[k], c, s)
                     contact[side, k, 0], contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
             x, z = _turned(segments.end[joint], c, s)

@@ -15,14 +15,22 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
 from springfoot.gait.human import HumanGait
+from springfoot.gait.kinetics import planned_moments
 from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
 
 from .constants import LegConstants, leg_constants
+from .phase import GRID
 from .settings import BipedSettings, reference_gait
 
 SPACING = 0.1
 """Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
 the one planned for that speed, most of it where people's measured speeds meet."""
+
+
+FED = ("hip", "knee", "ankle")
+"""Joints to which a moment is fed forward."""
+PLAN_HARMONICS = 8
+"""Fourier terms of the plan's moments that are fed forward: its stiff contacts make them jump, people's do not."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,6 +47,8 @@ class Walk:
     """Its CoM and the time of its strides."""
     constants: tuple[LegConstants, ...]
     """Leg constants: one set, or several variants."""
+    moments: NDArray
+    """(SAMPLES, 3) moments of hip, knee and ankle to feed forward [N m], extension and plantarflexion positive."""
 
 
 def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[Walk, ...]:
@@ -55,19 +65,34 @@ def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] 
     body = Body(settings.height, settings.mass)
     settings = replace(settings, speed=speed)
     human = reference_gait(settings)
+    if settings.human is None:
+        plan = _plan(body, speed, settings.cadence)
+    else:
+        plan = plan_walk(body, speed, settings.cadence, human=human)
+    equal_speed = speed / sqrt(body.length_scale)
+    legs = legs or [leg_constants(settings.equilibrium, settings.cadence, equal_speed, settings.feedforward)]
     return Walk(
         body=body,
         speed=speed,
         human=human,
-        plan=(
-            _plan(body, speed, settings.cadence)
-            if settings.human is None
-            else plan_walk(body, speed, settings.cadence, human=human)
-        ),
-        constants=tuple(
-            legs or [leg_constants(settings.equilibrium, settings.cadence, speed / sqrt(body.length_scale))]
-        ),
+        plan=plan,
+        constants=tuple(legs),
+        moments=_plans_moments(plan) if settings.feedforward == "plan" else _peoples_moments(human, body),
     )
+
+
+def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
+    """(SAMPLES, 3) of `Walk.moments`, as measured."""
+    moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
+    return np.stack(moments, -1) * body.mass * body.length_scale
+
+
+def _plans_moments(plan: WalkPlan) -> NDArray:
+    """(SAMPLES, 3) of `Walk.moments`, by the plan's inverse dynamics; its steps where feet land and leave smoothed."""
+    by_joint = planned_moments(plan, GRID)
+    waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
+    waves[PLAN_HARMONICS + 1 :] = 0.0
+    return np.fft.irfft(waves, len(GRID), axis=0)
 
 
 def rows(walks: Sequence[Walk]) -> Iterator[tuple[LegConstants, Walk]]:

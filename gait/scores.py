@@ -189,10 +189,16 @@ def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | Non
     return means
 
 
-def travel(position: NDArray, loaded: NDArray) -> float:
-    """Path [m] of contact points (T, C) along the ground, summed over points and samples loaded at both ends."""
-    moved = np.abs(np.diff(position, axis=0))
-    return float(np.sum(moved[loaded[1:] & loaded[:-1]]))
+def travel(position: NDArray, force: NDArray, least: float) -> float:
+    """Path [m] along the ground of contact points (T, C) that bear `force` (T, C) [N].
+
+    Each point counts by its share of the foot's load, so that a rigid foot that slides by d travels d whatever the
+    number of its contact points; samples where the foot bears less than `least` [N] at either end do not count.
+    """
+    between = force[1:] + force[:-1]
+    share = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
+    loaded = force.sum(axis=1) > least
+    return float(np.sum((np.abs(np.diff(position, axis=0)) * share)[loaded[1:] & loaded[:-1]]))
 
 
 def mean_sd(values: ArrayLike) -> dict[str, float | None]:
