@@ -7,6 +7,7 @@ import pytest
 
 from springfoot.agents.evaluation import CURVES, measure
 from springfoot.agents.recording import SERIES, Recording, load_recording, prepare, record, record_each
+from springfoot.envs.model import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT
@@ -46,7 +47,10 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None) -> Recording:
     landed = (np.floor(strides) - [0.3, 0.8]) * STRIDE_LENGTH + 0.2
     ankle = np.stack([landed + swing * STRIDE_LENGTH, np.full_like(phase, 0.07)], -1)
     contact = np.zeros((count, 2, 3, 2))
-    contact[..., 0] = ankle[..., None, 0]
+    # Spheres that roll: their lowest points move against the turn of foot and toe, the sole's material stays.
+    foot = angle[..., 0] - PITCH - angle[..., 1] + angle[..., 2]
+    turn = np.stack([foot, foot + angle[..., 3], foot + angle[..., 3]], -1)
+    contact[..., 0] = ankle[..., None, 0] - turn * [HEEL_RADIUS, BALL_RADIUS, TOE_RADIUS]
     contact[..., 1] = np.where(swing > 0, CLEARANCE, 0.0)[..., None]
     step = PERCENT / 100
     plan = np.stack([-0.2 + HUMAN.step_length * step, 0.97 - 0.02 * np.cos(2 * np.pi * step)], -1)

@@ -13,9 +13,8 @@ from springfoot.envs.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, 
 from springfoot.envs.legs import knot_curve
 from springfoot.envs.phase import GRID
 from springfoot.envs.settings import BipedSettings
-from springfoot.gait.body import Body
+from springfoot.envs.walks import walk_at
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.human import human_gait
 
 
 def test_every_set_of_constants_says_what_found_it():
@@ -58,7 +57,7 @@ def test_a_setting_without_constants_is_refused():
     with pytest.raises(SpringfootError) as error:
         Biped(BipedSettings(equilibrium="neutral", cadence="thesis"), 1)
     assert str(error.value) == (
-        "no leg constants walk with equilibrium 'neutral' at cadence 'thesis'; "
+        "no leg constants walk with equilibrium 'neutral' at cadence 'thesis' and people's moments; "
         "equilibrium 'neutral' needs cadence 'people'"
     )
 
@@ -71,10 +70,11 @@ def test_knots_are_met_and_periodic():
 
 
 def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
-    body, human = Body(), human_gait(1.2)
+    walk = walk_at(BipedSettings(), 1.2)
+    human = walk.human
     plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
     constants = constants_from({**vars(leg_constants("planned", "people")), **plain})
-    rest = planned(constants, body, human, human.stride_time)[:, 0]
+    rest = planned(constants, walk)[:, 0]
     rate = human.rate("ankle", GRID) / (constants.period_factor * human.stride_time)
     torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - human.mean("ankle", GRID) - 0.02 * rate)
     np.testing.assert_allclose(torque, -63.0 * human.mean("ankle_moment", GRID), atol=1e-9)

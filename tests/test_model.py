@@ -4,7 +4,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from springfoot.envs.model import CONTACTS, JOINTS, SIDES, build_model, build_spec, contact_offsets, geom_name
+from springfoot.envs.model import (
+    CONTACTS,
+    JOINTS,
+    SIDES,
+    build_model,
+    build_spec,
+    contact_material,
+    contact_offsets,
+    geom_name,
+)
 from springfoot.gait.body import GRAVITY, Body
 
 BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0)]
@@ -39,6 +48,34 @@ def test_the_foot_is_as_long_as_the_bodys():
     back = heel[0] - heel[2]
     front = body.ankle_to_toe_joint + toe[0] + toe[2]
     assert front - back == pytest.approx(body.foot_length, rel=1e-12)
+
+
+def test_heel_off_turns_the_foot_about_the_ball_and_leaves_ball_and_toe_where_they_are():
+    model = build_model(Body())
+    data = mujoco.MjData(model)
+    data.joint("z").qpos = Body().leg_length
+    mujoco.mj_forward(model, data)
+    before = {name: data.geom(f"{name}_left").xpos.copy() for name in ("ball", "toe")}
+    joint = data.body("toe_left").xpos.copy()
+    data.joint("toe_left").qpos = 0.5  # toes up against the foot, as the heel rises
+    data.joint("pitch").qpos = 0.5
+    mujoco.mj_forward(model, data)
+    data.joint("x").qpos, data.joint("z").qpos = data.qpos[:2] + (joint - data.body("toe_left").xpos)[[0, 2]]
+    mujoco.mj_forward(model, data)
+    for name, place in before.items():
+        np.testing.assert_allclose(data.geom(f"{name}_left").xpos, place, atol=1e-12)
+
+
+def test_a_sphere_that_rolls_carries_its_material_nowhere_and_one_that_slides_does():
+    heel = contact_offsets(Body())["heel"][2]
+    turn, slide = np.linspace(0.3, 0.0, 4), 0.01 * np.arange(4)
+    angle, contact = np.zeros((4, 2, 4)), np.zeros((4, 2, 3, 2))
+    angle[..., 0] = turn[:, None]  # a straight leg swings back and turns its foot with it
+    contact[:, 0, 0, 0] = -heel * turn
+    contact[:, 1, 0, 0] = -heel * turn + slide
+    material = contact_material(Body(), contact, np.zeros((4, 3)), angle)[..., 0]
+    np.testing.assert_allclose(material[:, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(material[:, 1], slide, atol=1e-12)
 
 
 @pytest.mark.parametrize(

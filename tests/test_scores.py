@@ -150,7 +150,14 @@ def test_phase_means_split_at_10_45_percent_and_toe_off():
     assert score.phase_means(curve, 62.0) == {"loading": 1.0, "mid_stance": 2.0, "push_off": 3.0, "swing": 4.0}
 
 
-def test_travel_counts_only_loaded_stretches():
-    position = np.array([[0.0, 0.0], [0.1, 0.0], [0.05, 5.0], [0.05, 9.0]])
-    loaded = np.array([[True, False], [True, False], [True, True], [False, False]])
-    assert score.travel(position, loaded) == pytest.approx(0.15)
+def test_travel_counts_only_loaded_points_by_their_share():
+    position = np.array([[0.0, 0.0], [0.1, 0.0], [0.05, 4.0], [0.05, 9.0]])
+    force = np.array([[10.0, 0.0], [20.0, 0.0], [15.0, 5.0], [0.5, 0.5]])
+    assert score.travel(position, force, 2.0) == pytest.approx(0.1 + 0.05 * 35 / 40 + 4.0 * 5 / 40)
+
+
+@pytest.mark.parametrize("points", [1, 2, 5])
+def test_a_rigid_foot_that_slides_travels_as_far_with_any_number_of_contact_points(points):
+    slide = np.linspace(0.0, 0.03, 7)
+    load = np.random.default_rng(0).uniform(1.0, 9.0, (7, points))
+    assert score.travel(np.tile(slide[:, None], points), load, 0.5) == pytest.approx(0.03)
