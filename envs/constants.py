@@ -73,8 +73,8 @@ def leg_constants(
     name, table = constants_name(equilibrium, cadence, feedforward=feedforward), _committed()
     if name not in table:
         raise SpringfootError(
-            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s moments; "
-            "equilibrium 'neutral' needs cadence 'people'"
+            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s "
+            "moments; equilibrium 'neutral' needs cadence 'people'"
         )
     prefix, unit = f"{name}, ", " m/s"
     others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]

@@ -75,7 +75,7 @@ def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
     plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
     constants = constants_from({**vars(leg_constants("planned", "people")), **plain})
     rest = planned(constants, walk)[:, 0]
-    rate = human.rate("ankle", GRID) / (constants.period_factor * human.stride_time)
+    rate = human.rate("ankle", GRID) / (constants.period_factor * walk.plan.stride_time)
     torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - human.mean("ankle", GRID) - 0.02 * rate)
     np.testing.assert_allclose(torque, -63.0 * human.mean("ankle_moment", GRID), atol=1e-9)
 
