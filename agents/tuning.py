@@ -25,8 +25,8 @@ from springfoot.envs.biped import Biped, Tick
 from springfoot.envs.constants import TUNED_SPEED, LegConstants, constants_from, constants_name
 from springfoot.envs.equilibrium import foot_curves
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE
-from springfoot.envs.settings import BipedSettings
-from springfoot.gait.body import GRAVITY, Body
+from springfoot.envs.settings import BipedSettings, body_of
+from springfoot.gait.body import GRAVITY
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.human import human_gait
@@ -179,7 +179,7 @@ def _walk(settings, candidates, walks, seed, threads, ease=0.0) -> tuple[NDArray
 
 def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
     """(C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
-    body, human = Body(settings.height, settings.mass), human_gait(settings.speed, settings.height)
+    body, human = body_of(settings), human_gait(settings.speed, settings.height)
     stride_time = plan_walk(body, settings.speed, settings.cadence).stride_time
     curves = [
         [foot_curves(kind, c, body, human, stride_time)[0] for c in candidates]

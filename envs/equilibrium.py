@@ -61,7 +61,7 @@ def planned(constants: LegConstants, body: Body, human: HumanGait, stride_time: 
     """
     beta, period = damping_times(body)[ANKLE], constants.period_factor * stride_time
     quasi = plateau_curve(REFERENCE_STIFFNESS) * body.stiffness_scale
-    moment = human.mean("ankle_moment", GRID) * body.mass * body.length_scale
+    moment = human.mean("ankle_moment", GRID) * body.total_mass * body.length_scale
     lead = beta * human.rate("ankle", GRID) / period - moment / quasi
     ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
     return np.stack([ankle, _toe()], axis=-1)

@@ -100,10 +100,10 @@ GAINS = np.dtype(
 def _gains(c: LegConstants, body: Body, stride_time: float) -> tuple[float, ...]:
     scale, root = body.stiffness_scale, sqrt(body.length_scale)
     return (
-        TOUCHDOWN_LOAD * body.mass * GRAVITY,
+        TOUCHDOWN_LOAD * body.total_mass * GRAVITY,
         WINDOW / (c.period_factor * stride_time),
         c.period_speed_gain / root,
-        radians(c.trunk_pitch_deg),
+        radians(c.trunk_pitch_deg) + body.trunk_lean,
         c.trunk_stiffness * scale,
         c.trunk_damping * scale * root,
         c.speed_torque * scale / root,
@@ -175,7 +175,7 @@ def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_tim
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
     beta, period = damping_times(body), constants.period_factor * stride_time
-    torque = body.mass * body.length_scale
+    torque = body.total_mass * body.length_scale
     columns = [stance]
     drives = []
     for joint, name, moment, knots, (in_stance, in_swing) in (
@@ -184,6 +184,8 @@ def leg_curves(constants: LegConstants, body: Body, human: HumanGait, stride_tim
     ):
         stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
+        if joint == HIP:
+            target = target + body.trunk_lean  # hip = thigh to the vertical + pitch of the trunk
         feed = -constants.feedforward[joint] * human.mean(moment, GRID) * torque  # people count extension positive
         columns.append(stiffness)
         drives.append(stiffness * target + feed)

@@ -18,7 +18,7 @@ from springfoot.gait.human import HumanGait
 from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
 
 from .constants import LegConstants, leg_constants
-from .settings import BipedSettings, reference_gait
+from .settings import BipedSettings, body_of, reference_gait
 
 SPACING = 0.1
 """Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
@@ -52,7 +52,7 @@ def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None
 
 def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None) -> Walk:
     """The walk of the settings' body at `speed` [m/s]."""
-    body = Body(settings.height, settings.mass)
+    body = body_of(settings)
     settings = replace(settings, speed=speed)
     human = reference_gait(settings)
     return Walk(
@@ -88,7 +88,7 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     slow, fast = min(slow * lowest, speed), max(fast * highest, speed)
     if slow == fast:
         return np.array([speed])
-    unit = sqrt(Body(settings.height, settings.mass).length_scale)
+    unit = sqrt(body_of(settings).length_scale)
     first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
     grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # 1.2, and not 12 x 0.1
     return np.array(sorted({*grid, speed}))
