@@ -8,6 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from springfoot.envs.actuation import stiffness_ranges
 from springfoot.envs.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE, contact_offsets
+from springfoot.envs.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 
@@ -34,7 +35,7 @@ SOFT, STIFF = np.array([255, 236, 179]), np.array([122, 18, 60])
 
 def save_animation(path: Path, recording: Recording) -> None:
     """Write the animation: two strides from a left heel strike, or the last seconds of a walk that only fell."""
-    body = Body(recording.settings.height, recording.settings.mass)
+    body = body_of(recording.settings)
     episode, first, last = _clip(recording, body)
     series = {name: values[episode, first:last].astype(float) for name, values in recording.series.items()}
     canvas = _Canvas(body, series, recording)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.envs.model import ANKLE, CONTACTS, HIP, KNEE, SIDES, TOE, contact_material
-from springfoot.envs.settings import reference_gait, settings_to_json
+from springfoot.envs.settings import body_of, reference_gait, settings_to_json
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import (
@@ -126,7 +126,7 @@ class Gait:
 def measure(recording: Recording) -> Gait:
     """Every number of metrics.json and the mean curves, from the recording alone."""
     gait, tally = Gait(), _Tally()
-    body = Body(recording.settings.height, recording.settings.mass)
+    body = body_of(recording.settings)
     fell = recording.fall_reason != ""
     for episode, ticks in enumerate(recording.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}

@@ -25,7 +25,7 @@ from springfoot.envs.actuation import FEET, stiffness_ranges
 from springfoot.envs.equilibrium import REFERENCE_STIFFNESS, plateau_curve
 from springfoot.envs.model import damping_times
 from springfoot.envs.phase import GRID
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError, require_count
@@ -82,7 +82,7 @@ def mean_springs(recording: Recording) -> MeanSprings:
         return np.stack([np.interp(STARTS, at, total / count[count > 0], period=1.0) for total in totals], -1)
 
     return MeanSprings(
-        body=Body(recording.settings.height, recording.settings.mass),
+        body=body_of(recording.settings),
         **{name: mean(name) for name in ("angle", "velocity", "torque", "stiffness")},
     )
 

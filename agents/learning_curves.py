@@ -22,33 +22,12 @@ from springfoot.gait.errors import SpringfootError
 from .command import exit_code
 from .evaluation import measure
 from .figures import STYLE
+from .limits import WALKS, unmet
 from .recording import prepare, record
 from .training import RUN
 
 EPISODES, SECONDS = 20, 20.0
 """What the best policy is judged on."""
-SPEED, RMSE_DEG = 0.03, {"thigh": 3.5, "knee": 4.5, "ankle": 4.0}
-"""Of a walk: speed this near the commanded one [m/s]; angles nearer to people's mean than one person's usually are."""
-PEAK_BW, FORCE_R = 1.3, 0.93
-"""Of a walk: no greater peak of the mean vertical force [body weights], no smaller correlation with people's."""
-
-
-def unmet(metrics: dict[str, Any]) -> list[str]:
-    """The limits of a walk that an evaluation misses, as words with the number; none if it walks."""
-    grf, joints = metrics["grf"], metrics["joints"]
-    off = abs((metrics["speed_m_s"]["mean"] or 0.0) - metrics["environment"]["speed"])
-    misses = [f"{metrics['falls']} falls"] if metrics["falls"] else []
-    misses += [f"{off:.3f} m/s off"] if off > SPEED else []
-    for joint, limit in RMSE_DEG.items():
-        rmse = joints[joint]["rmse_deg"]
-        if rmse is None or rmse > limit:
-            misses.append(f"{joint} {_number(rmse)}°")
-    for name in ("vertical_peak1_bw", "vertical_peak2_bw"):
-        if grf[name] is None or grf[name] > PEAK_BW:
-            misses.append(f"{name} {_number(grf[name])}")
-    if grf["vertical_r"] is None or grf["vertical_r"] < FORCE_R:
-        misses.append(f"vertical_r {_number(grf['vertical_r'])}")
-    return misses
 
 
 def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | None:
@@ -102,13 +81,9 @@ def run(flags: Flags) -> None:
         steady = first_without_falls(record_of_run["evaluations"])
         when = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else "–"
         seconds, steps = record_of_run["seconds"], record_of_run["timesteps"]
-        print(f"| {name} | {seconds:.0f} | {steps:,} | {when} | {', '.join(unmet(metrics)) or 'nothing'} |")
+        print(f"| {name} | {seconds:.0f} | {steps:,} | {when} | {', '.join(unmet(metrics, WALKS)) or 'nothing'} |")
     print(f"\nMedian wall time {median(record_of_run['seconds'] for record_of_run in runs.values()):.0f} s.")
     save_curves(flags.out, runs)
-
-
-def _number(value: float | None) -> str:
-    return "?" if value is None else f"{value:.2f}"
 
 
 def _read(folder: Path) -> dict[str, Any]:

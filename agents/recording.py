@@ -25,10 +25,9 @@ from springfoot.gait.plan import WalkPlan
 from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
+_WHO = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed")
 _RANGES = ("height_range", "mass_range", "speed_range", "speed_interval")
-CONDITIONS = {
-    name: getattr(BipedSettings, name) for name in ("height", "mass", "speed", *_RANGES, "push_newton", "start_noise")
-}
+CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, "push_newton", "start_noise")}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -100,7 +99,8 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, Bi
     """
     wanted = CONDITIONS | given
     if name.partition(":")[0] in BASELINES:
-        settings = settings_from(**(own_settings(name, *(wanted[key] for key in ("height", "mass", "speed"))) | wanted))
+        who = settings_from(**{key: wanted[key] for key in _WHO})
+        settings = settings_from(**(own_settings(name, who) | wanted))
         return baseline(name, settings, seed), settings
     if name != "pretrained" and not Path(name).exists():
         known = ", ".join(["pretrained", *BASELINES])

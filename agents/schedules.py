@@ -16,7 +16,7 @@ from springfoot.envs.constants import leg_constants
 from springfoot.envs.equilibrium import fixed_stiffness
 from springfoot.envs.model import ACTIONS
 from springfoot.envs.phase import GRID, PLACE, PhaseTable, leg_phases
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task import OBSERVATION
 from springfoot.envs.walks import tabulated_speeds
 from springfoot.gait.body import Body
@@ -41,7 +41,7 @@ def leg_phase(observation: NDArray) -> NDArray:
 
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> Policy:
     """The same ankle and toe stiffness always: (ankle, toe) [N m/rad], for 1.70 m and 63 kg, scaled with the body."""
-    body = Body(settings.height, settings.mass)
+    body = body_of(settings)
     _require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
     action = np.tile(action_of(scaled, settings, body).astype(np.float32), 2)
@@ -64,7 +64,7 @@ def schedule(settings: BipedSettings) -> Policy:
 
     The latter is that of the commanded speed, whatever it is at present; both scale with the body.
     """
-    body, speeds = Body(settings.height, settings.mass), tabulated_speeds(settings)
+    body, speeds = body_of(settings), tabulated_speeds(settings)
     if settings.schedule is not None:
         stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
         return _follow(stiffness[None], speeds[:1], settings, body)
@@ -114,14 +114,14 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> Policy:
     raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
 
 
-def own_settings(name: str, height: float, mass: float, speed: float) -> dict[str, Any]:
-    """The environment settings that a baseline brings with it, for a body [m, kg] and a walking speed [m/s].
+def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
+    """The environment settings that a baseline brings with it, for the body and speed of `settings`.
 
     `thesis` brings the thesis's straight lines between gait events, and their equilibrium angles.
     """
     if name != "thesis":
         return {}
-    return {"equilibrium": "phase", "schedule": thesis_schedule(Body(height, mass), speed).to_json()}
+    return {"equilibrium": "phase", "schedule": thesis_schedule(body_of(settings), settings.speed).to_json()}
 
 
 def _stiffness_from(text: str) -> tuple[float, float]:

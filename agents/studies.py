@@ -106,7 +106,7 @@ def compare(
     found = [] if best is None else [f"constant:{best[0]:g},{best[1]:g}"]
     prepared = [(name, policy, settings)]
     for baseline in [*BASELINES, *found]:
-        own = own_settings(baseline, settings.height, settings.mass, settings.speed)
+        own = own_settings(baseline, settings)
         prepared.append((baseline, *prepare(baseline, settings_to_json(settings) | own, seed)))
     how = {"episodes": episodes, "seed": seed, "threads": threads, "progress": progress}
     return [run_row(*each, **how) for each in prepared]

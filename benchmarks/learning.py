@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from springfoot.agents.config import PRESETS
 from springfoot.agents.learner import Learner
 from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.envs.settings import settings_to_json
+from springfoot.envs.settings import body_of, settings_to_json
 from springfoot.gait.body import Body
 from springfoot.gait.plan import plan_walk
 from springfoot.gait.posture import leg_angles
@@ -67,7 +67,7 @@ def planning_seconds(repeats: int) -> float:
     settings, taken = PRESETS["walk"].environment, []
     for _ in range(repeats):
         begin = perf_counter()
-        plan_walk(Body(settings.height, settings.mass), settings.speed, settings.cadence)
+        plan_walk(body_of(settings), settings.speed, settings.cadence)
         taken.append(perf_counter() - begin)
     return float(np.median(taken))
 

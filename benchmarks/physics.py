@@ -24,7 +24,7 @@ from springfoot.agents.recording import prepare, record
 from springfoot.agents.schedules import Policy
 from springfoot.envs.biped import WINDOWS
 from springfoot.envs.model import TIMESTEP, build_model
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.simulation import WINDOW
 from springfoot.gait.body import Body
 from springfoot.gait.errors import require_count
@@ -184,7 +184,7 @@ def run(flags: Flags) -> None:
     default = spent[list(ROWS).index(DEFAULT)]
     for policy_name, (policy, settings) in prepared.items():
         lines = [list(HEAD), ["---"] * len(HEAD)]
-        body, reference = Body(settings.height, settings.mass), None
+        body, reference = body_of(settings), None
         rows = tqdm(ROWS.items(), desc=policy_name, leave=False, disable=None)
         for (name, edit), cost in zip(rows, spent, strict=True):
             gait = walked(policy, settings, edited(edit, body), flags.episodes, flags.threads)

@@ -132,6 +132,9 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | --------------------- | -------------- | ----------------------------------------------------------------- |
     | `height`              | `1.7`          | standing height [m]                                               |
     | `mass`                | `63.0`         | body mass [kg]                                                    |
+    | `leg_ratio`           | `1.0`          | thigh and shank over the average at that height, trunk the rest   |
+    | `foot_ratio`          | `1.0`          | length of the foot over the average at that height                |
+    | `carried_ratio`       | `0.0`          | mass of a load on the back over body mass                         |
     | `speed`               | `1.2`          | commanded speed [m/s]                                             |
     | `height_range`        | `None`         | heights drawn at each reset [m], in place of `height`             |
     | `mass_range`          | `None`         | body masses drawn at each reset [kg], in place of `mass`          |

@@ -97,10 +97,10 @@ GAINS = np.dtype(
 def _gains(c: LegConstants, body: Body, stride_time: float) -> tuple[float, ...]:
     scale, root = body.stiffness_scale, sqrt(body.length_scale)
     return (
-        TOUCHDOWN_LOAD * body.mass * GRAVITY,
+        TOUCHDOWN_LOAD * body.total_mass * GRAVITY,
         WINDOW / (c.period_factor * stride_time),
         c.period_speed_gain / root,
-        radians(c.trunk_pitch_deg),
+        radians(c.trunk_pitch_deg) + body.trunk_lean,
         c.trunk_stiffness * scale,
         c.trunk_damping * scale * root,
         c.speed_torque * scale / root,
@@ -181,6 +181,8 @@ def leg_curves(constants: LegConstants, walk: Walk) -> NDArray:
     ):
         stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
+        if joint == HIP:
+            target = target + body.trunk_lean  # hip = thigh to the vertical + pitch of the trunk
         feed = -constants.feedforward[joint] * walk.moments[:, joint]  # which count extension positive
         columns.append(stiffness)
         drives.append(stiffness * target + feed)

@@ -65,12 +65,12 @@ def damping_times(body: Body) -> np.ndarray:
 
 def torque_limits(body: Body) -> np.ndarray:
     """Largest actuator torque [N m] of each joint in the order of `JOINTS`, shape (4,)."""
-    return np.array(TORQUE_LIMIT) * body.stiffness_scale
+    return np.array(TORQUE_LIMIT) * body.strength_scale
 
 
 def passive_damping(body: Body) -> np.ndarray:
     """Joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
-    return np.array(PASSIVE_DAMPING) * body.stiffness_scale * sqrt(body.length_scale)
+    return np.array(PASSIVE_DAMPING) * body.strength_scale * sqrt(body.length_scale)
 
 
 def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
@@ -155,6 +155,8 @@ def build_spec(body: Body) -> mujoco.MjSpec:
         mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
     )
     _bone(trunk, (0, 0.0), (0, body.trunk_length), 0.07 * length, 0.0)
+    if body.carried_ratio:
+        _load(trunk, body)
     for index, side in enumerate(SIDES):
         _leg(spec, trunk, body, side, hip_y=(0.09 if index == LEFT else -0.09) * length)
     for side in SIDES:
@@ -183,6 +185,19 @@ def build_spec(body: Body) -> mujoco.MjSpec:
 def build_model(body: Body) -> mujoco.MjModel:
     """The compiled model of `body`."""
     return build_spec(body).compile()
+
+
+def _load(trunk, body: Body) -> None:
+    """A box on the back, fixed to the trunk."""
+    forward, up = body.carried_com
+    load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
+    load.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=np.array([0.075, 0.15, 0.25]) * body.length_scale,
+        contype=0,
+        conaffinity=0,
+        rgba=(0.45, 0.50, 0.35, 1.0),
+    )
 
 
 def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> None:

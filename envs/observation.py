@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
 from .kernel import kernel
 from .model import ACTIONS, CONTACTS, JOINTS, LEFT, SIDES
@@ -70,7 +70,8 @@ def _entries() -> tuple[Entry, ...]:
 
 
 OBSERVATION = _entries()
-"""Every entry of the observation, in order; l is the leg length (hip to floor when standing)."""
+"""Every entry of the observation, in order; l is the leg length (hip to floor when standing), weight and mass are those
+of body and load."""
 
 
 SEEN = np.dtype(
@@ -109,7 +110,7 @@ class Observer:
         for index in ids:
             body = self._walkers.bodies[index]
             self._units[index] = _units(body)
-            self._ratios[index] = body.length_scale, body.mass_scale
+            self._ratios[index] = body.length_scale, body.total_mass / REFERENCE_MASS
 
     def observe(
         self,
@@ -141,7 +142,7 @@ def _units(body: Body) -> NDArray:
         "leg length": leg,
         "sqrt(g l)": sqrt(GRAVITY * leg),
         "sqrt(g/l)": sqrt(GRAVITY / leg),
-        "body weight": body.mass * GRAVITY,
+        "body weight": body.total_mass * GRAVITY,
     }
     return np.array([unit[entry.unit] for entry in OBSERVATION])
 

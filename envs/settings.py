@@ -46,6 +46,12 @@ class BipedSettings:
     """Standing height of the body [m]."""
     mass: float = REFERENCE_MASS
     """Body mass [kg]."""
+    leg_ratio: float = 1.0
+    """Length of thigh and shank over the average at that height; the trunk takes the rest [-]."""
+    foot_ratio: float = 1.0
+    """Length of the foot over the average at that height [-]."""
+    carried_ratio: float = 0.0
+    """Mass of a load on the back over body mass [-]."""
     speed: float = 1.2
     """Commanded walking speed [m/s]."""
     height_range: tuple[float, float] | None = None
@@ -99,7 +105,7 @@ class BipedSettings:
     """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
 
     def __post_init__(self) -> None:
-        Body(self.height, self.mass)  # refuses impossible ones
+        body_of(self)  # refuses impossible ones
         require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
         self._check_draws()
         for name, choices in (
@@ -179,6 +185,11 @@ def settings_from(**values: Any) -> BipedSettings:
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
     """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
     return json.loads(json.dumps(asdict(settings)))
+
+
+def body_of(settings: BipedSettings) -> Body:
+    """The settings' body."""
+    return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
 
 
 def reference_gait(settings: BipedSettings) -> HumanGait:

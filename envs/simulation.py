@@ -226,7 +226,7 @@ def _average(sensors, force):
 
 SEGMENTS = np.dtype(
     [
-        ("trunk", float, 2),  # the trunk's part of hip -> CoM [m], in its own frame (forward, up)
+        ("trunk", float, 2),  # part of trunk and load in hip -> CoM [m], in the trunk's frame (forward, up)
         ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see _segments
         ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
         ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
@@ -250,7 +250,7 @@ def _segments(body: Body) -> NDArray:
     toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
     offsets = contact_offsets(body)
     segments = np.zeros(1, SEGMENTS)
-    segments["trunk"] = np.array([0.0, body.trunk_mass * body.trunk_com_above_hip]) / body.mass
+    segments["trunk"] = np.array(body.upper_moment) / body.total_mass
     segments["part"] = (
         np.array(
             [
@@ -260,7 +260,7 @@ def _segments(body: Body) -> NDArray:
                 (toe * body.toe_com, 0.0),
             ]
         )
-        / body.mass
+        / body.total_mass
     )
     segments["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
     segments["contact"] = [(forward, up) for forward, up, _ in offsets.values()]

@@ -58,4 +58,5 @@ def _start_curves(walk: Walk) -> NDArray:
     period = first.period_factor * walk.plan.stride_time
     angles = [walk.human.mean(name, GRID) for name in ANGLES]
     rates = [walk.human.rate(name, GRID) / period for name in ANGLES]
-    return np.stack([*angles, *rates, np.full(len(GRID), np.deg2rad(first.trunk_pitch_deg))], axis=-1)
+    pitch = np.deg2rad(first.trunk_pitch_deg) + walk.body.trunk_lean
+    return np.stack([*angles, *rates, np.full(len(GRID), pitch)], axis=-1)

@@ -72,7 +72,7 @@ SCALES = np.dtype(
         ("pose_share", float, len(JOINTS)),
         ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
         ("stiffness_share", float, 2),
-        ("weight", float),  # of the body [N]
+        ("weight", float),  # of body and load [N]
     ]
 )
 """What one body is measured by."""
@@ -206,7 +206,7 @@ def _scales(body: Body) -> NDArray:
     scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
     scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
     scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
-    scales["weight"] = body.mass * GRAVITY
+    scales["weight"] = body.total_mass * GRAVITY
     return scales
 
 

@@ -5,6 +5,7 @@ Mechanics scale exactly (`envs.model`). So curves are tabulated for one body, th
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -15,7 +16,7 @@ from springfoot.gait.errors import SpringfootError
 
 from .kernel import kernel
 from .phase import PLACE
-from .settings import BipedSettings
+from .settings import BipedSettings, body_of
 
 SCALE = np.dtype([("length", float), ("root", float), ("mass", float), ("torque", float)])
 """Ratios of a body to the settings' own: of height, its square root (of times and speeds), of mass, and mass x height
@@ -38,7 +39,7 @@ class Walkers:
 
     def __init__(self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None):
         self._settings = settings
-        self._home = Body(settings.height, settings.mass)
+        self._home = body_of(settings)
         self._speeds = speeds
         self._first = np.zeros(num, int) if variant is None else np.asarray(variant, int) * len(speeds)
         self.bodies = [self._home] * num
@@ -115,7 +116,7 @@ class Walkers:
             drawn = {name: random.uniform(*ranges[name]) for name in ("height", "mass") if ranges[name]}
             chosen = values | drawn | given
             try:
-                body = Body(chosen["height"], chosen["mass"])
+                body = replace(self._home, height=chosen["height"], mass=chosen["mass"])
                 break
             except SpringfootError:
                 if last == 1 or not drawn.keys() - given.keys():

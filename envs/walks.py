@@ -20,7 +20,7 @@ from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
 
 from .constants import LegConstants, leg_constants
 from .phase import GRID
-from .settings import BipedSettings, reference_gait
+from .settings import BipedSettings, body_of, reference_gait
 
 SPACING = 0.1
 """Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
@@ -62,7 +62,7 @@ def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None
 
 def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None) -> Walk:
     """The walk of the settings' body at `speed` [m/s]."""
-    body = Body(settings.height, settings.mass)
+    body = body_of(settings)
     settings = replace(settings, speed=speed)
     human = reference_gait(settings)
     if settings.human is None:
@@ -84,7 +84,7 @@ def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] 
 def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
     """(SAMPLES, 3) of `Walk.moments`, as measured."""
     moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
-    return np.stack(moments, -1) * body.mass * body.length_scale
+    return np.stack(moments, -1) * body.total_mass * body.length_scale
 
 
 def _plans_moments(plan: WalkPlan) -> NDArray:
@@ -113,7 +113,7 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     slow, fast = min(slow * lowest, speed), max(fast * highest, speed)
     if slow == fast:
         return np.array([speed])
-    unit = sqrt(Body(settings.height, settings.mass).length_scale)
+    unit = sqrt(body_of(settings).length_scale)
     first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
     grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # 1.2, and not 12 x 0.1
     return np.array(sorted({*grid, speed}))

@@ -1,4 +1,4 @@
-"""The body: every length, mass, centre of mass and inertia from height and body mass.
+"""The body: every length, mass, centre of mass and inertia from height and body mass, proportions and a load.
 
 Sources. Thesis: D. W. Nam, DGIST 2016, Table 1 (ratios of height). Winter: D. A. Winter, Biomechanics and
 Motor Control of Human Movement, 4th ed. 2009, Table 4.1 (mass fractions, centres of mass, radii of gyration)
@@ -6,7 +6,7 @@ and Figure 4.1 (segment lengths). All ratios of masses are of body mass, all rat
 """
 
 from dataclasses import dataclass
-from math import cos, hypot, sin, sqrt
+from math import atan2, cos, hypot, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,18 @@ MASS_RANGE = (20.0, 250.0)
 """Body masses accepted [kg]."""
 BMI_RANGE = (10.0, 80.0)
 """Body-mass indices accepted [kg/m^2]."""
+LEG_RATIO_RANGE = (0.94, 1.06)
+"""Leg ratios accepted: +-2 SD of adults of one height. SD 3 %: that of sitting height over height is about 0.014, and
+thigh and shank are 0.49 of height (ANSUR II, Gordon et al. 2014, Natick/TR-15/007; remembered, not read)."""
+FOOT_RATIO_RANGE = (0.93, 1.07)
+"""Foot ratios accepted: +-2 SD of adults of one height. SD 3.5 %: about 9 mm of 271 mm (ANSUR II; remembered)."""
+CARRIED_RATIO_RANGE = (0.0, 0.4)
+"""Loads accepted [body masses]."""
+CARRIED_BEHIND = 0.2
+"""Centre of a load behind the trunk's CoM, at its height [m at 1.70 m]: half the depth of the chest and of a backpack
+0.15 m thick (design choice)."""
+CARRIED_GYRATION = 0.15
+"""Radius of gyration of a load [m at 1.70 m]: a uniform box 0.5 m high and 0.15 m thick (design choice)."""
 
 
 def gravity(slope: float) -> NDArray:
@@ -36,21 +48,30 @@ def gravity(slope: float) -> NDArray:
 
 @dataclass(frozen=True)
 class Body:
-    """A person of average proportions; properties in m, kg and kg m^2, one leg each.
+    """A person, of average proportions unless said otherwise; properties in m, kg and kg m^2, one leg each.
 
-    Inertias are sagittal, about the segment's own centre of mass (CoM). Raises `SpringfootError` for a body
-    outside `HEIGHT_RANGE`, `MASS_RANGE` or `BMI_RANGE`.
+    Inertias are sagittal, about the segment's own centre of mass (CoM). Proportions move lengths, not segment masses.
+    Raises `SpringfootError` for a body outside the ranges at the head of this module.
     """
 
     height: float = REFERENCE_HEIGHT
     """Standing height [m]."""
     mass: float = REFERENCE_MASS
-    """Body mass [kg]."""
+    """Body mass [kg], without a load."""
+    leg_ratio: float = 1.0
+    """Length of thigh and shank over the average at that height; the trunk takes the rest."""
+    foot_ratio: float = 1.0
+    """Length of the foot over the average at that height."""
+    carried_ratio: float = 0.0
+    """Mass of a load over body mass: a backpack, fixed to the trunk behind its CoM."""
 
     def __post_init__(self) -> None:
         require_within("height", self.height, HEIGHT_RANGE, "m")
         require_within("mass", self.mass, MASS_RANGE, "kg")
         require_within("body-mass index mass/height^2", self.mass / self.height**2, BMI_RANGE, "kg/m^2")
+        require_within("leg_ratio", self.leg_ratio, LEG_RATIO_RANGE, "(relative)")
+        require_within("foot_ratio", self.foot_ratio, FOOT_RATIO_RANGE, "(relative)")
+        require_within("carried_ratio", self.carried_ratio, CARRIED_RATIO_RANGE, "(relative)")
 
     # Scales against the reference body --------------------------------------------------------------------
 
@@ -65,26 +86,31 @@ class Body:
         return self.mass / REFERENCE_MASS
 
     @property
-    def stiffness_scale(self) -> float:
-        """Of stiffness and torque, at equal strain: mass scale x length scale."""
+    def strength_scale(self) -> float:
+        """Of what the body itself is made of, such as torque limits and damping: mass scale x length scale."""
         return self.mass_scale * self.length_scale
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Of stiffness and torque that carry all of it, at equal strain: total mass / 63 kg x length scale."""
+        return self.total_mass / REFERENCE_MASS * self.length_scale
 
     # Lengths ------------------------------------------------------------------------------------------------
 
     @property
     def heel_to_ankle(self) -> float:
         """Back of the heel to the ankle axis, along the sole (thesis l_bf)."""
-        return 0.051 * self.height
+        return 0.051 * self.height * self.foot_ratio
 
     @property
     def ankle_to_toe_joint(self) -> float:
         """Ankle axis to toe joint, along the sole (thesis Table 1, appendix l_ft)."""
-        return 0.061 * self.height
+        return 0.061 * self.height * self.foot_ratio
 
     @property
     def toe_length(self) -> float:
         """Toe joint to toe tip (thesis l_toe, from SizeKorea)."""
-        return 0.04 * self.height
+        return 0.04 * self.height * self.foot_ratio
 
     @property
     def foot_length(self) -> float:
@@ -104,12 +130,12 @@ class Body:
     @property
     def shank_length(self) -> float:
         """Knee to ankle (thesis l_shank)."""
-        return 0.245 * self.height
+        return 0.245 * self.height * self.leg_ratio
 
     @property
     def thigh_length(self) -> float:
         """Hip to knee (thesis l_thigh)."""
-        return 0.245 * self.height
+        return 0.245 * self.height * self.leg_ratio
 
     @property
     def leg_length(self) -> float:
@@ -118,10 +144,18 @@ class Body:
 
     @property
     def trunk_length(self) -> float:
-        """Greater trochanter to glenohumeral joint, Winter's HAT (head, arms, trunk) segment (Figure 4.1)."""
-        return 0.288 * self.height
+        """Greater trochanter to glenohumeral joint, Winter's HAT (head, arms, trunk) segment (Figure 4.1).
+
+        What longer legs have more it has less, so that all add up to the height.
+        """
+        return (0.288 - 0.49 * (self.leg_ratio - 1.0)) * self.height
 
     # Masses -------------------------------------------------------------------------------------------------
+
+    @property
+    def total_mass(self) -> float:
+        """Body and load: what the legs carry."""
+        return self.mass + self.carried_mass
 
     @property
     def trunk_mass(self) -> float:
@@ -205,6 +239,35 @@ class Body:
     def toe_inertia(self) -> float:
         """Toe, a uniform rod."""
         return self.toe_mass * self.toe_length**2 / 12
+
+    # Load ---------------------------------------------------------------------------------------------------
+
+    @property
+    def carried_mass(self) -> float:
+        """The load's."""
+        return self.carried_ratio * self.mass
+
+    @property
+    def carried_com(self) -> tuple[float, float]:
+        """CoM of the load (forward of the hip, above the hip) along the trunk."""
+        return -CARRIED_BEHIND * self.length_scale, self.trunk_com_above_hip
+
+    @property
+    def carried_inertia(self) -> float:
+        """A box, radius of gyration `CARRIED_GYRATION`."""
+        return self.carried_mass * (CARRIED_GYRATION * self.length_scale) ** 2
+
+    @property
+    def upper_moment(self) -> tuple[float, float]:
+        """First mass moment of trunk and load about the hip (forward, up), along the trunk [kg m]."""
+        forward, up = self.carried_com
+        return self.carried_mass * forward, self.trunk_mass * self.trunk_com_above_hip + self.carried_mass * up
+
+    @property
+    def trunk_lean(self) -> float:
+        """Forward pitch of the trunk [rad] that puts the CoM of trunk and load over the hip, as people lean."""
+        forward, up = self.upper_moment
+        return atan2(-forward, up)
 
     # Derived ------------------------------------------------------------------------------------------------
 

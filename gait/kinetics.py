@@ -102,7 +102,7 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     second = phase >= 0.5
     step_phase = 2 * (phase - 0.5 * second)
     com = np.stack(plan.com(step_phase), -1)
-    force = ground_reaction(plan.body.mass, *plan.com_acceleration(step_phase), plan.slope)
+    force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
     zmp, shared = plan.zmp(step_phase), step_phase <= 2 * plan.feet.toe_off - 1
     rear, front = _double_support_cops(plan, step_phase)
     # In single support the stance foot bears all of it at the ZMP, as front foot.
@@ -170,7 +170,7 @@ def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[Le
     both_feet = forces(phase) + forces(phase + 0.5)
     # People's mean forces do not quite add up to their weight: only what differs from the mean accelerates.
     com_acceleration = GRAVITY * (both_feet - 2 * forces(grid).mean(0))
-    swinging = (mass_acceleration(body, leg) + mass_acceleration(body, legs(phase + 0.5))) / body.mass
+    swinging = (mass_acceleration(body, leg) + mass_acceleration(body, legs(phase + 0.5))) / body.total_mass
     pitch = leg.turn[..., FOOT]
     on_heel = _ankle_over(body, pitch, -body.heel_to_ankle, 0.0)
     on_ball = _ankle_over(body, pitch, body.ankle_to_toe_joint, body.toe_joint_height)
@@ -183,7 +183,7 @@ def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[Le
         hip_acceleration=com_acceleration - swinging,
     )
     cop = body.foot_length * human_cop(phase / gait.toe_off)
-    force = body.mass * GRAVITY * forces(phase)
+    force = body.total_mass * GRAVITY * forces(phase)
     toe_joint = joint_positions(body, motion.turn, motion.hip)["toe"]
     return motion, load_at(force, np.stack([cop, np.zeros(cop.shape)], -1), toe_joint[..., 0])
 

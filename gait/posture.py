@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, degrees, sin, sqrt
+from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,7 +52,7 @@ class Legs:
 
 
 def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGait) -> Legs:
-    """The posture, trunk upright, whose whole-body CoM is the planned one.
+    """The posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one.
 
     Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
     """
@@ -75,7 +75,7 @@ def legs_under(
     both: Callable[[NDArray], NDArray],
     slope: float = 0.0,
 ) -> Legs:
-    """The posture, trunk upright, whose whole-body CoM is `com` (2, ...) [m].
+    """The posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip.
 
     `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
     length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2).
@@ -83,7 +83,7 @@ def legs_under(
     foot_and_toe = _foot_moment(body, pitch, toe)
     hip = com.copy()
     hip[1] -= 0.1 * body.leg_length
-    trunk = body.trunk_mass * body.trunk_com_above_hip / body.mass
+    trunk = hypot(*body.upper_moment) / body.total_mass
     # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
     for _ in range(60):
         forward, down = ankle[0] - hip[0], hip[1] - ankle[1]
@@ -96,7 +96,7 @@ def legs_under(
             + (body.foot_mass + body.toe_mass) * np.stack([forward, -down])
             + foot_and_toe
         )
-        com_from_hip = both(leg) / body.mass
+        com_from_hip = both(leg) / body.total_mass
         com_from_hip[0] += trunk * sin(slope)
         com_from_hip[1] += trunk * cos(slope)
         moved = np.abs(com - com_from_hip - hip).max()

@@ -191,7 +191,7 @@ def thesis_schedule(
     )
     phase = np.linspace(0.0, human.toe_off, 1001)
     # The data count plantarflexion positive, the joint dorsiflexion.
-    torque = -human.mean("ankle_moment", phase) * body.mass * body.length_scale
+    torque = -human.mean("ankle_moment", phase) * body.total_mass * body.length_scale
     return schedule_from_curves(
         phase,
         human.toe_off,

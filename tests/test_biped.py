@@ -27,6 +27,27 @@ def walk(biped: Biped, seconds: float) -> list[Tick]:
     return ticks
 
 
+def test_under_a_load_the_floor_carries_body_and_load():
+    biped = Biped(BipedSettings(carried_ratio=0.3, leg_ratio=1.06, foot_ratio=0.93), 1)
+    ticks = walk(biped, 6.0)[200:]
+    up = np.mean([tick.measurement.force[0, :, :, 1].sum() for tick in ticks])
+    rate = [tick.measurement.com_velocity[0, 1] for tick in (ticks[0], ticks[-1])]
+    mass = 1.3 * 63.0
+    assert up == pytest.approx(mass * (GRAVITY + np.subtract(*rate[::-1]) / (0.01 * len(ticks))), rel=0.01)
+
+
+def test_bodies_of_a_batch_have_the_settings_proportions_and_scale_exactly():
+    built = {"leg_ratio": 1.05, "foot_ratio": 0.95, "carried_ratio": 0.2}
+    drawn, alone = Biped(settings_from(mass_range=(40, 120), **built), 1), Biped(settings_from(mass=100, **built), 1)
+    drawn.reset(np.arange(1), [3], given={"mass": np.array([100.0])})
+    alone.reset(np.arange(1), [3])
+    assert drawn.walkers.bodies == [alone.body] and alone.body.total_mass == pytest.approx(120.0)
+    for _ in range(50):
+        outcome = drawn.step(np.zeros((1, 4)))
+        np.testing.assert_allclose(outcome.observation, alone.step(np.zeros((1, 4))).observation, atol=1e-5)
+    assert not outcome.terminated.any()
+
+
 @pytest.fixture(scope="module")
 def walked() -> tuple[Biped, list[Tick]]:
     biped = Biped(BipedSettings(), 2)

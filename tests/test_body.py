@@ -36,6 +36,35 @@ def test_equal_froude_speed_means_speed_scales_with_root_of_length():
     assert Body(1.9).froude_speed(1.2 * math.sqrt(1.9 / 1.7)) == pytest.approx(Body().froude_speed(1.2))
 
 
+def test_proportions_move_lengths_and_all_of_them_add_up_to_the_height():
+    average = Body(1.8, 75.0)
+    head = 1.8 - average.leg_length - average.trunk_length  # above the shoulder, 0.182 of height (Winter)
+    for ratio in (0.94, 1.06):
+        legs, feet = Body(1.8, 75.0, leg_ratio=ratio), Body(1.8, 75.0, foot_ratio=ratio)
+        assert legs.leg_length + legs.trunk_length + head == pytest.approx(1.8, rel=1e-12)
+        assert legs.thigh_length / average.thigh_length == pytest.approx(ratio)
+        assert legs.foot_length == average.foot_length
+        assert feet.foot_length / average.foot_length == pytest.approx(ratio)
+        assert feet.leg_length == average.leg_length
+    assert Body(1.8, 75.0, carried_ratio=0.2).total_mass == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize(
+    ("proportion", "value", "allowed"),
+    [
+        ("leg_ratio", 0.93, r"\[0.94, 1.06\]"),
+        ("foot_ratio", 1.08, r"\[0.93, 1.07\]"),
+        ("carried_ratio", -0.1, r"\[0, 0.4\]"),
+        ("carried_ratio", 0.41, r"\[0, 0.4\]"),
+        ("leg_ratio", float("nan"), "leg_ratio"),
+    ],
+)
+def test_impossible_proportions_are_refused_with_one_line(proportion, value, allowed):
+    with pytest.raises(SpringfootError, match=f"{proportion}.*{allowed}" if "[" in allowed else allowed) as caught:
+        Body(**{proportion: value})
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("height", "mass", "word"),
     [

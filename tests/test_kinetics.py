@@ -94,16 +94,17 @@ def test_a_foot_that_would_have_to_pull_is_refused():
         share_forces(weight, com, np.nan, 0.3)
 
 
+@pytest.mark.parametrize("carried", [0.0, 0.3])
 @SLOPES
-def test_legs_of_a_plan_carry_its_trunk(cadence, speed, slope):
-    """Both hips' forces are what the trunk's mass needs: the plan, its forces and the segments agree."""
-    plan = plan_walk(Body(), speed, cadence, slope=slope)
+def test_legs_of_a_plan_carry_its_trunk_and_load(cadence, speed, slope, carried):
+    """Both hips' forces are what their mass needs: the plan, its forces and the segments agree."""
+    plan = plan_walk(Body(carried_ratio=carried), speed, cadence, slope=slope)
     body = plan.body
     hips, (motion, _) = 0.0, planned_leg(plan, PHASE)
     for shift in (0.0, 0.5):
         hips = hips + inverse_dynamics(body, *planned_leg(plan, PHASE + shift), slope).force["hip"]
     forward, up = np.moveaxis(motion.hip_acceleration, -1, 0)
-    needed = ground_reaction(body.trunk_mass, forward, up, slope)
+    needed = ground_reaction(body.trunk_mass + body.carried_mass, forward, up, slope)
     error = np.abs(hips + needed) / (body.mass * GRAVITY)
     assert np.sqrt(np.mean(error**2)) < 0.02
     # The leg stands where the plan has it.

@@ -16,17 +16,52 @@ from springfoot.envs.model import (
 )
 from springfoot.gait.body import GRAVITY, Body
 
-BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0)]
+BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0), Body(1.6, 70.0, 0.94, 1.07, 0.3)]
 
 
 @pytest.mark.parametrize("body", BODIES)
 def test_masses_and_lengths_are_the_bodys(body):
     model = build_model(body)
-    assert model.body_mass.sum() == pytest.approx(body.mass, rel=1e-12)
+    assert model.body_mass.sum() == pytest.approx(body.total_mass, rel=1e-12)
     for side in SIDES:
         assert model.body(f"toe_{side}").mass[0] == pytest.approx(body.toe_mass, rel=1e-12)
         assert model.body(f"thigh_{side}").inertia[1] == pytest.approx(body.thigh_inertia, rel=1e-12)
         assert -model.body(f"foot_{side}").pos[2] == pytest.approx(body.shank_length, rel=1e-12)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_standing_straight_the_com_is_the_bodys(body):
+    model = build_model(body)
+    data = mujoco.MjData(model)
+    data.joint("z").qpos = body.leg_length
+    mujoco.mj_forward(model, data)
+    forward, below = body.foot_com
+    leg = np.array(
+        [
+            [0.0, body.thigh_mass * (body.leg_length - body.thigh_com)],
+            [0.0, body.shank_mass * (body.leg_length - body.thigh_length - body.shank_com)],
+            [body.foot_mass * forward, body.foot_mass * (body.ankle_height - below)],
+            np.array([body.ankle_to_toe_joint + body.toe_com, body.toe_joint_height]) * body.toe_mass,
+        ]
+    ).sum(0)
+    trunk = body.trunk_mass * np.array([0.0, body.leg_length + body.trunk_com_above_hip])
+    behind, above = body.carried_com
+    load = body.carried_mass * np.array([behind, body.leg_length + above])
+    expected = (2 * leg + trunk + load) / body.total_mass
+    np.testing.assert_allclose(data.subtree_com[0][[0, 2]], expected, atol=1e-12)
+
+
+def test_leaning_under_a_load_the_com_of_trunk_and_load_is_over_the_hip():
+    body = Body(1.8, 75.0, carried_ratio=0.25)
+    model = build_model(body)
+    data = mujoco.MjData(model)
+    data.joint("pitch").qpos = body.trunk_lean
+    mujoco.mj_forward(model, data)
+    upper = [data.body(name) for name in ("trunk", "load")]
+    moment = sum(mass * segment.xipos for mass, segment in zip((body.trunk_mass, 0.25 * 75.0), upper, strict=True))
+    assert moment[0] == pytest.approx(0.0, abs=1e-12)
+    assert moment[2] == pytest.approx(np.hypot(*body.upper_moment), rel=1e-12)
+    assert 5 < np.degrees(body.trunk_lean) < 12 and Body().trunk_lean == 0
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -129,4 +164,4 @@ def test_at_rest_the_floor_carries_the_weight(body):
         mujoco.mj_step(model, data)
     assert np.abs(data.qacc).max() < 1e-3
     vertical = sum(data.sensor(f"force_{geom_name(contact, side)}").data[2] for side in SIDES for contact in CONTACTS)
-    assert vertical == pytest.approx(body.mass * GRAVITY, rel=1e-3)
+    assert vertical == pytest.approx(body.mass * (1 + body.carried_ratio) * GRAVITY, rel=1e-3)

@@ -11,8 +11,7 @@ from springfoot.gait import Body, SpringfootError
 
 
 def settings_of(name, **values):
-    body = {"height": 1.70, "mass": 63.0, "speed": 1.2} | values
-    return settings_from(**(own_settings(name, **body) | values))
+    return settings_from(**(own_settings(name, settings_from(**values)) | values))
 
 
 def started(settings, phases):

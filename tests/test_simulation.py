@@ -31,7 +31,7 @@ def started(num: int, threads: int = 1, body: Body | None = None) -> tuple[Simul
     return simulation, random
 
 
-@pytest.mark.parametrize("body", [Body(), Body(1.55, 90.0)])
+@pytest.mark.parametrize("body", [Body(), Body(1.55, 90.0), Body(1.7, 63.0, 1.06, 0.93, 0.3)])
 def test_kinematics_agree_with_mujoco(body):
     simulation, random = started(4, body=body)
     m = advance(simulation, random.uniform(5, 300, (4, *LEGS)), random.normal(size=(4, *LEGS)))
