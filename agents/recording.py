@@ -176,8 +176,13 @@ def record_each(
 ) -> list[Recording]:
     """As `record`, one episode for each of E bodies and speeds, side by side; a recording each, with its own settings.
 
-    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from.
+    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from. Raises
+    `SpringfootError` for settings whose commanded speed changes within an episode.
     """
+    if settings.speed_interval is not None:
+        raise SpringfootError(
+            f"a recording is at one speed: speed_interval must be None, got {settings.speed_interval}"
+        )
     columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
     given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
     ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, None, progress)
