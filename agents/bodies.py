@@ -113,7 +113,7 @@ def pairs_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 def pairs_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst."""
     fallen = [row for row in rows if row["fall"]]
-    lines = [("falls", f"{len(fallen)} of {len(rows)}", "", "", "")]
+    lines: list[tuple[str, ...]] = [("falls", f"{len(fallen)} of {len(rows)}", "", "", "")]
     for label, column, pattern, badness in QUANTITIES:
         standing = [row for row in rows if not row["fall"] and row[column] is not None]
         standing.sort(key=lambda row, column=column, badness=badness: badness(row[column]))
