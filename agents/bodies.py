@@ -18,10 +18,9 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from springfoot.envs.settings import BipedSettings, reference_gait
+from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.envs.walkers import DRAWN, Walkers
 from springfoot.envs.walks import tabulated_speeds
-from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError, require_count
 
 from .bundle import write_atomically
@@ -89,7 +88,7 @@ def _row(recording: Recording) -> dict[str, Any]:
         "height_m": settings.height,
         "mass_kg": settings.mass,
         "speed_m_s": settings.speed,
-        "froude_speed": Body(settings.height, settings.mass).froude_speed(settings.speed),
+        "froude_speed": body_of(settings).froude_speed(settings.speed),
         "people_clamped": int(reference_gait(settings).clamped),
         "seconds": metrics["seconds_mean"],
         "fall": str(recording.fall_reason[0]),
