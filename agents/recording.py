@@ -26,8 +26,9 @@ from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
 _WHO = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed")
-_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval")
-CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, "push_newton", "start_noise")}
+_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg", "stiffness_delay_range_s")
+_WORLD = ("push_newton", "friction", "slope_deg", "unevenness_m", "sensor_noise", "stiffness_delay_s")
+CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, *_WORLD, "start_noise")}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -147,10 +148,12 @@ def record(
         model: the body's with other options, as for `envs.simulation.Simulation`.
         progress: told the simulated time [s] of all episodes together after every step.
 
-    Raises `SpringfootError` for settings that draw bodies or speeds.
+    Raises `SpringfootError` for settings that draw what may differ between episodes.
     """
     if any(getattr(settings, name) is not None for name in _RANGES):
-        raise SpringfootError(f"a recording is of one body at one speed: {', '.join(_RANGES)} must be None")
+        raise SpringfootError(
+            f"a recording is of one body at one speed in one world: {', '.join(_RANGES)} must be None"
+        )
     ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, model, progress)
     return Recording(
         policy=name,

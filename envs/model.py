@@ -42,16 +42,24 @@ HEEL_RADIUS = 0.04
 SOLE_RADIUS = 0.02
 """Radius [m] of the contact spheres at the ball and the toe tip at 1.70 m: the toe joint's height above the sole."""
 FRICTION = 1.0
+"""Coefficient of Coulomb friction between foot and ground; rubber soles on dry floors have 0.6 to 1.2."""
 HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
 """Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
 SOLE_CONTACT = {"solref": (0.025, 1.0), "solimp": (0.9, 0.95, 0.003)}
 
+_CONTACT_BIT = {"left": 1, "right": 2}
+"""Each foot stands on its own ground."""
 _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
 
 
 def geom_name(contact: str, side: str) -> str:
     """Name of a foot's contact sphere."""
     return f"{contact}_{side}"
+
+
+def ground_name(side: str) -> str:
+    """Name of the ground below a foot: a plane, moved from outside (mocap)."""
+    return f"ground_{side}"
 
 
 def damping_times(body: Body) -> np.ndarray:
@@ -82,8 +90,11 @@ def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
     }
 
 
-def build_spec(body: Body) -> mujoco.MjSpec:
-    """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors."""
+def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
+    """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors.
+
+    Either foot has a ground of its own, a plane that is moved from outside (mocap).
+    """
     length, mass = body.length_scale, body.mass_scale
     spec = mujoco.MjSpec()
     spec.modelname = "springfoot"
@@ -119,15 +130,6 @@ def build_spec(body: Body) -> mujoco.MjSpec:
 
     world = spec.worldbody
     world.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
-    world.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=(0, 0, 1),
-        material="tiles",
-        contype=0,
-        conaffinity=1,
-        friction=(FRICTION, 0.005, 0.0001),
-    )
     trunk = _segment(world, "trunk", (0, 0, 0), body.trunk_mass, (0, body.trunk_com_above_hip), body.trunk_inertia)
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
     for name, kind, axis in zip(ROOT, (slide, slide, hinge), ((1, 0, 0), (0, 0, 1), (0, 1, 0)), strict=True):
@@ -144,6 +146,16 @@ def build_spec(body: Body) -> mujoco.MjSpec:
     for index, side in enumerate(SIDES):
         _leg(spec, trunk, body, side, hip_y=(0.09 if index == LEFT else -0.09) * length)
     for side in SIDES:
+        ground = world.add_body(name=ground_name(side), mocap=True)
+        ground.add_geom(
+            name=ground_name(side),
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=(0, 0, 1),
+            material="tiles",
+            contype=0,
+            conaffinity=_CONTACT_BIT[side],
+        )
+    for side in SIDES:
         for index, joint in enumerate(JOINTS):
             _add_spring(spec, f"{joint}_{side}", float(damping_times(body)[index]))
     for side in SIDES:
@@ -152,7 +164,7 @@ def build_spec(body: Body) -> mujoco.MjSpec:
                 name=f"force_{geom_name(contact, side)}",
                 type=mujoco.mjtSensor.mjSENS_CONTACT,
                 objtype=mujoco.mjtObj.mjOBJ_GEOM,
-                objname="floor",
+                objname=ground_name(side),
                 reftype=mujoco.mjtObj.mjOBJ_GEOM,
                 refname=geom_name(contact, side),
                 intprm=(
@@ -161,14 +173,16 @@ def build_spec(body: Body) -> mujoco.MjSpec:
                     1,
                 ),  # force only; net force; one slot
             )
+    for geom in spec.geoms:
+        geom.friction[0] = friction  # of both: MuJoCo takes the larger, or that of the geom with priority
     spec.stat.extent = 2.0 * length
     spec.stat.meanmass = mass
     return spec
 
 
-def build_model(body: Body) -> mujoco.MjModel:
+def build_model(body: Body, friction: float = FRICTION) -> mujoco.MjModel:
     """The compiled model of `body`."""
-    return build_spec(body).compile()
+    return build_spec(body, friction).compile()
 
 
 def _load(trunk, body: Body) -> None:
@@ -276,10 +290,9 @@ def _sphere(segment, name: str, offset: tuple[float, float, float], contact: dic
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         pos=(forward, 0, up),
         size=(radius, 0, 0),
-        contype=1,
+        contype=_CONTACT_BIT[name.rsplit("_", 1)[1]],
         conaffinity=0,
         priority=priority,
-        friction=(FRICTION, 0.005, 0.0001),
         solref=(time * sqrt(body.length_scale), ratio),
         solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),
         rgba=(0.85, 0.55, 0.25, 1.0),
