@@ -10,7 +10,7 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from springfoot.agents.command import exit_code
+from springfoot.agents.command import exit_code, next_free, policy_label
 from springfoot.agents.config import SettingsFlags, given
 from springfoot.gait.errors import SpringfootError, require_count
 
@@ -82,22 +82,6 @@ def run(flags: Flags) -> None:
         shutil.rmtree(part, ignore_errors=True)
     report.print_table(gait.metrics)
     print(f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif)")
-
-
-def policy_label(name: str) -> str:
-    """What a policy is called in results: its name, its run's, or its file's; without folders."""
-    path = Path(name)
-    if path.suffix != ".safetensors":
-        return path.resolve().name.replace(":", "-").replace(",", "-")
-    return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem
-
-
-def next_free(folder: Path, stem: str) -> Path:
-    """`folder`/`stem`-N with the first N from 1 on that is free."""
-    number = 1
-    while (path := folder / f"{stem}-{number}").exists():
-        number += 1
-    return path
 
 
 if __name__ == "__main__":

@@ -36,7 +36,8 @@ BEST, LAST = "best.safetensors", "last.safetensors"
 
 _MODEL_NUMBERS = (
     *("body_mass", "body_inertia", "body_pos", "body_ipos", "jnt_range", "jnt_actfrcrange", "dof_damping"),
-    *("dof_armature", "geom_size", "geom_pos", "geom_friction", "geom_solref", "geom_solimp", "actuator_gainprm"),
+    *("dof_armature", "geom_size", "geom_pos", "pair_friction", "pair_solref", "pair_solreffriction", "pair_solimp"),
+    "actuator_gainprm",
 )
 
 

@@ -1,7 +1,8 @@
-"""What every command line does around its work: one line for bad input, and an exit code."""
+"""What every command line does around its work: one line for bad input, an exit code, names of results."""
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 from springfoot.gait.errors import SpringfootError
 
@@ -21,3 +22,19 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+
+
+def policy_label(name: str) -> str:
+    """What a policy is called in results: its name, its run's, or its file's; without folders."""
+    path = Path(name)
+    if path.suffix != ".safetensors":
+        return path.resolve().name.replace(":", "-").replace(",", "-")
+    return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem
+
+
+def next_free(folder: Path, stem: str) -> Path:
+    """`folder`/`stem`-N with the first N from 1 on that is free."""
+    number = 1
+    while (path := folder / f"{stem}-{number}").exists():
+        number += 1
+    return path

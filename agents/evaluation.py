@@ -120,7 +120,7 @@ class Gait:
     both: Curves = field(default_factory=lambda: Curves(names=CURVES))
     """Curves over the stride of both feet."""
     com: Curves = field(default_factory=lambda: Curves(names=("x", "z", "vx")))
-    """CoM over the step: x from the ankle of the foot whose stance began last, z above the floor [m], vx [m/s]."""
+    """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
 
 
 def measure(recording: Recording) -> Gait:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from springfoot.envs.actuation import FEET
 from springfoot.envs.biped import Biped, Tick
+from springfoot.envs.constants import LegConstants
 from springfoot.envs.model import CONTACTS, JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.walkers import DRAWN
@@ -26,8 +27,9 @@ from .bundle import load_policy
 from .schedules import BASELINES, Policy, baseline, own_settings
 
 _WHO = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed")
-_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval")
-CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, "push_newton", "start_noise")}
+_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg", "stiffness_delay_range_s")
+_WORLD = ("push_newton", "friction", "slope_deg", "unevenness_m", "sensor_noise", "stiffness_delay_s")
+CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, *_WORLD, "start_noise")}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -133,6 +135,7 @@ def record(
     seed: int = 0,
     threads: int = 2,
     model: mujoco.MjModel | None = None,
+    legs: LegConstants | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> Recording:
     """Run `episodes` episodes of `settings.episode_seconds` each, episode i seeded with `seed` + i.
@@ -145,13 +148,16 @@ def record(
         seed: of the first.
         threads: of the physics; any number gives the same bits.
         model: the body's with other options, as for `envs.simulation.Simulation`.
+        legs: leg constants in place of the committed ones.
         progress: told the simulated time [s] of all episodes together after every step.
 
-    Raises `SpringfootError` for settings that draw bodies or speeds.
+    Raises `SpringfootError` for settings that draw what may differ between episodes.
     """
     if any(getattr(settings, name) is not None for name in _RANGES):
-        raise SpringfootError(f"a recording is of one body at one speed: {', '.join(_RANGES)} must be None")
-    ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, model, progress)
+        raise SpringfootError(
+            f"a recording is of one body at one speed in one world: {', '.join(_RANGES)} must be None"
+        )
+    ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, (model, legs), progress)
     return Recording(
         policy=name,
         settings=settings,
@@ -176,11 +182,16 @@ def record_each(
 ) -> list[Recording]:
     """As `record`, one episode for each of E bodies and speeds, side by side; a recording each, with its own settings.
 
-    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from.
+    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from. Raises
+    `SpringfootError` for settings whose commanded speed changes within an episode.
     """
+    if settings.speed_interval is not None:
+        raise SpringfootError(
+            f"a recording is at one speed: speed_interval must be None, got {settings.speed_interval}"
+        )
     columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
     given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
-    ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, None, progress)
+    ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, (None, None), progress)
     recordings = []
     for index in range(episodes):
         own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(_RANGES)
@@ -207,10 +218,12 @@ def _walk(
     episodes: int,
     seed: int,
     threads: int,
-    model: mujoco.MjModel | None,
+    other: tuple[mujoco.MjModel | None, LegConstants | None],
     progress: Callable[[float], object],
 ) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
-    """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`."""
+    """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`; `other`
+    model and leg constants as in `record`."""
+    model, legs = other
     step = settings.step_seconds
     length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
@@ -219,7 +232,7 @@ def _walk(
     for first in range(0, episodes, BATCH):
         rows = slice(first, min(first + BATCH, episodes))
         count = rows.stop - first
-        biped = Biped(settings, num_envs=count, num_threads=threads, model=model)
+        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs])
         biped.reset(
             np.arange(count), [seed + first + i for i in range(count)], None, {k: v[rows] for k, v in given.items()}
         )

@@ -44,17 +44,24 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
     out = require_new(out)
     Biped(config.environment, 1)  # refuses what cannot be walked, before anything is written
     make_folder(out)
-    configs = [replace(config, seed=config.seed + k, threads=1) for k in range(seeds)]
-    at_once = min(seeds, processors())
-    with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
-        print(f"{seeds} seeds, {at_once} at a time, one thread each", file=sys.stderr, flush=True)
-        rows = list(pool.map(lambda each: trainings.run(each, out / f"seed-{each.seed}"), configs))
-    status = "interrupted" if trainings.stopping else "finished"
-    if any(row["status"] == "failed" for row in rows):
-        status = "failed"
+    configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
+    rows, status = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
     record = {"config": config_to_json(config), "status": status, "seeds": rows, "spread": spread(rows)}
     write_atomically(out / SEEDS, (json.dumps(record, indent=2) + "\n").encode())
     return record
+
+
+def train_all(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> tuple[list[dict[str, Any]], str]:
+    """Trains each configuration into its new folder, its messages marked with its name, as `train_seeds` does.
+
+    Returns what each came to, and `finished`, `failed` or `interrupted`.
+    """
+    at_once = min(max(len(jobs), 1), processors())
+    with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
+        print(f"{len(jobs)} seeds, {at_once} at a time, one thread each", file=sys.stderr, flush=True)
+        rows = list(pool.map(lambda job: trainings.run(*job), jobs))
+    status = "interrupted" if trainings.stopping else "finished"
+    return rows, "failed" if any(row["status"] == "failed" for row in rows) else status
 
 
 def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
@@ -97,8 +104,9 @@ class _Trainings:
         self._running: list[subprocess.Popen[str]] = []
         self._before: dict[int, Any] = {}
 
-    def run(self, config: TrainingConfig, folder: Path) -> dict[str, Any]:
-        """Trains in a process of its own, whose messages appear here with the seed before them; a row of the report."""
+    def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
+        """Trains in a process of its own, whose messages appear here with `name` before them; a row of the report."""
+        config = replace(config, threads=1)
         command = [sys.executable, "-m", __name__, str(folder), json.dumps(config_to_json(config))]
         _block(True)  # also in the process, until it has its imports behind it; this thread waits only
         with self._lock:
@@ -117,7 +125,7 @@ class _Trainings:
         with process:
             assert process.stderr is not None
             for line in process.stderr:
-                print(f"seed {config.seed}: {line}", end="", file=sys.stderr, flush=True)
+                print(f"{name}: {line}", end="", file=sys.stderr, flush=True)
         with self._lock:
             self._running.remove(process)
         return _row(config, folder, "interrupted" if self.stopping else "failed")

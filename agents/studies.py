@@ -3,6 +3,7 @@
     python -m springfoot.agents.studies best-constant
     python -m springfoot.agents.studies compare --constant 300 40
     python -m springfoot.agents.studies seeds runs/seed-1 runs/seed-2 runs/seed-3
+    python -m springfoot.agents.studies bodies pretrained
 
 Every row is one recording, measured as by `evaluate.py`. What is compared shares its seeds, hence starts and pushes,
 and its reward: that of the policy which the others are held against.
@@ -25,9 +26,11 @@ from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 
+from .bodies import JOINTS, Bodies
 from .command import exit_code
 from .config import SettingsFlags, given, optional_flags
 from .evaluation import measure
+from .page import table, text_of
 from .recording import prepare, record
 from .schedules import BASELINES, Policy, constant, own_settings
 
@@ -41,9 +44,6 @@ REFINEMENTS = 3
 """Times the search then halves its spacing around the best so far."""
 SEARCH_SEED = 100_000
 """Of the search's first episode: far from a comparison's, so that the best constant is not fitted to its starts."""
-JOINTS = ("thigh", "knee", "ankle")
-"""Whose angles are compared; people's toe is that of other people."""
-MISSING = "–"
 
 PushedFlags = optional_flags("PushedFlags", BipedSettings, PUSHED)
 
@@ -154,14 +154,14 @@ def comparison_table(rows: Sequence[Row]) -> str:
     lines = [[*head, f"return against {first.name}"]]
     for row in rows:
         m, (low, high) = row.metrics, row.interval
-        rmse = " / ".join(_text(m["joints"][joint]["rmse_deg"], ".1f") for joint in JOINTS)
-        peaks = " / ".join(_text(m["grf"][f"vertical_peak{peak}_bw"], ".2f") for peak in (1, 2))
-        falls, speed = f"{m['falls']} of {m['episodes']}", _text(m["speed_m_s"]["mean"], ".3f")
+        rmse = " / ".join(text_of(m["joints"][joint]["rmse_deg"], ".1f") for joint in JOINTS)
+        peaks = " / ".join(text_of(m["grf"][f"vertical_peak{peak}_bw"], ".2f") for peak in (1, 2))
+        falls, speed = f"{m['falls']} of {m['episodes']}", text_of(m["speed_m_s"]["mean"], ".3f")
         returns = f"{row.returns.mean():.1f} [{low:.1f}, {high:.1f}]"
         lines.append(
             [f"`{row.name}`", falls, returns, speed, rmse, peaks, "" if row is first else _against(row, first)]
         )
-    return _markdown(lines)
+    return table(lines[0], lines[1:])
 
 
 def verdict(rows: Sequence[Row]) -> str:
@@ -186,9 +186,9 @@ def seeds_table(rows: Sequence[Row]) -> str:
         values: list[Any] = [reduce(getitem, keys, row.metrics) for row in rows]
         spread = mean_sd(values) if None not in values else {"mean": None, "sd": None}
         fine = ".1f" if pattern == "d" else pattern
-        mean, sd = (_text(spread[key], fine) for key in ("mean", "sd"))
-        lines.append([label, *(_text(value, pattern) for value in values), f"{mean} ± {sd}"])
-    return _markdown(lines)
+        mean, sd = (text_of(spread[key], fine) for key in ("mean", "sd"))
+        lines.append([label, *(text_of(value, pattern) for value in values), f"{mean} ± {sd}"])
+    return table(lines[0], lines[1:])
 
 
 _QUANTITIES = (
@@ -213,16 +213,6 @@ def _against(row: Row, first: Row) -> str:
     if high < first_low:
         return "lower, intervals apart"
     return "higher, intervals apart" if low > first_high else "intervals overlap"
-
-
-def _markdown(lines: list[list[str]]) -> str:
-    head, *body = lines
-    rule = ["---"] * len(head)
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, rule, *body))
-
-
-def _text(value: float | None, pattern: str) -> str:
-    return MISSING if value is None else format(value, pattern)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -332,7 +322,7 @@ def _what_ran(study: _Study, row: Row) -> str:
 
 def main() -> int:
     """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(BestConstant | Compare | Seeds, prog="springfoot.agents.studies")
+    flags = tyro.cli(BestConstant | Compare | Seeds | Bodies, prog="springfoot.agents.studies")
     return exit_code("studies", flags.run)
 
 

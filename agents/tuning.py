@@ -65,7 +65,13 @@ FALL_COST = 30.0
 further costs proportionally less, down to a third."""
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
 """One unit of the search: degrees of a knot, relative change of a gain."""
-ADDITIVE_STEP = {"trunk_pitch_deg": 1.0, "swing_speed_gain": 0.05, "speed_torque": 15.0, "period_speed_gain": 0.03}
+ADDITIVE_STEP = {
+    "toe_flat_deg": 3.0,
+    "trunk_pitch_deg": 1.0,
+    "swing_speed_gain": 0.05,
+    "speed_torque": 15.0,
+    "period_speed_gain": 0.03,
+}
 """One unit of the search for constants that may change sign or vanish, in their own units."""
 
 

@@ -75,8 +75,6 @@ ROWS: dict[str, Edit] = {
     "5 ms": _timestep(2),
     "search for islands": _flag(_DISABLE.mjDSBL_ISLAND, False),
     "pyramidal cone": _option(cone=int(mujoco.mjtCone.mjCONE_PYRAMIDAL)),
-    "friction ratio 1": _option(impratio=1.0),
-    "friction ratio 100": _option(impratio=100.0),
     "solver CG": _option(solver=int(_SOLVER.mjSOL_CG)),
     "solver PGS": _option(solver=int(_SOLVER.mjSOL_PGS)),
     "at most 5 solver iterations": _option(iterations=5),

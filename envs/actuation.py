@@ -15,7 +15,8 @@ from springfoot.gait.stiffness import ankle_events, toe_events
 from .kernel import kernel
 from .model import ANKLE
 from .phase import GRID, PhaseTable
-from .settings import BipedSettings
+from .settings import LONGEST_DELAY, BipedSettings
+from .simulation import WINDOW
 from .walkers import Walkers
 
 FEET = slice(ANKLE, None)
@@ -115,10 +116,14 @@ class FootSprings:
         """(N, side, 2) work put in by moving the rest angle since then [J]; changed in place."""
         self._fresh = np.ones(num, bool)
         self._everyone = np.ones(num, bool)
+        self._delay = np.zeros(num, int)
+        self._commands = np.zeros((num, 1 + round(LONGEST_DELAY / WINDOW), 2, 2))  # in the last windows, newest first
 
-    def reset(self, ids: NDArray) -> None:
-        """The next change of springs `ids` costs no work."""
+    def reset(self, ids: NDArray, delay: NDArray | int = 0) -> None:
+        """The next change of springs `ids` (K,) costs no work and acts at once, as if commanded long before; later ones
+        act `delay` (K,) control windows after they were commanded."""
         self._fresh[ids] = True
+        self._delay[ids] = delay
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
@@ -127,9 +132,10 @@ class FootSprings:
     def set_stiffness(
         self, action: NDArray, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None
     ) -> None:
-        """Take new stiffness from an action (N, 4) at joint angles (N, side, joint).
+        """Command new stiffness by an action (N, 4), to act after the delay.
 
-        Changing K under a deflection x puts 1/2 (K' - K) x^2 into the spring. Without `running` (N,), all change.
+        Changing K under a deflection x, that of joint angles (N, side, joint), puts 1/2 (K' - K) x^2 into the spring.
+        Without `running` (N,), all change.
         """
         action = action.reshape(self.stiffness.shape)
         if self._residual:
@@ -140,23 +146,22 @@ class FootSprings:
                 middle = middle.copy()
                 middle[..., self._fixed] = self._schedule.at(leg_phase, self._walkers.place)[..., self._fixed]
         running = self._everyone if running is None else running
+        state = self._fresh, running, self._delay, self._commands, self.stiffness
         works = self.work_stiffness, self.work_equilibrium
-        _stiffen(
-            middle, factor, self._walkers.scale, angle, self.equilibrium, self._fresh, running, self.stiffness, *works
-        )
+        _stiffen(middle, factor, self._walkers.scale, angle, self.equilibrium, *state, *works)
 
     def move_equilibrium(
         self, leg_phase: NDArray, angle: NDArray, control: NDArray, running: NDArray | None = None
     ) -> None:
-        """Take the rest angles of the legs' phases, and put K and K theta_eq into `control` (N, side, joint, 2).
+        """Let a control window begin: take the rest angles of the legs' phases, and the stiffness whose delay is over,
+        and put K and K theta_eq into `control` (N, side, joint, 2).
 
         Moving the rest angle from deflection x to x' puts 1/2 K (x'^2 - x^2) into the spring.
         """
         equilibrium = self._equilibrium.at(leg_phase, self._walkers.place)
         running = self._everyone if running is None else running
-        _move(
-            equilibrium, angle, self._fresh, running, self.stiffness, self.equilibrium, self.work_equilibrium, control
-        )
+        state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
+        _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)
 
 
 @kernel
@@ -182,7 +187,20 @@ def _take(running, decided, events, phase, stage, last_action, action):
 
 
 @kernel
-def _stiffen(middle, factor, scale, angle, equilibrium, fresh, running, stiffness, work_stiffness, work_equilibrium):
+def _stiffen(
+    middle,
+    factor,
+    scale,
+    angle,
+    equilibrium,
+    fresh,
+    running,
+    delay,
+    commands,
+    stiffness,
+    work_stiffness,
+    work_equilibrium,
+):
     for i in range(len(stiffness)):
         for side in range(2):
             for joint in range(2):
@@ -191,14 +209,22 @@ def _stiffen(middle, factor, scale, angle, equilibrium, fresh, running, stiffnes
                     before = stiffness[i, side, joint]
                     after = middle[i, side, joint] * scale[i].torque * factor[i, side, joint]
                     deflection = equilibrium[i, side, joint] - angle[i, side, ANKLE + joint]
-                    stiffness[i, side, joint] = after
-                    if not fresh[i]:
+                    commands[i, 0, side, joint] = after
+                    if fresh[i]:
+                        commands[i, :, side, joint] = after
+                    if fresh[i] or delay[i] == 0:
+                        stiffness[i, side, joint] = after
+                    if not fresh[i] and delay[i] == 0:
                         work_stiffness[i, side, joint] = 0.5 * (after - before) * deflection**2
 
 
 @kernel
-def _move(wanted, angle, fresh, running, stiffness, equilibrium, work, control):
+def _move(
+    wanted, angle, fresh, running, delay, commands, stiffness, equilibrium, work_stiffness, work_equilibrium, control
+):
     for i in range(len(equilibrium)):
+        if running[i] and delay[i] > 0:
+            _arrive(delay[i], angle[i], equilibrium[i], commands[i], stiffness[i], work_stiffness[i])
         for side in range(2):
             for joint in range(2):
                 k, theta = stiffness[i, side, joint], angle[i, side, ANKLE + joint]
@@ -206,7 +232,20 @@ def _move(wanted, angle, fresh, running, stiffness, equilibrium, work, control):
                     before, after = equilibrium[i, side, joint] - theta, wanted[i, side, joint] - theta
                     equilibrium[i, side, joint] = wanted[i, side, joint]
                     if not fresh[i]:
-                        work[i, side, joint] += 0.5 * k * (after * after - before * before)
+                        work_equilibrium[i, side, joint] += 0.5 * k * (after * after - before * before)
                 control[i, side, ANKLE + joint, 0] = k
                 control[i, side, ANKLE + joint, 1] = k * equilibrium[i, side, joint]
         fresh[i] = fresh[i] and not running[i]
+
+
+@kernel
+def _arrive(delay, angle, equilibrium, commands, stiffness, work):
+    """The command of `delay` windows ago acts; then a window passes."""
+    for side in range(2):
+        for joint in range(2):
+            before, after = stiffness[side, joint], commands[delay, side, joint]
+            deflection = equilibrium[side, joint] - angle[side, ANKLE + joint]
+            stiffness[side, joint] = after
+            work[side, joint] += 0.5 * (after - before) * deflection**2
+            for past in range(len(commands) - 1, 0, -1):
+                commands[past, side, joint] = commands[past - 1, side, joint]

@@ -28,6 +28,7 @@ from .start import place, random_phase, start_table
 from .task import ALIVE, Task
 from .walkers import Walkers
 from .walks import rows, walks_of
+from .world import World
 
 WINDOWS = round(STEP_SECONDS / WINDOW)
 """Control windows in one step of the default 20 ms."""
@@ -100,7 +101,8 @@ class Biped:
         self._start = start_table(table)
         self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
-        self._simulation = Simulation(self.body, num_envs, num_threads, model)
+        self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
+        self._world = World(settings, self._simulation)
         self._task = Task(settings, table, self.walkers)
         self.observation_names = self._task.names
         self.observation_low, self.observation_high = self._task.low, self._task.high
@@ -174,7 +176,8 @@ class Biped:
             randoms.append(random)
         self._fit(self.walkers.reset(ids, randoms, given))
         self._legs.reset(ids, phase)
-        self._springs.reset(ids)
+        self._world.reset(ids, randoms, self._legs.phase)
+        self._springs.reset(ids, self._world.delay[ids])
         self._decisions.reset(ids)
         self._steps[ids] = 0
         self._last_action[ids] = 0.0
@@ -193,7 +196,7 @@ class Biped:
 
     def observe(self) -> NDArray:
         """(N, D) float32 observation of the present."""
-        return self._task.observe(self._now, self._legs.phase, self._last_action, self._force)
+        return self._world.seen(self._task.observe(self._now, self._legs.phase, self._last_action, self._force))
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> Outcome:
         """Apply actions (N, 4) for a step; environments not in the mask `active` (N,) stand still, reward 0."""
@@ -216,8 +219,9 @@ class Biped:
         reward = self._task.reward(terms)
         terminated, truncated, termination = self._end(running, terms, reward)
         self._last_action = action
+        self._world.sense(self._random, running)
         return Outcome(
-            observation=self._task.observe(self._now, phase, action, self._force, curves),
+            observation=self._world.seen(self._task.observe(self._now, phase, action, self._force, curves)),
             reward=reward,
             terminated=terminated,
             truncated=truncated,
@@ -261,6 +265,7 @@ class Biped:
         legs.command(m, control)
         self._now = self._simulation.advance(ids)
         legs.advance(self._now, running)
+        self._world.advance(self._now, legs.phase, self._random)
         if self.on_tick is not None and phase is not None:
             self.on_tick(self._tick(phase, running))
 

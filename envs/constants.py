@@ -49,6 +49,8 @@ class LegConstants:
     """Swing-hip target for each m/s too fast (foot placement) [rad s/m]."""
     neutral_deg: tuple[float, float]
     """Constant ankle and toe angle of `equilibrium="neutral"` [deg]."""
+    toe_flat_deg: float
+    """Angle at which the toe rests from foot flat to toe-off in the planned equilibrium: down, it presses [deg]."""
     ankle_schedule: tuple[float, float, float, float, float]
     """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
     toe_schedule: float

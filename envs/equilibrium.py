@@ -56,19 +56,19 @@ def planned(constants: LegConstants, walk: Walk) -> NDArray:
     """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds a moment forward through K_ref.
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots: on the plan, K = K_ref gives a times the walk's moment M
-    (plantarflexion positive). The toe rests at 0 from foot flat to toe-off and 10 deg up otherwise.
+    (plantarflexion positive). The toe rests at the tuned angle from foot flat to toe-off and 10 deg up otherwise.
     """
     body, human = walk.body, walk.human
     beta, period = damping_times(body)[ANKLE], constants.period_factor * walk.plan.stride_time
     quasi = plateau_curve(REFERENCE_STIFFNESS) * body.stiffness_scale
     lead = beta * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
     ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
-    return np.stack([ankle, _toe()], axis=-1)
+    return np.stack([ankle, _toe(constants.toe_flat_deg)], axis=-1)
 
 
 def angle(human: HumanGait) -> NDArray:
     """(SAMPLES, 2) equilibrium [rad]: people's ankle angle alone, and the planned toe."""
-    return np.stack([human.mean("ankle", GRID), _toe()], axis=-1)
+    return np.stack([human.mean("ankle", GRID), _toe(0.0)], axis=-1)
 
 
 def neutral(constants: LegConstants) -> NDArray:
@@ -76,6 +76,6 @@ def neutral(constants: LegConstants) -> NDArray:
     return np.tile(np.deg2rad(constants.neutral_deg), (len(GRID), 1))
 
 
-def _toe() -> NDArray:
+def _toe(flat_deg: float) -> NDArray:
     corners = [*FOOT_FLAT, *TOE_OFF]
-    return np.deg2rad(TOE_SWING_DEG) * np.interp(GRID, corners, [1.0, 0.0, 0.0, 1.0])
+    return np.deg2rad(np.interp(GRID, corners, [TOE_SWING_DEG, flat_deg, flat_deg, TOE_SWING_DEG]))

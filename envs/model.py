@@ -44,8 +44,10 @@ BALL_RADIUS, TOE_RADIUS = 0.02, 0.012
 """Radius [m] of the contact spheres at 1.70 m: the ball's is the toe joint's height above the sole, and its sphere sits
 on that joint as part of the toe, so that heel-off neither rolls it nor drags the toe along the floor."""
 FRICTION = 1.0
-FRICTION_RATIO = 10.0
-"""Impedance of friction against that of the normal force: loaded feet creep less (docs/physics.md)."""
+"""Coefficient of Coulomb friction between foot and ground; rubber soles on dry floors have 0.6 to 1.2."""
+FRICTION_TIME = 0.004
+"""Time constant [s] in which sliding is stopped. MuJoCo leaves the change of the contact's Jacobian out of its
+constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms (docs/physics.md)."""
 HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
 """Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
 SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}
@@ -56,6 +58,11 @@ _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y 
 def geom_name(contact: str, side: str) -> str:
     """Name of a foot's contact sphere."""
     return f"{contact}_{side}"
+
+
+def ground_name(side: str) -> str:
+    """Name of the ground below a foot: a plane, moved from outside (mocap)."""
+    return f"ground_{side}"
 
 
 def damping_times(body: Body) -> np.ndarray:
@@ -97,8 +104,11 @@ def contact_material(body: Body, contact: NDArray, root: NDArray, angle: NDArray
     return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
-def build_spec(body: Body) -> mujoco.MjSpec:
-    """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors."""
+def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
+    """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors.
+
+    Either foot has a ground of its own, a plane that is moved from outside (mocap).
+    """
     length, mass = body.length_scale, body.mass_scale
     spec = mujoco.MjSpec()
     spec.modelname = "springfoot"
@@ -106,7 +116,6 @@ def build_spec(body: Body) -> mujoco.MjSpec:
     spec.option.gravity = (0.0, 0.0, -GRAVITY)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = FRICTION_RATIO
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     # Islands of constraints and boxes around few spheres: looking for them costs 11 % of a step and finds nothing.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
@@ -135,15 +144,6 @@ def build_spec(body: Body) -> mujoco.MjSpec:
 
     world = spec.worldbody
     world.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
-    world.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=(0, 0, 1),
-        material="tiles",
-        contype=0,
-        conaffinity=1,
-        friction=(FRICTION, 0.005, 0.0001),
-    )
     trunk = _segment(world, "trunk", (0, 0, 0), body.trunk_mass, (0, body.trunk_com_above_hip), body.trunk_inertia)
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
     for name, kind, axis in zip(ROOT, (slide, slide, hinge), ((1, 0, 0), (0, 0, 1), (0, 1, 0)), strict=True):
@@ -160,6 +160,18 @@ def build_spec(body: Body) -> mujoco.MjSpec:
     for index, side in enumerate(SIDES):
         _leg(spec, trunk, body, side, hip_y=(0.09 if index == LEFT else -0.09) * length)
     for side in SIDES:
+        ground = world.add_body(name=ground_name(side), mocap=True)
+        ground.add_geom(
+            name=ground_name(side),
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=(0, 0, 1),
+            material="tiles",
+            contype=0,
+            conaffinity=0,
+        )
+        for contact in CONTACTS:
+            _touch(spec, contact, side, body, friction)
+    for side in SIDES:
         for index, joint in enumerate(JOINTS):
             _add_spring(spec, f"{joint}_{side}", float(damping_times(body)[index]))
     for side in SIDES:
@@ -168,7 +180,7 @@ def build_spec(body: Body) -> mujoco.MjSpec:
                 name=f"force_{geom_name(contact, side)}",
                 type=mujoco.mjtSensor.mjSENS_CONTACT,
                 objtype=mujoco.mjtObj.mjOBJ_GEOM,
-                objname="floor",
+                objname=ground_name(side),
                 reftype=mujoco.mjtObj.mjOBJ_GEOM,
                 refname=geom_name(contact, side),
                 intprm=(
@@ -182,9 +194,9 @@ def build_spec(body: Body) -> mujoco.MjSpec:
     return spec
 
 
-def build_model(body: Body) -> mujoco.MjModel:
+def build_model(body: Body, friction: float = FRICTION) -> mujoco.MjModel:
     """The compiled model of `body`."""
-    return build_spec(body).compile()
+    return build_spec(body, friction).compile()
 
 
 def _load(trunk, body: Body) -> None:
@@ -249,9 +261,9 @@ def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> Non
         body,
     )
     offsets = contact_offsets(body)
-    _sphere(foot, geom_name("heel", side), offsets["heel"], HEEL_CONTACT, body, priority=1)
-    _sphere(toe, geom_name("ball", side), offsets["ball"], SOLE_CONTACT, body, priority=0)
-    _sphere(toe, geom_name("toe", side), offsets["toe"], SOLE_CONTACT, body, priority=0)
+    _sphere(foot, geom_name("heel", side), offsets["heel"])
+    _sphere(toe, geom_name("ball", side), offsets["ball"])
+    _sphere(toe, geom_name("toe", side), offsets["toe"])
     _bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
     _bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
     _bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
@@ -282,23 +294,37 @@ def _segment(parent, name, pos, mass, com, inertia, joint: str = "", body: Body 
     return segment
 
 
-def _sphere(segment, name: str, offset: tuple[float, float, float], contact: dict, body: Body, priority: int) -> None:
-    """A contact sphere; its softness scales with the body (time ~ sqrt(l), depth ~ l)."""
+def _sphere(segment, name: str, offset: tuple[float, float, float]) -> None:
+    """A sphere that touches the ground of its foot (see `_touch`) and nothing else."""
     forward, up, radius = offset
-    time, ratio = contact["solref"]
-    soft, hard, depth = contact["solimp"]
     segment.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         pos=(forward, 0, up),
         size=(radius, 0, 0),
-        contype=1,
+        contype=0,
         conaffinity=0,
-        priority=priority,
-        friction=(FRICTION, 0.005, 0.0001),
-        solref=(time * sqrt(body.length_scale), ratio),
-        solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),
         rgba=(0.85, 0.55, 0.25, 1.0),
+    )
+
+
+def _touch(spec: mujoco.MjSpec, contact: str, side: str, body: Body, friction: float) -> None:
+    """Let a sphere touch the ground of its foot; softness scales with the body (time ~ sqrt(l), depth ~ l).
+
+    It is an explicit pair because only a pair has a time constant of its own for friction.
+    """
+    kind = HEEL_CONTACT if contact == "heel" else SOLE_CONTACT
+    time, ratio = kind["solref"]
+    soft, hard, depth = kind["solimp"]
+    root = sqrt(body.length_scale)
+    spec.add_pair(
+        geomname1=ground_name(side),
+        geomname2=geom_name(contact, side),
+        condim=3,
+        friction=(friction, friction, 0.005, 0.0001, 0.0001),
+        solref=(time * root, ratio),
+        solreffriction=(max(FRICTION_TIME * root, 2.0 * TIMESTEP), 1.0),
+        solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),
     )
 
 

@@ -19,13 +19,15 @@ if TYPE_CHECKING:
 
 
 class Entry(NamedTuple):
-    """One entry of the observation: name, unit it is divided by, bounds it is clipped to, and its meaning."""
+    """One entry of the observation: name, unit it is divided by, bounds it is clipped to, its meaning, and whether it
+    is measured (else the body knows it of itself)."""
 
     name: str
     unit: str
     low: float
     high: float
     meaning: str
+    measured: bool = True
 
 
 def _entries() -> tuple[Entry, ...]:
@@ -42,10 +44,10 @@ def _entries() -> tuple[Entry, ...]:
             Entry(f"{joint}_rate_{side}", "sqrt(g/l)", -15.0, 15.0, f"angular rate, {sign[joint]} positive")
             for side, joint in legs
         ),
-        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase"),
-        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase"),
-        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase"),
-        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase"),
+        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase", False),
+        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase", False),
+        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase", False),
+        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase", False),
         *(
             Entry(
                 f"load_{contact}_{side}",
@@ -60,12 +62,12 @@ def _entries() -> tuple[Entry, ...]:
         Entry("com_x_error", "leg length", -2.0, 2.0, "CoM minus plan, forward positive"),
         Entry("com_z_error", "leg length", -2.0, 2.0, "CoM minus plan, up positive"),
         Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
-        *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before") for name in ACTIONS),
-        *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive") for side in SIDES),
-        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right"),
-        Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)"),
-        Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m"),
-        Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg"),
+        *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before", False) for name in ACTIONS),
+        *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive", False) for side in SIDES),
+        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right", False),
+        Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)", False),
+        Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m", False),
+        Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg", False),
     )
 
 

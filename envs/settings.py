@@ -15,6 +15,9 @@ from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
+from .model import FRICTION
+from .simulation import WINDOW
+
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 Feedforward = Literal["people", "plan"]
 ActionMode = Literal["absolute", "residual"]
@@ -24,6 +27,17 @@ StiffnessJoints = Literal["both", "ankle", "toe"]
 STEP_SECONDS = 0.02
 """Time between two actions [s] by default: stiffness is decided at 50 Hz (design study; a 40 ms lag on K falls).
 Rewards and the discount of training are told for this time, whatever a step lasts (`BipedSettings.step_seconds`)."""
+
+FRICTION_RANGE = (0.4, 1.2)
+"""Of coefficients of friction, from wet floor to rough rubber."""
+SLOPE_RANGE_DEG = (-5.0, 5.0)
+"""Of slopes, uphill positive [deg]; ramps for wheelchairs have 4.8."""
+MOST_UNEVENNESS = 0.03
+"""Largest unevenness [m]; feet swing about this far above the ground."""
+MOST_SENSOR_NOISE = 0.1
+"""Largest standard deviation of sensor noise, in units of the observation."""
+LONGEST_DELAY = 0.04
+"""Of a stiffness behind its command [s]."""
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
@@ -101,6 +115,22 @@ class BipedSettings:
     """Duration of each push [s]."""
     push_interval: float = 4.0
     """One push at a random time in each interval of this length [s]."""
+    friction: float = FRICTION
+    """Coefficient of friction between feet and ground [0.4..1.2]."""
+    slope_deg: float = 0.0
+    """Slope of the ground [-5..5 deg], uphill positive."""
+    slope_range_deg: tuple[float, float] | None = None
+    """Slopes drawn at each reset in place of `slope_deg` [deg], evenly."""
+    unevenness_m: float = 0.0
+    """The ground of each footfall is up to this much higher or lower than the mean ground [0..0.03 m], evenly; a
+    swinging foot gets that of its next footfall in mid-swing."""
+    sensor_noise: float = 0.0
+    """Standard deviation of Gaussian noise, new at every step, on all that is measured of the observation, in its own
+    dimensionless units [0..0.1]: 0.01 is 0.6 deg, 9 mm of hip height, 2 deg/s, and 1 % of body weight."""
+    stiffness_delay_s: float = 0.0
+    """A commanded ankle or toe stiffness acts this much later (pure delay) [0..0.04 s, in steps of 0.01 s]."""
+    stiffness_delay_range_s: tuple[float, float] | None = None
+    """Delays drawn at each reset in place of `stiffness_delay_s`, evenly from the steps of 0.01 s [s]."""
     reward_weights: dict[str, float] = field(default_factory=dict)
     """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
 
@@ -128,6 +158,7 @@ class BipedSettings:
         require_number("push_newton", self.push_newton, 0.0, unit="N")
         require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
         require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
+        self._check_world()
         _check_weights(self.reward_weights)
 
     @property
@@ -156,6 +187,21 @@ class BipedSettings:
             if self.speed_range is None:
                 raise SpringfootError("speed_interval needs a speed_range to draw from, got None")
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
+
+    def _check_world(self) -> None:
+        require_number("friction", self.friction, *FRICTION_RANGE)
+        require_number("slope_deg", self.slope_deg, *SLOPE_RANGE_DEG, unit="deg")
+        _check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
+        require_number("unevenness_m", self.unevenness_m, 0.0, MOST_UNEVENNESS, "m")
+        require_number("sensor_noise", self.sensor_noise, 0.0, MOST_SENSOR_NOISE, "(observation units)")
+        require_number("stiffness_delay_s", self.stiffness_delay_s, 0.0, LONGEST_DELAY, "s")
+        _check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
+        for name, delays in (
+            ("stiffness_delay_s", (self.stiffness_delay_s,)),
+            ("stiffness_delay_range_s", self.stiffness_delay_range_s or ()),
+        ):
+            if any(abs(delay / WINDOW - round(delay / WINDOW)) > 1e-9 for delay in delays):
+                raise SpringfootError(f"{name} must be whole steps of {WINDOW:g} s, got {getattr(self, name)!r}")
 
     def _check_schedule(self) -> None:
         if self.schedule is None:
@@ -227,6 +273,14 @@ def _check_range(name: str, value: Any, unit: str) -> None:
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
     if not numbers or not 0 < value[0] < value[1]:
         raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {value!r}")
+
+
+def _check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -> None:
+    numbers = isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
+    if value is not None and not (numbers and allowed[0] <= value[0] < value[1] <= allowed[1]):
+        raise SpringfootError(
+            f"{name} must be (low, high) with low < high in [{allowed[0]:g}, {allowed[1]:g}] {unit}, got {value!r}"
+        )
 
 
 def _check_weights(weights: Any) -> None:

@@ -7,7 +7,7 @@ physics step); contact forces are the mean over the window's physics steps, so t
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, sin
+from math import cos, sin, tan
 
 import mujoco
 import numpy as np
@@ -21,6 +21,7 @@ from .kernel import kernel
 from .model import (
     ANKLE,
     CONTACTS,
+    FRICTION,
     JOINTS,
     KNEE,
     SIDES,
@@ -40,6 +41,10 @@ STEPS_PER_WINDOW = round(WINDOW / TIMESTEP)
 @dataclass(kw_only=True, eq=False)  # making it frozen takes longer than measuring
 class Measurement:
     """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
+
+    Every height z is above the ground: below the point, and for a foot's contacts the ground of that foot; the others'
+    is the mean ground, a plane through the origin. So is every velocity up. Angles are to the true vertical, and
+    forces horizontal and vertical.
 
     Axes called side, joint and contact follow `SIDES`, `JOINTS` and `CONTACTS` of `envs.model`.
     """
@@ -78,15 +83,24 @@ class Simulation:
         num: N.
         threads: of the physics; any number gives the same bits.
         model: the body's model with other options, such as a timestep that divides `WINDOW`, in place of the default.
+        friction: between feet and ground, of the default models [-].
     """
 
-    def __init__(self, body: Body, num: int, threads: int = 1, model: mujoco.MjModel | None = None):
+    def __init__(
+        self,
+        body: Body,
+        num: int,
+        threads: int = 1,
+        model: mujoco.MjModel | None = None,
+        friction: float = FRICTION,
+    ):
         self.body = body
         self.num = num
-        self.model = model or build_model(body)
+        self.model = model or build_model(body, friction)
         self.models = [self.model] * num
         """Of each simulation."""
         self._own_options = model is not None
+        self._friction = friction
         self._substeps = round(WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, threads)
         self._qpos = self._batch.bind("qpos")
@@ -95,6 +109,8 @@ class Simulation:
         """(N, side, joint, 2) K [N m/rad] and K theta_eq plus any feed-forward torque [N m]; changed in place."""
         self._time = self._batch.bind("time").reshape(num)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
+        self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
+        self._ground = np.zeros((num, 1 + len(SIDES)))  # tangent of the slope, height below each foot [m]
         self._warnings = self._batch.warning[:, :, 1]
         self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
         self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
@@ -106,15 +122,27 @@ class Simulation:
         if self._own_options:
             raise SpringfootError("a simulation with a model of one's own keeps its body")
         for index, body in zip(ids, bodies, strict=True):
-            self.models[index] = self.model if body == self.body else build_model(body)
+            self.models[index] = self.model if body == self.body else build_model(body, self._friction)
             self._segments[index] = _segments(body)[0]
         self._batch.set_models(self.models)
 
     def reset(self, ids: NDArray, root: NDArray, root_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
         """Put simulations `ids` (K,) into the states given: (K, 3), (K, 3), (K, side, joint), (K, side, joint)."""
+        position, turn = self._position[ids], self._turn[ids]  # the ground stays
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._position[ids], self._turn[ids] = position, turn
         self._qpos[ids, :3], self._qpos[ids, 3:] = root, angle.reshape(len(ids), -1)
         self._qvel[ids, :3], self._qvel[ids, 3:] = root_velocity, velocity.reshape(len(ids), -1)
+        for state, given in ((self._qpos, root), (self._qvel, root_velocity)):
+            state[ids, 1] += self._ground[ids, 0] * given[:, 0]
+
+    def lay(self, ids: NDArray, slope: NDArray, height: NDArray) -> None:
+        """Give simulations `ids` (K,) ground of a slope (K,) [rad], uphill positive, whose plane below each foot lies
+        `height` (K, side) [m] above the mean one, which goes through the origin."""
+        for index, angle, heights in zip(ids.tolist(), slope.tolist(), height, strict=True):
+            self._ground[index] = tan(angle), *heights
+            self._position[index, :, 2] = heights  # mocap bodies are the grounds, in the order of SIDES
+            self._turn[index] = cos(angle / 2), 0.0, -sin(angle / 2), 0.0
 
     def push(self, force: NDArray) -> None:
         """Hold a horizontal force [N], (N,), on the trunk's CoM until told otherwise."""
@@ -162,7 +190,7 @@ class Simulation:
             force=np.empty(feet),
             diverged=np.empty(self.num, int),
         )
-        state = self._segments, self._qpos, self._qvel, control, self._sensors, self._warnings
+        state = self._segments, self._ground, self._qpos, self._qvel, control, self._sensors, self._warnings
         legs = m.root, m.root_velocity, m.angle, m.velocity, m.torque
         _measure(*state, *legs, m.com, m.com_velocity, m.ankle, m.contact, m.force, m.diverged)
         return m
@@ -171,6 +199,7 @@ class Simulation:
 @kernel
 def _measure(
     segments,
+    ground,
     position,
     rate,
     control,
@@ -193,6 +222,7 @@ def _measure(
             root[i, k], root_velocity[i, k] = position[i, k], rate[i, k]
         _read_joints(segments[i], position[i], rate[i], control[i], angle[i], velocity[i], torque[i])
         _locate(segments[i], position[i], rate[i], com[i], com_velocity[i], ankle[i], contact[i])
+        _above(ground[i], root[i], root_velocity[i], com[i], com_velocity[i], ankle[i], contact[i])
         _average(sensors[i], force[i])
         diverged[i] = -1
         for kind in range(warnings.shape[1] - 1, -1, -1):
@@ -299,6 +329,19 @@ def _locate(segments, position, rate, com, com_velocity, ankle, contact):
             x, z = _turned(segments.end[joint], c, s)
             joint_x, joint_z = joint_x + x, joint_z + z
     com[0], com[1], com_velocity[0], com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
+
+
+@kernel
+def _above(ground, root, root_velocity, com, com_velocity, ankle, contact):
+    """From the world's heights to those above the ground."""
+    slope = ground[0]
+    for position, velocity in ((root, root_velocity), (com, com_velocity)):
+        position[1] -= slope * position[0]
+        velocity[1] -= slope * velocity[0]
+    for side in range(2):
+        ankle[side, 1] -= slope * ankle[side, 0]
+        for k in range(3):
+            contact[side, k, 1] -= slope * contact[side, k, 0] + ground[1 + side]
 
 
 @kernel

@@ -57,7 +57,7 @@ def test_readme_commands_are_understood(folder):
     programs = {
         "train.py": train.Flags,
         "evaluate.py": evaluate.Flags,
-        "-m springfoot.agents.studies": studies.BestConstant | studies.Compare | studies.Seeds,
+        "-m springfoot.agents.studies": studies.BestConstant | studies.Compare | studies.Seeds | studies.Bodies,
     }
     assert {program for program, _ in COMMANDS} == set(programs)
     for program, words in COMMANDS:

@@ -15,6 +15,7 @@ from PIL import Image, ImageSequence
 from rich.console import Console
 
 import evaluate
+from springfoot.agents.bodies import draw_pairs, walk_pairs
 from springfoot.agents.bundle import Policy, fingerprint, save_policy
 from springfoot.agents.evaluation import CURVES, measure
 from springfoot.agents.recording import load_recording, prepare, record
@@ -266,3 +267,9 @@ def test_every_column_and_array_is_documented_and_nothing_else(folder):
     assert sorted(documented("### `gait_cycle.csv`")) == sorted(set(columns) - {f"{curve}_sd" for curve in CURVES})
     with np.load(folder / "strides.npz") as file:
         assert sorted(documented("### `strides.npz`")) == sorted(file)
+
+
+def test_every_column_of_a_pair_is_documented_and_nothing_else():
+    policy, settings = prepare("schedule", {"episode_seconds": 0.1})
+    who = draw_pairs(settings, 1)
+    assert documented("### `pairs.csv`") == list(walk_pairs(policy, settings, who, name="schedule")[0])

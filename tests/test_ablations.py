@@ -1,0 +1,101 @@
+"""Ablations: rows that differ from the preset in their flags alone, a study that may be stopped, and its pages."""
+
+import json
+import sys
+from dataclasses import replace
+
+import pytest
+
+from springfoot.agents import ablations
+from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.recording import record
+from springfoot.agents.schedules import schedule
+from springfoot.agents.training import RUN
+from springfoot.envs.settings import STEP_SECONDS, BipedSettings, settings_to_json
+
+SHORT = ("--episodes", "1", "--seconds", "0.5", "--threads", "1")
+
+
+def main(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["ablations", *map(str, words)])
+    return ablations.main()
+
+
+def test_every_row_differs_from_the_preset_in_its_flags_and_walks_as_long():
+    preset = PRESETS["walk"]
+    assert list(ablations.MEANING) == list(ablations.ABLATIONS)
+    assert ablations.config_of("walk") == preset
+    known = settings_to_json(preset.environment)
+    for name, flags in ablations.ABLATIONS.items():
+        config = ablations.config_of(name, seed=2)
+        own = settings_to_json(config.environment)
+        assert {key for key in own if own[key] != known[key]} == set(flags) | (
+            {"schedule"} if name == "phase" else set()
+        )
+        step = config.environment.step_seconds
+        for field in ("timesteps", "update_steps", "eval_interval"):
+            assert getattr(config, field) * step == pytest.approx(getattr(preset, field) * STEP_SECONDS)
+        assert config.seed == 2 and (config.gamma, config.minibatches) == (preset.gamma, preset.minibatches)
+
+
+def test_the_phase_equilibrium_of_the_ablation_is_one_that_can_be_walked():
+    own = ablations.phase_schedule(BipedSettings())
+    assert len(own.ankle) == len(own.toe) == 10
+    settings = BipedSettings(equilibrium="phase", schedule=own.to_json(), episode_seconds=4.0)
+    assert not record(schedule(settings), settings, name="", episodes=3).fall_reason.any()
+
+
+def test_what_is_finished_is_kept_what_is_not_begins_anew_and_the_page_is_made_of_it(monkeypatch, capsys, tmp_path):
+    quick = TrainingConfig(
+        num_envs=8, update_steps=512, eval_interval=512, eval_episodes=2, environment=BipedSettings(episode_seconds=0.5)
+    )
+    monkeypatch.setitem(ablations.PRESETS, "walk", quick)
+    out, page, readme = tmp_path / "out", tmp_path / "page.md", tmp_path / "readme.md"
+    folder = out / "25hz" / "seed-0"
+    folder.mkdir(parents=True)
+    (folder / RUN).write_text(json.dumps({"status": "running"}))
+    (folder / "half").touch()
+    words = ["--out", out, "--seeds", 1, "--only", "25hz", "--timesteps", 512, *SHORT]
+    assert main(monkeypatch, *words, "--page", page, "--readme", readme) == 0
+    assert not (folder / "half").exists()
+    done = json.loads((folder / RUN).read_text())
+    assert done["status"] == "finished" and done["timesteps"] == 256  # as long a walk, in steps twice as long
+    written = page.read_bytes(), readme.read_bytes()
+    assert b"K decided at 25 Hz" in written[0] and b"thesis lines" in written[1]
+
+    page.unlink()
+    assert main(monkeypatch, *words, "--page", page, "--readme", readme) == 0
+    assert (page.read_bytes(), readme.read_bytes()) == written
+    assert json.loads((folder / RUN).read_text()) == done
+    capsys.readouterr()
+    words[words.index("--timesteps") + 1] = 1024
+    assert main(monkeypatch, *words) == 2
+    assert "has trained 256 steps, not 512" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--only", "walks"], "no row 'walks'; there are walk, "),
+        (["--seeds", 0], "seeds must be"),
+        (["--seconds", -1], "seconds"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_on_disk(monkeypatch, capsys, tmp_path, words, message):
+    assert main(monkeypatch, "--out", tmp_path / "out", *words) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_table_has_mean_and_spread_over_seeds_and_people_beside_them():
+    how = replace(ablations.Measurement(), episodes=2, seconds=0.5, threads=1)
+    one = how.of("schedule")
+    other = json.loads(json.dumps(one))
+    for metrics, value in ((one, 1.0), (other, 2.0)):
+        metrics["undisturbed"]["speed_m_s"]["mean"] = value
+        metrics["pushed"]["falls"] = int(value)
+    head, _, row, people = ablations.rows_table({"x": [one, other]}, "what", people=True).splitlines()
+    assert head.startswith("| what | seeds | falls | pushed | return | m/s |")
+    assert row.startswith("| x | 2 | 0.0 ± 0.0 | 1.5 ± 0.7 |") and "| 1.50 ± 0.71 |" in row
+    assert people.startswith("| people | – | – | – | – | 1.20 |") and "| 1.31 |" in people
