@@ -44,18 +44,18 @@ SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 3
 TOLERANCE = {
     "speed": 0.03,  # m/s
     "period": 0.03,  # share of the plan's stride time
-    "thigh": np.deg2rad(1.2),
+    "thigh": np.deg2rad(1.0),
     "knee": np.deg2rad(2.5),
     "ankle": np.deg2rad(2.0),
     "toe": np.deg2rad(5.0),
     "grf_vertical": 0.06,  # body weights
-    "grf_forward": 0.02,
+    "grf_forward": 0.013,
     "force_peak": 0.08,  # largest 10 ms value of a stride beyond 1.25 body weights
     "knee_moment": 0.15,  # N m/kg
     "ankle_moment": 0.12,
-    "com_x": 0.03,  # m, against the plan
+    "com_x": 0.02,  # m, against the plan
     "com_z": 0.006,
-    "travel": 0.006,  # m a stance, of the sole on the floor
+    "travel": 0.008,  # m a stance, of the sole on the floor
     "unsteady": 0.06,  # SD of the vertical force over strides [body weights]
     "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
 }
