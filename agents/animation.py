@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from springfoot.envs.actuation import stiffness_ranges
-from springfoot.envs.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE, contact_offsets
+from springfoot.envs.contact import contact_offsets
+from springfoot.envs.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts

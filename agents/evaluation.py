@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.envs.model import ANKLE, CONTACTS, HIP, KNEE, SIDES, TOE, contact_material
+from springfoot.envs.contact import CONTACTS
+from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_material
 from springfoot.envs.settings import body_of, reference_gait, settings_to_json
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score

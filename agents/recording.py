@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from springfoot.envs.actuation import FEET
 from springfoot.envs.biped import Biped, Tick
 from springfoot.envs.constants import LegConstants
-from springfoot.envs.model import CONTACTS, JOINTS, SIDES
+from springfoot.envs.contact import CONTACTS
+from springfoot.envs.model import JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.walkers import DRAWN
 from springfoot.envs.walks import walk_at

@@ -23,7 +23,8 @@ from springfoot.agents.evaluation import Gait, measure
 from springfoot.agents.recording import prepare, record
 from springfoot.agents.schedules import Policy
 from springfoot.envs.biped import WINDOWS
-from springfoot.envs.model import TIMESTEP, build_model
+from springfoot.envs.contact import TIMESTEP
+from springfoot.envs.model import build_model
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.simulation import WINDOW
 from springfoot.gait.body import Body

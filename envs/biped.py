@@ -16,10 +16,11 @@ from springfoot.gait.errors import SpringfootError
 
 from .actuation import Decisions, FootSprings
 from .constants import LegConstants
+from .contact import CONTACTS
 from .equilibrium import foot_curves
 from .kernel import kernel
 from .legs import Legs
-from .model import ACTIONS, CONTACTS, JOINTS, SIDES, passive_damping
+from .model import ACTIONS, JOINTS, SIDES, passive_damping
 from .outcome import Outcome, report
 from .pushes import Pushes
 from .settings import STEP_SECONDS, BipedSettings

@@ -16,16 +16,23 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import GRAVITY, Body
 
+from .contact import (
+    CONTACTS,
+    FRICTION,
+    TIMESTEP,
+    add_sphere,
+    add_touch,
+    contact_offsets,
+    geom_name,
+    ground_name,
+)
+
 SIDES = ("left", "right")
 JOINTS = ("hip", "knee", "ankle", "toe")
-CONTACTS = ("heel", "ball", "toe")
 ROOT = ("x", "z", "pitch")
 LEFT, RIGHT = range(2)
 HIP, KNEE, ANKLE, TOE = range(4)
 ACTIONS = tuple(f"{joint}_{side}" for side in SIDES for joint in ("ankle", "toe"))
-
-TIMESTEP = 0.002
-"""Physics step [s], independent of the body: half the cost of 1 ms, and the same gait (docs/physics.md)."""
 
 DAMPING_TIME = (0.031, 0.0377, 0.02, 0.02)
 """beta [s] of tau = K (theta_eq - theta - beta dtheta/dt), in the order of `JOINTS`; scaled with sqrt(l)."""
@@ -38,31 +45,7 @@ PASSIVE_DAMPING = (0.5, 0.5, 0.5, 0.1)
 JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
 """Stops of the joints [deg], in the order of `JOINTS`; walking never reaches them."""
 
-HEEL_RADIUS = 0.04
-"""Radius [m] of the heel's contact sphere at 1.70 m: a rounded heel with a soft pad at most 8 mm deep."""
-BALL_RADIUS, TOE_RADIUS = 0.02, 0.012
-"""Radius [m] of the contact spheres at 1.70 m: the ball's is the toe joint's height above the sole, and its sphere sits
-on that joint as part of the toe, so that heel-off neither rolls it nor drags the toe along the floor."""
-FRICTION = 1.0
-"""Coefficient of Coulomb friction between foot and ground; rubber soles on dry floors have 0.6 to 1.2."""
-FRICTION_TIME = 0.004
-"""Time constant [s] in which sliding is stopped. MuJoCo leaves the change of the contact's Jacobian out of its
-constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms (docs/physics.md)."""
-HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
-"""Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
-SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}
-
 _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
-
-
-def geom_name(contact: str, side: str) -> str:
-    """Name of a foot's contact sphere."""
-    return f"{contact}_{side}"
-
-
-def ground_name(side: str) -> str:
-    """Name of the ground below a foot: a plane, moved from outside (mocap)."""
-    return f"ground_{side}"
 
 
 def damping_times(body: Body) -> np.ndarray:
@@ -78,19 +61,6 @@ def torque_limits(body: Body) -> np.ndarray:
 def passive_damping(body: Body) -> np.ndarray:
     """Joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
     return np.array(PASSIVE_DAMPING) * body.strength_scale * sqrt(body.length_scale)
-
-
-def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
-    """Centre (forward, up) [m] in its segment's frame, and radius [m], of each contact sphere.
-
-    The heel is in the foot's frame (origin: ankle), ball and toe tip in the toe's frame (origin: toe joint).
-    """
-    heel, ball, toe = (radius * body.length_scale for radius in (HEEL_RADIUS, BALL_RADIUS, TOE_RADIUS))
-    return {
-        "heel": (heel - body.heel_to_ankle, heel - body.ankle_height, heel),
-        "ball": (0.0, ball - body.toe_joint_height, ball),
-        "toe": (body.toe_length - toe, toe - body.toe_joint_height, toe),
-    }
 
 
 def contact_material(body: Body, contact: NDArray, root: NDArray, angle: NDArray) -> NDArray:
@@ -170,7 +140,7 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
             conaffinity=0,
         )
         for contact in CONTACTS:
-            _touch(spec, contact, side, body, friction)
+            add_touch(spec, contact, side, body, friction)
     for side in SIDES:
         for index, joint in enumerate(JOINTS):
             _add_spring(spec, f"{joint}_{side}", float(damping_times(body)[index]))
@@ -261,9 +231,9 @@ def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> Non
         body,
     )
     offsets = contact_offsets(body)
-    _sphere(foot, geom_name("heel", side), offsets["heel"])
-    _sphere(toe, geom_name("ball", side), offsets["ball"])
-    _sphere(toe, geom_name("toe", side), offsets["toe"])
+    add_sphere(foot, geom_name("heel", side), offsets["heel"])
+    add_sphere(toe, geom_name("ball", side), offsets["ball"])
+    add_sphere(toe, geom_name("toe", side), offsets["toe"])
     _bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
     _bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
     _bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
@@ -292,40 +262,6 @@ def _segment(parent, name, pos, mass, com, inertia, joint: str = "", body: Body 
             actfrcrange=(-limit, limit),
         )
     return segment
-
-
-def _sphere(segment, name: str, offset: tuple[float, float, float]) -> None:
-    """A sphere that touches the ground of its foot (see `_touch`) and nothing else."""
-    forward, up, radius = offset
-    segment.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        pos=(forward, 0, up),
-        size=(radius, 0, 0),
-        contype=0,
-        conaffinity=0,
-        rgba=(0.85, 0.55, 0.25, 1.0),
-    )
-
-
-def _touch(spec: mujoco.MjSpec, contact: str, side: str, body: Body, friction: float) -> None:
-    """Let a sphere touch the ground of its foot; softness scales with the body (time ~ sqrt(l), depth ~ l).
-
-    It is an explicit pair because only a pair has a time constant of its own for friction.
-    """
-    kind = HEEL_CONTACT if contact == "heel" else SOLE_CONTACT
-    time, ratio = kind["solref"]
-    soft, hard, depth = kind["solimp"]
-    root = sqrt(body.length_scale)
-    spec.add_pair(
-        geomname1=ground_name(side),
-        geomname2=geom_name(contact, side),
-        condim=3,
-        friction=(friction, friction, 0.005, 0.0001, 0.0001),
-        solref=(time * root, ratio),
-        solreffriction=(max(FRICTION_TIME * root, 2.0 * TIMESTEP), 1.0),
-        solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),
-    )
 
 
 def _bone(segment, start, end, radius: float, shade: float) -> None:

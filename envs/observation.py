@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
+from .contact import CONTACTS
 from .kernel import kernel
-from .model import ACTIONS, CONTACTS, JOINTS, LEFT, SIDES
+from .model import ACTIONS, JOINTS, LEFT, SIDES
 from .walkers import Walkers
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
-from .model import FRICTION
+from .contact import FRICTION
 from .simulation import WINDOW
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]

@@ -17,21 +17,9 @@ from numpy.typing import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 
+from .contact import CONTACTS, FRICTION, TIMESTEP, contact_offsets
 from .kernel import kernel
-from .model import (
-    ANKLE,
-    CONTACTS,
-    FRICTION,
-    JOINTS,
-    KNEE,
-    SIDES,
-    TIMESTEP,
-    TOE,
-    build_model,
-    contact_offsets,
-    damping_times,
-    torque_limits,
-)
+from .model import ANKLE, JOINTS, KNEE, SIDES, TOE, build_model, damping_times, torque_limits
 
 WINDOW = 0.01
 """Control window [s]: controls are held and forces averaged over it."""

@@ -11,7 +11,8 @@ import pytest
 
 from benchmarks.timing import Case, measure
 from benchmarks.walking import STEP, Physics, batch_case, record_walk, step_over_physics, study_model
-from springfoot.envs.model import TIMESTEP, build_model
+from springfoot.envs.contact import TIMESTEP
+from springfoot.envs.model import build_model
 from springfoot.gait.body import Body
 
 ROOT = Path(__file__).parents[1]

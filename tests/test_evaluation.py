@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.agents.evaluation import CURVES, measure
 from springfoot.agents.recording import SERIES, Recording, load_recording, prepare, record, record_each
-from springfoot.envs.model import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
+from springfoot.envs.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT

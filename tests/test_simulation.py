@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springfoot.envs.model import CONTACTS, JOINTS, SIDES, damping_times, geom_name, torque_limits
+from springfoot.envs.contact import CONTACTS, geom_name
+from springfoot.envs.model import JOINTS, SIDES, damping_times, torque_limits
 from springfoot.envs.simulation import STEPS_PER_WINDOW, Measurement, Simulation
 from springfoot.gait.body import Body
 

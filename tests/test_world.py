@@ -6,7 +6,8 @@ import pytest
 
 from springfoot.envs.actuation import FEET, action_of
 from springfoot.envs.biped import Biped, Tick
-from springfoot.envs.model import ANKLE, FRICTION, SIDES, build_spec
+from springfoot.envs.contact import FRICTION
+from springfoot.envs.model import ANKLE, SIDES, build_spec
 from springfoot.envs.observation import OBSERVATION
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.envs.simulation import Simulation
