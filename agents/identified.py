@@ -250,6 +250,8 @@ class Flags:
     """Episode i is seeded with seed + i, in every row."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
+    unevenness_m: float = 0.01
+    """Unevenness of the ground [m]."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
     schedules: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
@@ -262,7 +264,10 @@ def run(flags: Flags) -> None:
     """Walk every row, print the table, and write what was asked for."""
     for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
         require_count(name, getattr(flags, name), least)
-    disturbances = {f"±{flags.push_newton:g} N": {"push_newton": flags.push_newton}}
+    disturbances = {
+        f"±{flags.push_newton:g} N": {"push_newton": flags.push_newton},
+        f"±{100 * flags.unevenness_m:g} cm": {"unevenness_m": flags.unevenness_m},
+    }
     how = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
     given = {"episode_seconds": flags.seconds}
     with tqdm(desc="any stiffness", unit="s", unit_scale=True, leave=False, disable=None) as bar:
