@@ -5,7 +5,8 @@
 
 A recorded gait has a mean angle, velocity and torque of ankle and toe at each phase of the leg controller. For any
 K(phase) > 0, theta_eq = theta + beta dtheta/dt + tau/K gives back that torque. Each such pair of K and theta_eq is a
-schedule for equilibrium `phase`, and walks here as the baseline `schedule`: undisturbed, pushed, on uneven ground.
+schedule for equilibrium `phase`, and walks here as the baseline `schedule`: undisturbed, pushed, on uneven ground. It
+is decided at 100 Hz, as theta_eq moves: held longer, K and theta_eq would be those of an earlier phase.
 """
 
 import json
@@ -189,7 +190,8 @@ def any_stiffness(
     lowest, highest = stiffness_ranges(settings, springs.body)
     for each in stiffnesses:
         schedules[each] = rebuilt(springs, np.clip(stiffness_named(each, springs), lowest, highest))
-        changed = replace(settings, equilibrium="phase", action_mode="absolute", schedule=schedules[each].to_json())
+        own_springs = {"schedule": schedules[each].to_json(), "equilibrium": "phase", "decisions": "100hz"}
+        changed = replace(settings, action_mode="absolute", **own_springs)
         rows.append(walk_row(each, walk(each, schedule, changed)))
     return rows, schedules
 
@@ -250,10 +252,13 @@ class Flags:
     """Episode i is seeded with seed + i, in every row."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
+    unevenness_m: float = 0.01
+    """Unevenness of the ground [m]."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
     schedules: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Also write each K with its equilibrium there, for evaluate.py schedule --equilibrium phase --schedule FILE."""
+    """Also write each K with its equilibrium there, for evaluate.py schedule --equilibrium phase --decisions 100hz
+    --schedule FILE."""
     page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Also write the table into this page, between the markers of ANY-K."""
 
@@ -262,7 +267,10 @@ def run(flags: Flags) -> None:
     """Walk every row, print the table, and write what was asked for."""
     for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
         require_count(name, getattr(flags, name), least)
-    disturbances = {f"±{flags.push_newton:g} N": {"push_newton": flags.push_newton}}
+    disturbances = {
+        f"±{flags.push_newton:g} N": {"push_newton": flags.push_newton},
+        f"±{100 * flags.unevenness_m:g} cm": {"unevenness_m": flags.unevenness_m},
+    }
     how = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
     given = {"episode_seconds": flags.seconds}
     with tqdm(desc="any stiffness", unit="s", unit_scale=True, leave=False, disable=None) as bar:

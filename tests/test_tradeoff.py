@@ -1,0 +1,66 @@
+"""The trade-off: the measure of stiffness is the reward's, the knee is found, finished trainings are kept."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from springfoot.agents import tradeoff
+from springfoot.agents.evaluation import WARM_UP
+from springfoot.agents.recording import prepare, record
+from springfoot.agents.tradeoff import config_of, folder_of, knee, stiffness_cost
+from springfoot.envs.biped import Biped
+
+
+def test_the_stiffness_cost_is_the_rewards_term():
+    policy, settings = prepare("schedule", {"episode_seconds": WARM_UP + 1.0})
+    biped, costs = Biped(settings, 1), []
+    biped.reset(np.arange(1), [0])
+    observation = biped.observe()
+    for _ in range(round(settings.episode_seconds / biped.dt)):
+        outcome = biped.step(policy(observation))
+        observation = outcome.observation
+        costs.append(outcome.info["reward/stiffness"][0])
+    expected = np.mean(costs[round(WARM_UP / biped.dt) :])
+    assert stiffness_cost(record(policy, settings, name="schedule", episodes=1)) == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_knee_is_where_the_curve_is_farthest_below_the_line_between_its_ends():
+    cost = np.linspace(0.1, 1.0, 10)
+    loss = np.where(cost < 0.35, 10 - 30 * (cost - 0.1), 4 - 0.1 * (cost - 0.3))
+    assert knee(cost, loss) == knee(100 * cost + 5, 3 * loss) == 2
+    order = np.random.default_rng(0).permutation(10)
+    assert order[knee(cost[order], loss[order])] == 2
+    assert knee(cost, -cost) is None and knee(cost, -(cost**2)) is None and knee(cost[:2], loss[:2]) is None
+
+
+def test_a_weight_changes_its_own_term_alone():
+    config = config_of(0.2, 3, "stiffness_rate", 100)
+    assert (config.seed, config.timesteps) == (3, 100)
+    assert config.environment.reward_weights == {"stiffness_rate": -0.2}
+
+
+def test_the_command_trains_what_is_missing_draws_and_keeps_what_is_finished(monkeypatch, capfd, tmp_path):
+    def main(*words):
+        short = ["--seeds", "1", "--timesteps", "8192", "--episodes", "1", "--seconds", "6", "--pushes", "150"]
+        files = ["--out", str(tmp_path / "runs"), "--figure", str(tmp_path / "t.png")]
+        monkeypatch.setattr(sys, "argv", ["tradeoff", "--weights", "0.4", "0", *short, *files, *words])
+        code = tradeoff.main()
+        return code, *capfd.readouterr()
+
+    code, out, error = main()
+    assert code == 0 and "stiffness 0.4, seed 0: " in error
+    assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+    best = folder_of(tmp_path / "runs", "stiffness", 0.4, 0) / "best.safetensors"
+    written = best.stat().st_mtime_ns
+    assert main()[:2] == (0, out) and best.stat().st_mtime_ns == written
+    code, _, error = main("--timesteps", "9000")
+    assert code == 2 and "trained with other settings" in error
+    code, _, error = main("--no-train", "--term", "stiffness_rate")
+    assert code == 2 and "no finished training of stiffness_rate" in error
+
+
+def test_a_bad_weight_is_refused_before_anything_is_trained(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(sys, "argv", ["tradeoff", "--weights", "-0.1", "--out", str(tmp_path / "runs")])
+    assert tradeoff.main() == 2
+    assert "must be a finite number <= 0" in capsys.readouterr().err and not (tmp_path / "runs").exists()
