@@ -41,7 +41,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     The stiffnesses are those of 1.70 m and 63 kg; they scale with mass x height.
 
     ## Observation space
-    `Box(Min, Max, (44,), float32)`, dimensionless: each value is divided by its unit and clipped to its bounds. l is
+    `Box(Min, Max, (43,), float32)`, dimensionless: each value is divided by its unit and clipped to its bounds. l is
     the leg length (hip to floor when standing, 0.53 of height), g gravity.
 
     | Num | Observation             | Divided by  | Min  | Max | Meaning                                   |
@@ -89,7 +89,6 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | 40  | leading_leg             | 1           | -1   | 1   | stance that began last: +1 left, -1 right |
     | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
     | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |
-    | 43  | mass_ratio              | 1           | 0    | 5   | body mass / 63 kg                         |
 
     ## Rewards
     Sum of weight x term. All terms are dimensionless and stand unweighted in `info`. On the step of a fall the reward

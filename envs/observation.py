@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
+from springfoot.gait.body import GRAVITY, Body
 
 from .contact import CONTACTS
 from .kernel import kernel
@@ -68,13 +68,12 @@ def _entries() -> tuple[Entry, ...]:
         Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right", False),
         Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)", False),
         Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m", False),
-        Entry("mass_ratio", "1", 0.0, 5.0, "body mass / 63 kg", False),
     )
 
 
 OBSERVATION = _entries()
-"""Every entry of the observation, in order; l is the leg length (hip to floor when standing), weight and mass are those
-of body and load."""
+"""Every entry of the observation, in order; l is the leg length (hip to floor when standing), weight that of body and
+load. Nothing tells the body's mass: mechanics scale it away (`envs.model`)."""
 
 
 SEEN = np.dtype(
@@ -89,7 +88,7 @@ SEEN = np.dtype(
         ("last_action", float, len(ACTIONS)),
         ("planned_ankle", float, len(SIDES)),
         ("leading_leg", float),
-        ("command", float, 3),
+        ("command", float, 2),
     ]
 )
 """The entries of `OBSERVATION`, in order, before they are made dimensionless [SI]."""
@@ -103,7 +102,7 @@ class Observer:
         self.low = np.array([entry.low for entry in OBSERVATION], np.float32)
         self.high = np.array([entry.high for entry in OBSERVATION], np.float32)
         self._units = np.empty((len(walkers.bodies), len(OBSERVATION)))
-        self._ratios = np.empty((len(walkers.bodies), 2))
+        self._ratios = np.empty(len(walkers.bodies))
         self._row = np.zeros(1, SEEN)  # the body that is being looked at
         self._entries = self._row.view(float)
         self.fit(range(len(walkers.bodies)))
@@ -113,7 +112,7 @@ class Observer:
         for index in ids:
             body = self._walkers.bodies[index]
             self._units[index] = _units(body)
-            self._ratios[index] = body.length_scale, body.total_mass / REFERENCE_MASS
+            self._ratios[index] = body.length_scale
 
     def observe(
         self,
@@ -178,7 +177,7 @@ def _observe(
         row.cycle[0], row.cycle[1], row.cycle[2], row.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
         row.leading_leg = 1.0 if left < 0.5 else -1.0
         row.root[0], row.root[1] = root[i, 1], root[i, 2]
-        row.command[0], row.command[1], row.command[2] = speed[i], ratios[i, 0], ratios[i, 1]
+        row.command[0], row.command[1] = speed[i], ratios[i]
         for k in range(3):
             row.root_velocity[k], row.error[k] = root_velocity[i, k], error[i, k]
         for k in range(4):

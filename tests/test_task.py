@@ -283,7 +283,6 @@ def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
         "leading_leg": 1.0,
         "command_speed": setup.body.froude_speed(0.9),
         "height_ratio": 1.5 / 1.7,
-        "mass_ratio": 80 / 63,
     }
     for name, value in expected.items():
         assert row[name] == pytest.approx(value, rel=1e-6, abs=1e-4), name

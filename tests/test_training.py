@@ -50,7 +50,7 @@ def test_a_policy_does_not_read_what_never_varied_in_its_training(run):
     biped.reset(np.arange(1), [0])
     seen = biped.observe()
     other = seen.copy()
-    for name in ("command_speed", "height_ratio", "mass_ratio"):
+    for name in ("command_speed", "height_ratio"):
         other[:, biped.observation_names.index(name)] += 0.3
     np.testing.assert_allclose(policy(other), policy(seen), atol=1e-5)
     other[:, biped.observation_names.index("hip_height")] += 0.3
