@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from springfoot.envs.contact import CONTACTS
 from springfoot.envs.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_material
 from springfoot.envs.settings import body_of, reference_gait, settings_to_json
+from springfoot.envs.standing import steady_walk
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import (
@@ -29,7 +30,7 @@ from springfoot.gait.cycle import (
 from .recording import TICK, Recording
 
 WARM_UP = 3.0
-"""Beginning of each episode left out of the gait's numbers [s]; a fall in it counts."""
+"""Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
 SHORTEST_SPEED = 1.0
 """An episode that ends earlier than this after the warm-up [s] tells nothing about speed."""
 MID_SWING = (0.25, 0.75)
@@ -129,10 +130,14 @@ def measure(recording: Recording) -> Gait:
     gait, tally = Gait(), _Tally()
     body = body_of(recording.settings)
     fell = recording.fall_reason != ""
+    begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
         if ticks:
-            _add_episode(gait, tally, series, body, bool(fell[episode]))
+            _add_episode(gait, tally, series, body, (begin + WARM_UP, end), bool(fell[episode]))
+            tally.at_rest += not fell[episode] and score.at_rest(
+                series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
+            )
     gait.metrics = _metrics(recording, gait, tally, body)
     return gait
 
@@ -142,6 +147,7 @@ class _Tally:
     """What is collected stride by stride, step by step and episode by episode."""
 
     strides_of_falls: int = 0
+    at_rest: int = 0
     speed: list[float] = field(default_factory=list)
     distance: float = 0.0
     work: float = 0.0
@@ -156,14 +162,17 @@ class _Tally:
     clearance: list[float] = field(default_factory=list)
 
 
-def _add_episode(gait: Gait, tally: _Tally, series: dict[str, NDArray], body: Body, fell: bool) -> None:
+def _add_episode(
+    gait: Gait, tally: _Tally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool
+) -> None:
+    """`steady` is the time [s] the numbers are taken from."""
     weight = body.mass * GRAVITY
-    begin = round(WARM_UP / TICK)
     com, power = series["com"], (series["torque"] + series["passive_torque"]) * series["velocity"]
-    if len(com) > begin:
-        distance, seconds = com[-1, 0] - com[begin - 1, 0], (len(com) - begin) * TICK
+    begin, end = (round(min(time / TICK, len(com))) for time in steady)
+    if end > begin:
+        distance, seconds = com[end - 1, 0] - com[begin - 1, 0], (end - begin) * TICK
         tally.distance += distance
-        tally.work += float(score.positive_work(power[begin:], TICK).sum())
+        tally.work += float(score.positive_work(power[begin:end], TICK).sum())
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
 
@@ -175,7 +184,8 @@ def _add_episode(gait: Gait, tally: _Tally, series: dict[str, NDArray], body: Bo
     ]
     material = contact_material(body, series["contact"], series["root"], series["angle"])
     for side, foot in enumerate(contacts):
-        strides = foot.strides(after=WARM_UP)
+        strides = foot.strides(after=steady[0])
+        strides = strides[strides[:, 2] <= steady[1]]
         heel_strike, toe_off, end = strides.T
         curves = np.concatenate(
             [
@@ -198,11 +208,15 @@ def _add_episode(gait: Gait, tally: _Tally, series: dict[str, NDArray], body: Bo
             tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
             first, last = (round(leave + share * (stop - leave)) for share in MID_SWING)
             tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
-    _add_steps(gait, tally, series, contacts)
+    _add_steps(gait, tally, series, contacts, steady)
 
 
-def _add_steps(gait: Gait, tally: _Tally, series: dict[str, NDArray], contacts: list[Contacts]) -> None:
-    steps, sides = find_steps(contacts[0], contacts[1], after=WARM_UP)
+def _add_steps(
+    gait: Gait, tally: _Tally, series: dict[str, NDArray], contacts: list[Contacts], steady: tuple[float, float]
+) -> None:
+    steps, sides = find_steps(contacts[0], contacts[1], after=steady[0])
+    in_time = steps[:, 1] <= steady[1]
+    steps, sides = steps[in_time], sides[in_time]
     for side in range(len(SIDES)):
         begin, end = steps[sides == side].T
         relative = np.column_stack(
@@ -298,6 +312,7 @@ def _metrics(recording: Recording, gait: Gait, tally: _Tally, body: Body) -> dic
         "episodes": len(recording.ticks),
         "falls": sum(reasons.values()),
         "fall_reasons": dict(reasons),
+        "came_to_rest": None if settings.stop_at is None else tally.at_rest,
         "seconds_mean": float(recording.ticks.mean() * TICK),
         "return": score.mean_sd(recording.returns),
         "strides": {"count": both.count, "in_episodes_that_fell": tally.strides_of_falls},

@@ -30,7 +30,8 @@ from .schedules import BASELINES, Policy, baseline, own_settings
 _WHO = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed")
 _RANGES = ("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg", "stiffness_delay_range_s")
 _WORLD = ("push_newton", "friction", "slope_deg", "unevenness_m", "sensor_noise", "stiffness_delay_s")
-CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, *_WORLD, "start_noise")}
+_START = ("start", "stop_at", "start_noise")
+CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, *_WORLD, *_START)}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""

@@ -108,7 +108,8 @@ def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
     """The table's rows, in groups."""
     people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
     grf, their_grf, com = metrics["grf"], people["grf"], metrics["com"]
-    works = metrics["ankle_work_J_kg"]
+    works, rest = metrics["ankle_work_J_kg"], metrics["came_to_rest"]
+    at_rest = [] if rest is None else [("came to rest", "", f"{rest} of {metrics['episodes']}", "", "", "")]
 
     def row(
         label: str, unit: str, value: Any, pattern: str, their: Any = None, r: Any = None, inside: Any = None
@@ -127,6 +128,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
     return [
         [
             ("falls", "", f"{metrics['falls']} of {metrics['episodes']}", "", "", ""),
+            *at_rest,
             row("return", "", metrics["return"], ".1f"),
             row("speed", "m/s", metrics["speed_m_s"], ".3f", people["speed_m_s"]),
             row("step length", "m", metrics["step_length_m"], ".3f", people["step_length_m"]),

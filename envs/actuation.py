@@ -130,12 +130,17 @@ class FootSprings:
         return self._schedule.at(leg_phase, self._walkers.place) * self._walkers.scale["torque"][:, None, None]
 
     def set_stiffness(
-        self, action: NDArray, leg_phase: NDArray, angle: NDArray, running: NDArray | None = None
+        self,
+        action: NDArray,
+        leg_phase: NDArray,
+        angle: NDArray,
+        running: NDArray | None = None,
+        scheduled: NDArray | None = None,
     ) -> None:
         """Command new stiffness by an action (N, 4), to act after the delay.
 
         Changing K under a deflection x, that of joint angles (N, side, joint), puts 1/2 (K' - K) x^2 into the spring.
-        Without `running` (N,), all change.
+        Without `running` (N,), all change; those `scheduled` (N,) take the fixed stiffness instead.
         """
         action = action.reshape(self.stiffness.shape)
         if self._residual:
@@ -145,6 +150,10 @@ class FootSprings:
             if self._fixed:
                 middle = middle.copy()
                 middle[..., self._fixed] = self._schedule.at(leg_phase, self._walkers.place)[..., self._fixed]
+        if scheduled is not None:
+            who = scheduled[:, None, None]
+            middle = np.where(who, self._schedule.at(leg_phase, self._walkers.place), middle)
+            factor = np.where(who, 1.0, factor)
         running = self._everyone if running is None else running
         state = self._fresh, running, self._delay, self._commands, self.stiffness
         works = self.work_stiffness, self.work_equilibrium
@@ -162,6 +171,12 @@ class FootSprings:
         running = self._everyone if running is None else running
         state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
         _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)
+
+    def hold(self, control: NDArray, angle: NDArray, who: NDArray) -> None:
+        """Take K and K theta_eq of those of `who` (N,) from `control` (N, side, joint, 2), where another has put them;
+        without delay; the work of both changes is counted as above."""
+        works = self.work_stiffness, self.work_equilibrium
+        _hold(control, angle, who, self._fresh, self._commands, self.stiffness, self.equilibrium, *works)
 
 
 @kernel
@@ -249,3 +264,21 @@ def _arrive(delay, angle, equilibrium, commands, stiffness, work):
             work[side, joint] += 0.5 * (after - before) * deflection**2
             for past in range(len(commands) - 1, 0, -1):
                 commands[past, side, joint] = commands[past - 1, side, joint]
+
+
+@kernel
+def _hold(control, angle, who, fresh, commands, stiffness, equilibrium, work_stiffness, work_equilibrium):
+    for i in range(len(who)):
+        if not who[i]:
+            continue
+        for side in range(2):
+            for joint in range(2):
+                k, drive = control[i, side, ANKLE + joint]
+                theta, before = angle[i, side, ANKLE + joint], stiffness[i, side, joint]
+                old, new = equilibrium[i, side, joint] - theta, drive / k - theta
+                stiffness[i, side, joint], equilibrium[i, side, joint] = k, drive / k
+                commands[i, :, side, joint] = k
+                if not fresh[i]:
+                    work_stiffness[i, side, joint] += 0.5 * (k - before) * old * old
+                    work_equilibrium[i, side, joint] += 0.5 * k * (new * new - old * old)
+        fresh[i] = False

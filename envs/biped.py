@@ -25,7 +25,8 @@ from .outcome import Outcome, report
 from .pushes import Pushes
 from .settings import STEP_SECONDS, BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
-from .start import place, random_phase, start_table
+from .standing import Standing, off_phase
+from .start import place, random_phase, start_table, walking_posture
 from .task import ALIVE, Task
 from .walkers import Walkers
 from .walks import rows, walks_of
@@ -100,6 +101,8 @@ class Biped:
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers)
         self._decisions = Decisions(settings, self.human, num_envs)
         self._start = start_table(table)
+        uses = settings.start == "standing" or settings.stop_at is not None
+        self._standing = Standing(settings, self.walkers) if uses else None
         self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
@@ -152,17 +155,21 @@ class Biped:
         start: float | str | None = None,
         given: Mapping[str, NDArray] | None = None,
     ) -> None:
-        """Start environments `ids` anew, at people's posture in single support.
+        """Start environments `ids` anew, at people's posture in single support or standing.
 
         Args:
             ids: (K,) which.
             seeds: K seeds, or generators to draw from; None goes on with the environment's own.
-            start: stride phase of the left leg [0, 1) or "random", in place of the setting.
+            start: stride phase of the left leg [0, 1), "random" or "standing", in place of the setting.
             given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of what is set or drawn.
         """
         if len(ids) == 0:
             return
         start = self.settings.start if start is None else start
+        if start == "standing" != self.settings.start:
+            raise SpringfootError(
+                f"a reset can start 'standing' where the setting start is 'standing' too, got {self.settings.start!r}"
+            )
         phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
         randoms: list[np.random.Generator] = []
         for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
@@ -170,7 +177,7 @@ class Biped:
             if seed is not None or random is None:
                 random = self._random[index] = np.random.default_rng(seed)
             drawn = random_phase(random)
-            phase[row] = drawn if start == "random" else start
+            phase[row] = drawn if start == "random" else off_phase(drawn) if start == "standing" else start
             if self.settings.start_noise:
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
             self._pushes.reset(index, random)
@@ -183,7 +190,10 @@ class Biped:
         self._steps[ids] = 0
         self._last_action[ids] = 0.0
         self._force[ids] = 0.0
-        place(self._simulation, self._start, self.walkers, ids, phase, noise)
+        posture = walking_posture(self._start, self.walkers, ids, phase)
+        if self._standing is not None:
+            posture = self._standing.reset(ids, randoms, self._world.slope[ids], start == "standing") or posture
+        place(self._simulation, self.walkers, ids, posture, noise)
         self._now = self._simulation.measure()
 
     def _fit(self, ids: list[int]) -> None:
@@ -204,16 +214,19 @@ class Biped:
         running, ids = self._everyone, None
         if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
-        action = self._decode(actions, running)
-        if self.walkers.advance(self._steps, self._random, running):
-            self._legs.follow()
         springs, phase = self._springs, self._legs.phase
-        springs.set_stiffness(action, phase, self._now.angle, running)
+        action = self._decode(actions, running)
+        walking, scheduled = running, None
+        if self._standing is not None:
+            walking, scheduled = self._standing.switch(self._now, phase, self._steps * self.dt, running)
+        if self.walkers.advance(self._steps, self._random, walking):
+            self._legs.follow()
+        springs.set_stiffness(action, phase, self._now.angle, walking, scheduled)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
         rests = phase.copy() if self.settings.equilibrium == "phase" else phase  # a segment's rest goes with its K
         for window in range(self.windows):
-            self._window(running, ids, rests)
+            self._window(running, walking, ids, rests)
             self._windows[window] = self._now.force
         curves = self._task.at(phase)
         terms = self._task.terms(self._now, phase, action, self._last_action, springs.stiffness, self._windows, curves)
@@ -258,14 +271,18 @@ class Biped:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         return action
 
-    def _window(self, running: NDArray, ids: NDArray | None, rests: NDArray) -> None:
-        """One control window, the foot's springs resting as at the phases `rests` (N, side)."""
+    def _window(self, running: NDArray, walking: NDArray, ids: NDArray | None, rests: NDArray) -> None:
+        """One control window, the foot's springs of those `walking` (N,) resting as at the phases `rests` (N, side)."""
         legs, m, control = self._legs, self._now, self._simulation.control
         phase = None if self.on_tick is None else legs.phase.copy()
-        self._springs.move_equilibrium(rests, m.angle, control, running)
+        self._springs.move_equilibrium(rests, m.angle, control, walking)
         legs.command(m, control)
+        if self._standing is not None:
+            standing = running & ~walking
+            self._standing.command(m, standing, control)
+            self._springs.hold(control, m.angle, standing)
         self._now = self._simulation.advance(ids)
-        legs.advance(self._now, running)
+        legs.advance(self._now, walking)
         self._world.advance(self._now, legs.phase, self._random)
         if self.on_tick is not None and phase is not None:
             self.on_tick(self._tick(phase, running))

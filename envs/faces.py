@@ -108,6 +108,10 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     ## Starting state
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at
     the commanded speed, with `start_noise`. `reset(options={"start": phase})` sets the left leg's phase once.
+    With `start="standing"` the body stands for about a second, sets off and speeds up to the commanded speed; from
+    `stop_at` on it slows down, stops with one foot ahead and stands. Ankle and toe stiffness are then those of springs
+    that hold it, or of the fixed schedule while it sets off and slows down; info tells them, and the action acts in the
+    steady walk between. While it stands the phase waits, and reward and observation are against people and plan there.
 
     With `height_range`, `mass_range` or `speed_range` every episode draws its own body or speed; `options` may set them
     once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. Everything scales with the body as mechanics do, and is linear
@@ -150,7 +154,8 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `schedule`            | `None`         | a stiffness schedule in JSON form                                 |
     | `human`               | `None`         | someone's own walk in people's place, JSON form of `OwnGait`      |
     | `episode_seconds`     | `20.0`         | time until truncation [s]                                         |
-    | `start`               | `"random"`     | stride phase of the left leg at the start, or `"random"`          |
+    | `start`               | `"random"`     | left leg's stride phase at the start, `"random"` or `"standing"`  |
+    | `stop_at`             | `None`         | time from which the body slows down, stops and stands [s]         |
     | `start_noise`         | `0.0`          | relative spread of joint angles and velocities at the start       |
     | `push_newton`         | `0.0`          | size of each push on the trunk [N] for 63 kg, scales with mass    |
     | `push_seconds`        | `0.1`          | duration of each push [s]                                         |

@@ -105,8 +105,12 @@ class BipedSettings:
     CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time follow it."""
     episode_seconds: float = 20.0
     """Time after which an episode is truncated [s]."""
-    start: Literal["random"] | float = "random"
-    """Stride phase of the left leg at the start [0..1), or random within single support."""
+    start: Literal["random", "standing"] | float = "random"
+    """Start of an episode: walking at this stride phase of the left leg [0..1), at a random one within single support,
+    or standing: the body sets off by itself within 3 s (`springfoot.envs.standing`)."""
+    stop_at: float | None = None
+    """Time in the episode from which the body slows down, then stops and stands [s]; not before 3 s if it starts
+    standing."""
     start_noise: float = 0.0
     """Relative spread of the joint angles and velocities at the start [0..1]."""
     push_newton: float = 0.0
@@ -154,6 +158,8 @@ class BipedSettings:
             OwnGait.from_json(self.human)
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
+        if self.stop_at is not None:
+            require_number("stop_at", self.stop_at, 3.0 if self.start == "standing" else 0.0, unit="s")
         require_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
         require_number("push_newton", self.push_newton, 0.0, unit="N")
         require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
@@ -246,9 +252,9 @@ def reference_gait(settings: BipedSettings) -> HumanGait:
 
 
 def check_start(start: Any) -> None:
-    """Refuses what is neither "random" nor a stride phase in [0, 1)."""
-    if start != "random" and not (_is_number(start) and 0 <= start < 1):
-        raise SpringfootError(f"start must be 'random' or a stride phase in [0, 1), got {start!r}")
+    """Refuses what is neither "random" nor "standing" nor a stride phase in [0, 1)."""
+    if start not in ("random", "standing") and not (_is_number(start) and 0 <= start < 1):
+        raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {start!r}")
 
 
 def _plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""How a walk starts: at people's posture in single support, the lowest contact point just in the floor."""
+"""How an episode starts: at people's posture in single support, or standing, the lowest point just in the floor."""
 
 from collections.abc import Iterable
 
@@ -30,19 +30,32 @@ def random_phase(random: np.random.Generator) -> float:
     return (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
 
 
+def walking_posture(
+    table: PhaseTable, walkers: Walkers, ids: NDArray, left_phase: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """People's joint angles and rates (K, side, joint) at `left_phase` (K,) of `table`, the hips' angles against the
+    vertical, trunk pitch (K,) [rad] and the commanded speed (K,) [m/s] of `ids` (K,)."""
+    curves = table.at(leg_phases(left_phase), walkers.place[ids])
+    angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
+    return angle, velocity / walkers.scale[ids]["root"][:, None, None], curves[:, 0, -1], walkers.speed[ids]
+
+
 def place(
-    simulation: Simulation, table: PhaseTable, walkers: Walkers, ids: NDArray, left_phase: NDArray, noise: NDArray
+    simulation: Simulation,
+    walkers: Walkers,
+    ids: NDArray,
+    posture: tuple[NDArray, NDArray, NDArray, NDArray],
+    noise: NDArray,
 ) -> None:
-    """Put `ids` (K,) in people's posture at `left_phase` (K,) of `table`, at the commanded speed; `noise`
-    (K, 2, side, joint) is the relative error of angles and velocities."""
-    row, scale = walkers.place[ids], walkers.scale[ids]
-    curves = table.at(leg_phases(left_phase), row)
-    (angle, velocity), pitch = np.split(curves[..., :-1], 2, axis=-1), curves[:, 0, -1]
-    angle = angle * (1.0 + noise[:, 0])
-    velocity = velocity / scale["root"][:, None, None] * (1.0 + noise[:, 1])
+    """Put `ids` (K,) into a `posture` as of `walking_posture`.
+
+    `noise` (K, 2, side, joint) is the relative error of its angles and rates.
+    """
+    (angle, velocity, pitch, speed), scale = posture, walkers.scale[ids]
+    angle, velocity = angle * (1.0 + noise[:, 0]), velocity * (1.0 + noise[:, 1])
     angle[..., HIP] += pitch[:, None]
     root, rate = np.zeros((2, len(ids), 3))
-    root[:, 2], rate[:, 0] = pitch, walkers.speed[ids]
+    root[:, 2], rate[:, 0] = pitch, speed
     simulation.reset(ids, root, rate, angle, velocity)
     lowest = simulation.measure().contact[ids, ..., 1].min(axis=(1, 2))
     root[:, 1] = -lowest - START_DEPTH * simulation.body.length_scale * scale["length"]

@@ -50,7 +50,8 @@ class Walkers:
         """(N,) where that is in tables of variants x speeds."""
         self.scale = np.ones(num, SCALE)
         """(N,) ratios of the bodies to the settings' own."""
-        self._target = self.speed.copy()
+        self.target = self.speed.copy()
+        """(N,) which it goes to [m/s]."""
         self._change = np.full(num, np.inf)  # time of the next speed drawn [s]
         self._changing = False
         self._everyone = np.arange(num)
@@ -75,7 +76,7 @@ class Walkers:
                 self.bodies[index] = body
                 length, mass = body.height / self._home.height, body.mass / self._home.mass
                 self.scale[index] = length, sqrt(length), mass, mass * length
-            self.speed[index] = self._target[index] = speed
+            self.speed[index] = self.target[index] = speed
             self._change[index] = self._wait(0.0, random)
         self._locate(ids)
         return others
@@ -84,7 +85,17 @@ class Walkers:
         """From now on go to `speed` (K,) [m/s], at the settings' `speed_rate`."""
         for index, value in zip(ids.tolist(), speed.tolist(), strict=True):
             self._check(self.bodies[index], value)
-        self._target[ids] = speed
+        self.target[ids] = speed
+        self._changing = True
+
+    def begin(self, ids: NDArray, speed: NDArray) -> None:
+        """Command `speed` (K,) [m/s] of environments `ids` (K,) now, from where they go on to their own."""
+        self.speed[ids] = speed
+        self._changing = True
+
+    def end(self, ids: NDArray, speed: NDArray) -> None:
+        """From now on go to `speed` (K,) [m/s], and to no other."""
+        self.target[ids], self._change[ids] = speed, np.inf
         self._changing = True
 
     def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
@@ -95,12 +106,12 @@ class Walkers:
             for index in np.flatnonzero(running & (time >= self._change)).tolist():
                 random = randoms[index]
                 if random is not None and settings.speed_range is not None:
-                    self._target[index] = random.uniform(*settings.speed_range)
+                    self.target[index] = random.uniform(*settings.speed_range)
                     self._change[index] = self._wait(time[index], random)
                     self._changing = True
         if not self._changing:
             return False
-        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self._target, self.speed)
+        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self.target, self.speed)
         self._locate(self._everyone)
         return True
 

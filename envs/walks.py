@@ -21,6 +21,7 @@ from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
 from .constants import LegConstants, leg_constants
 from .phase import GRID
 from .settings import BipedSettings, body_of, reference_gait
+from .standing import SLOW_SPEED
 
 SPACING = 0.1
 """Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
@@ -111,9 +112,11 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     lowest, highest = (sqrt(height / other) for other in reversed(settings.height_range or (height, height)))
     slow, fast = settings.speed_range or (speed, speed)
     slow, fast = min(slow * lowest, speed), max(fast * highest, speed)
+    unit = sqrt(body_of(settings).length_scale)
+    if settings.start == "standing" or settings.stop_at is not None:
+        slow = min(slow, SLOW_SPEED * unit)
     if slow == fast:
         return np.array([speed])
-    unit = sqrt(body_of(settings).length_scale)
     first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
     grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # 1.2, and not 12 x 0.1
     return np.array(sorted({*grid, speed}))

@@ -26,6 +26,8 @@ LOADING_END_PERCENT = 10
 """Loading response: 0 to 10 % of the stride."""
 PUSH_OFF_BEGIN_PERCENT = 45
 """Push-off: 45 % to toe-off; mid-stance lies between loading and push-off."""
+REST_SECONDS, REST_TRAVEL = 1.0, 0.01
+"""A body is at rest whose points stay within so many metres, forward and up, for so long [s] at the end."""
 
 
 def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
@@ -199,6 +201,12 @@ def travel(position: NDArray, force: NDArray, least: float) -> float:
     share = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
     loaded = force.sum(axis=1) > least
     return float(np.sum((np.abs(np.diff(position, axis=0)) * share)[loaded[1:] & loaded[:-1]]))
+
+
+def at_rest(*points: NDArray, tick: float) -> bool:
+    """Whether points (T, 2) [m], sampled every `tick` [s], rest at the end; False for a series that is too short."""
+    samples = round(REST_SECONDS / tick)
+    return all(len(x) >= samples and np.ptp(x[-samples:], axis=0).max() <= REST_TRAVEL for x in points)
 
 
 def mean_sd(values: ArrayLike) -> dict[str, float | None]:

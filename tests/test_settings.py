@@ -89,7 +89,7 @@ BAD = [
     ({"human": OWN | {"stride_time": -1.0}}, ["my_gait.csv", "stride_time", "-1"]),
     ({"human": OWN | {"mean": {"elbow": [[0, 0]]}}}, ["human", "elbow", "knee"]),
     ({"episode_seconds": 0.0}, ["episode_seconds", "0.02"]),
-    ({"start": "standing"}, ["start", "'random'", "[0, 1)"]),
+    ({"start": "lying"}, ["start", "'random'", "[0, 1)"]),
     ({"start": 1.0}, ["start", "1.0"]),
     ({"start_noise": 2.0}, ["start_noise", "2.0"]),
     ({"push_newton": -150.0}, ["push_newton", "-150.0"]),
