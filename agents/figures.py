@@ -15,7 +15,8 @@ from springfoot.envs.settings import reference_gait
 from springfoot.gait import HumanGait
 from springfoot.gait.cycle import PERCENT
 
-from .evaluation import JOINT_CURVES, MOMENT_CURVES, Curves, Gait
+from .curves import Curves
+from .evaluation import JOINT_CURVES, MOMENT_CURVES, Gait
 from .recording import Recording
 
 MODEL, PLAN, PEOPLE = "#0b6e8f", "#d1495b", "#8a8a8a"

@@ -22,7 +22,8 @@ from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
 
 from .animation import save_animation
-from .evaluation import Curves, Gait
+from .curves import Curves
+from .evaluation import Gait
 from .figures import save_gait_figure
 from .recording import Recording
 
