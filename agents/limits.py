@@ -160,3 +160,14 @@ LOADS_LIKE_PEOPLE = (
 )
 """Human-like in force: ground reaction forces, joint moments and ankle work."""
 HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE)
+
+FOLLOWS_THE_PLAN = (
+    Limit(name="CoM x off by", path=("com", "x_rmse_m"), high=0.02, unit=" m", pattern=".4f"),
+    Limit(name="CoM z off by", path=("com", "z_rmse_m"), high=0.006, unit=" m", pattern=".4f"),
+    _r("CoM z r", ("com", "z_r"), 0.9),
+    _r("forward speed r", ("com", "vx_r"), 0.9),
+    Limit(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
+    Limit(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
+    Limit(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
+)
+"""Its CoM against the ZMP plan, and feet that neither slide nor stub."""
