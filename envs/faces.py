@@ -146,6 +146,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `speed_rate`          | `0.25`         | rate at which it goes to a new one [m/s^2]                        |
     | `cadence`             | `"people"`     | step length and time of `"people"` or of the `"thesis"`           |
     | `equilibrium`         | `"planned"`    | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                  |
+    | `feedforward`         | `"people"`     | moments fed forward: measured on `"people"`, or the `"plan"`'s own |
     | `action_mode`         | `"absolute"`   | `"absolute"` or `"residual"`                                      |
     | `decisions`           | `"50hz"`       | steps of 10, 20, 40 ms (`"100hz"`, `"50hz"`, `"25hz"`), `"event"` |
     | `stiffness_joints`    | `"both"`       | joints the action decides: `"both"`, `"ankle"` or `"toe"`         |
@@ -160,6 +161,13 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `push_newton`         | `0.0`          | size of each push on the trunk [N] for 63 kg, scales with mass    |
     | `push_seconds`        | `0.1`          | duration of each push [s]                                         |
     | `push_interval`       | `4.0`          | one push at a random time in each interval [s]                    |
+    | `friction`            | `1.0`          | coefficient of friction between feet and ground                   |
+    | `slope_deg`           | `0.0`          | slope of the ground, uphill positive [deg]                        |
+    | `slope_range_deg`     | `None`         | slopes drawn at each reset [deg], in place of `slope_deg`         |
+    | `unevenness_m`        | `0.0`          | each footfall's ground is up to this much higher or lower [m]     |
+    | `sensor_noise`        | `0.0`          | SD of noise on what is measured of the observation                |
+    | `stiffness_delay_s`   | `0.0`          | a commanded stiffness acts this much later [s]                    |
+    | `stiffness_delay_range_s` | `None`         | delays drawn at each reset [s], in place of it                    |
     | `reward_weights`      | `{}`           | weights that differ from the table above                          |
     | `human`               | `None`         | own gait data in people's place: `read_gait(FILE).to_json()`      |
 
