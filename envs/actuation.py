@@ -13,6 +13,7 @@ from springfoot.gait.human import HumanGait
 from springfoot.gait.stiffness import ankle_events, toe_events
 
 from .kernel import kernel
+from .legs import SLOPE_TABLE
 from .model import ANKLE
 from .phase import GRID, PhaseTable
 from .settings import LONGEST_DELAY, BipedSettings
@@ -100,6 +101,7 @@ class FootSprings:
         walkers: Walkers,
     ):
         num = len(walkers.place)
+        self._follows = settings.equilibrium in ("planned", "angle")  # a constant stays one on a slope too
         self._residual = settings.action_mode == "residual"
         self._fixed = [joint for joint, name in enumerate(("toe", "ankle")) if settings.stiffness_joints == name]
         middle, self._factor = _log_scale(settings, body)
@@ -168,6 +170,8 @@ class FootSprings:
         Moving the rest angle from deflection x to x' puts 1/2 K (x'^2 - x^2) into the spring.
         """
         equilibrium = self._equilibrium.at(leg_phase, self._walkers.place)
+        if self._follows and self._walkers.slope.any():
+            equilibrium[..., 0] += self._walkers.slope[:, None] * SLOPE_TABLE.at(leg_phase)[..., ANKLE]
         running = self._everyone if running is None else running
         state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
         _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)

@@ -106,7 +106,7 @@ class Biped:
         self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
-        self._world = World(settings, self._simulation)
+        self._world = World(settings, self._simulation, self.walkers)
         self._task = Task(settings, table, self.walkers)
         self.observation_names = self._task.names
         self.observation_low, self.observation_high = self._task.low, self._task.high

@@ -6,7 +6,7 @@ Mechanics scale exactly (`envs.model`). So curves are tabulated for one body, th
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import sqrt
+from math import radians, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,8 @@ class Walkers:
         """(N,) where that is in tables of variants x speeds."""
         self.scale = np.ones(num, SCALE)
         """(N,) ratios of the bodies to the settings' own."""
+        self.slope = np.full(num, radians(settings.slope_deg))
+        """(N,) of the ground [rad], uphill positive (`envs.world`)."""
         self.target = self.speed.copy()
         """(N,) which it goes to [m/s]."""
         self._change = np.full(num, np.inf)  # time of the next speed drawn [s]

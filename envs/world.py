@@ -10,6 +10,7 @@ from .model import SIDES
 from .observation import OBSERVATION
 from .settings import BipedSettings
 from .simulation import WINDOW, Measurement, Simulation
+from .walkers import Walkers
 
 MID_SWING = 0.75
 """Phase at which a swinging foot gets the ground of its next footfall: it is then 35 mm or more above the old one."""
@@ -21,12 +22,13 @@ class World:
     Args:
         settings: friction apart, which is the simulation's.
         simulation: whose ground this is.
+        walkers: whose slope this is.
     """
 
-    def __init__(self, settings: BipedSettings, simulation: Simulation):
+    def __init__(self, settings: BipedSettings, simulation: Simulation, walkers: Walkers):
         self._settings, self._simulation = settings, simulation
         num = simulation.num
-        self.slope = np.full(num, radians(settings.slope_deg))
+        self.slope = walkers.slope
         """(N,) of the ground [rad], uphill positive."""
         self.height = np.zeros((num, len(SIDES)))
         """(N, side) of the ground below a foot above the mean one [m]."""

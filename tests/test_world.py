@@ -151,3 +151,27 @@ def test_noise_is_on_what_is_measured_alone_new_at_every_step_and_of_its_size():
     free = measured & np.array([not entry.name.startswith("load") for entry in OBSERVATION])  # loads stop at 0
     np.testing.assert_allclose(noise[..., free].std(axis=(0, 1)), 0.02, rtol=0.2)
     assert np.abs(np.mean(noise[1:, :, free] * noise[:-1, :, free])) < 0.02**2 / 20
+
+
+def test_the_controller_walks_up_and_down_a_slope_at_about_the_commanded_speed():
+    for slope_deg in (-3.0, 3.0):
+        biped = Biped(settings_from(slope_deg=slope_deg), 4)
+        biped.reset(np.arange(4), range(4))
+        way = []
+        for _ in range(200):
+            assert not biped.step(scheduled(biped)).terminated.any()
+            way.append(biped.measurement.com[:, 0])
+        speed = (way[-1] - way[50]) / (149 * biped.dt)
+        np.testing.assert_allclose(speed, biped.settings.speed, rtol=0.15)
+
+
+def test_constant_rest_angles_stay_constant_on_a_slope():
+    level, sloping = (Biped(settings_from(equilibrium="neutral", slope_deg=slope), 1) for slope in (0.0, 4.0))
+    rests = []
+    for biped in (level, sloping):
+        ticks: list[Tick] = []
+        biped.on_tick = ticks.append
+        biped.reset(np.arange(1), [0])
+        biped.step(np.zeros((1, 4)))
+        rests.append(ticks[0].equilibrium[..., FEET])
+    np.testing.assert_array_equal(*rests)
