@@ -8,11 +8,11 @@ the page from what there is. All rows earn the default reward when measured, so 
 """
 
 import json
-import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
+from itertools import product
 from operator import getitem
 from pathlib import Path
 from typing import Annotated, Any
@@ -36,7 +36,7 @@ from .evaluation import measure
 from .page import MISSING, table, text_of, write_section
 from .recording import prepare, record
 from .report import people_metrics
-from .training import RUN
+from .seeds import is_finished, train_missing
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
@@ -131,34 +131,12 @@ def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> Trainin
     )
 
 
-def train_missing(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> str:
-    """Trains every row and seed that is not finished in `out`, one process a processor; `finished` or why not.
-
-    What was begun and not finished begins anew. Raises `SpringfootError` for finished ones of another length.
-    """
-    from .seeds import train_all  # torch takes seconds
-
-    jobs = []
-    for seed in range(seeds):  # every row once before any twice
-        for name in names:
-            config, folder = config_of(name, seed, timesteps), out / name / f"seed-{seed}"
-            if _is_finished(folder):
-                done = json.loads((folder / RUN).read_text(encoding="utf-8"))["config"]["timesteps"]
-                if done != config.timesteps:
-                    raise SpringfootError(
-                        f"{folder} has trained {done:,} steps, not {config.timesteps:,}; give another --out"
-                    )
-                continue
-            jobs.append((config, folder, f"{name}, seed {seed}"))
-    for _, folder, _ in jobs:
-        if (folder / RUN).is_file():
-            shutil.rmtree(folder)
-    return train_all(jobs)[1] if jobs else "finished"
-
-
-def _is_finished(folder: Path) -> bool:
-    run = folder / RUN
-    return run.is_file() and json.loads(run.read_text(encoding="utf-8")).get("status") == "finished"
+def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> list[tuple[TrainingConfig, Path, str]]:
+    """Each row and seed to train: configuration, folder and what it is called."""
+    order = product(range(seeds), names)  # every row once before any twice
+    return [
+        (config_of(name, seed, timesteps), out / name / f"seed-{seed}", f"{name}, seed {seed}") for seed, name in order
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,7 +191,7 @@ def trained(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
     rows = {}
     for name in ABLATIONS:
         folders = sorted((out / name).glob("seed-*"), key=lambda each: int(each.name.removeprefix("seed-")))
-        done = [folder for folder in folders if _is_finished(folder)]
+        done = [folder for folder in folders if is_finished(folder)]
         if done:
             rows[name] = [measured(each / RESULT, how, name, partial(how.of, str(each))) for each in done]
     return rows
@@ -308,7 +286,7 @@ def run(flags: Flags) -> int:
             raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
     status = "finished"
     if flags.train:
-        status = train_missing(flags.out, flags.only or tuple(ABLATIONS), flags.seeds, flags.timesteps)
+        status = train_missing(jobs(flags.out, flags.only or tuple(ABLATIONS), flags.seeds, flags.timesteps))
         if status == "interrupted":
             return 130
     rows = trained(flags.out, how)

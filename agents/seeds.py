@@ -5,6 +5,7 @@ Seed k is trained in the folder `seed-k`, by the same bits as `train.py --seed k
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from types import TracebackType
 from typing import Any
 
 from springfoot.envs.biped import Biped
-from springfoot.gait.errors import require_count
+from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 
 from .bundle import write_atomically
@@ -62,6 +63,30 @@ def train_all(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> tuple[list[di
         rows = list(pool.map(lambda job: trainings.run(*job), jobs))
     status = "interrupted" if trainings.stopping else "finished"
     return rows, "failed" if any(row["status"] == "failed" for row in rows) else status
+
+
+def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
+    """As `train_all`, of those that are not finished; what was begun and not finished begins anew.
+
+    Returns `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing changed, for a finished one of
+    other settings.
+    """
+    missing = [job for job in jobs if not is_finished(job[1])]
+    for config, folder, _ in jobs:
+        if is_finished(folder):
+            done = config_from_json(json.loads((folder / RUN).read_text(encoding="utf-8"))["config"])
+            if replace(done, threads=config.threads) != config:
+                raise SpringfootError(f"{folder} was trained with other settings; give another --out")
+    for _, folder, _ in missing:
+        if (folder / RUN).is_file():
+            shutil.rmtree(folder)
+    return train_all(missing)[1] if missing else "finished"
+
+
+def is_finished(folder: Path) -> bool:
+    """Whether a run folder holds a training that came to its end."""
+    run = folder / RUN
+    return run.is_file() and json.loads(run.read_text(encoding="utf-8")).get("status") == "finished"
 
 
 def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:

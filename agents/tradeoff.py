@@ -7,8 +7,6 @@ softest springs that still walk like people and stand pushes. A seed that is fin
 command may be stopped and begun anew, with more weights or seeds, or with `--no-train` to measure what there is.
 """
 
-import json
-import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -30,12 +28,12 @@ from springfoot.gait.scores import mean_sd
 
 from .agreement import agreements
 from .command import exit_code
-from .config import PRESETS, TrainingConfig, config_from_json
+from .config import PRESETS, TrainingConfig
 from .evaluation import WARM_UP, Gait, measure
 from .figures import MODEL, PLAN, STYLE
 from .page import MISSING, table, text_of, write_section
 from .recording import TICK, Recording, prepare, record
-from .training import RUN
+from .seeds import is_finished, train_missing
 
 SECTION = "TRADE-OFF"
 """Of the results page."""
@@ -95,40 +93,6 @@ def config_of(weight: float, seed: int, term: Term, timesteps: int | None = None
 def folder_of(out: Path, term: Term, weight: float, seed: int) -> Path:
     """Where that training lies in `out`."""
     return out / f"{term}-{weight:g}" / f"seed-{seed}"
-
-
-def train_missing(out: Path, term: Term, weights: Sequence[float], seeds: int, timesteps: int | None) -> str:
-    """Trains every weight and seed that is not finished in `out`, one process a processor; `finished` or why not.
-
-    What was begun and not finished begins anew. Raises `SpringfootError` for a finished one of other settings.
-    """
-    from .seeds import train_all  # torch takes seconds
-
-    jobs = []
-    for seed in range(seeds):  # every weight once before any twice
-        for weight in weights:
-            config, folder = config_of(weight, seed, term, timesteps), folder_of(out, term, weight, seed)
-            if not _is_finished(folder):
-                jobs.append((config, folder, f"{term} {weight:g}, seed {seed}"))
-            elif replace(_config(folder), threads=config.threads) != config:
-                raise SpringfootError(f"{folder} was trained with other settings; give another --out")
-    for _, folder, _ in jobs:
-        if (folder / RUN).is_file():
-            shutil.rmtree(folder)
-    return train_all(jobs)[1] if jobs else "finished"
-
-
-def _record(folder: Path) -> dict[str, Any]:
-    path = folder / RUN
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-
-
-def _is_finished(folder: Path) -> bool:
-    return _record(folder).get("status") == "finished"
-
-
-def _config(folder: Path) -> TrainingConfig:
-    return config_from_json(_record(folder)["config"])
 
 
 def measure_point(
@@ -293,18 +257,20 @@ def run(flags: Flags) -> int:
     weights = sorted(set(flags.weights))
     if not weights or not flags.pushes:
         raise SpringfootError("give one weight and one push or more")
-    for weight in weights:
-        config_of(weight, 0, flags.term, flags.timesteps)  # refuses a bad one before anything is trained
-    status = "finished"
-    if flags.train:
-        status = train_missing(flags.out, flags.term, weights, flags.seeds, flags.timesteps)
-        if status == "interrupted":
-            return 130
+    jobs = []
+    for seed in range(flags.seeds):  # every weight once before any twice
+        for weight in weights:
+            config = config_of(weight, seed, flags.term, flags.timesteps)
+            folder = folder_of(flags.out, flags.term, weight, seed)
+            jobs.append((config, folder, f"{flags.term} {weight:g}, seed {seed}"))
+    status = train_missing(jobs) if flags.train else "finished"
+    if status == "interrupted":
+        return 130
     points = []
     with tqdm(desc="trade-off", unit="s", unit_scale=True, leave=False, disable=None) as bar:
         for weight in weights:
             folders = [folder_of(flags.out, flags.term, weight, seed) for seed in range(flags.seeds)]
-            if done := [folder for folder in folders if _is_finished(folder)]:
+            if done := [folder for folder in folders if is_finished(folder)]:
                 how: dict[str, Any] = {"episodes": flags.episodes, "threads": flags.threads, "progress": bar.update}
                 points.append(measure_point(weight, done, flags.pushes, flags.seconds, **how))
     if not points:
