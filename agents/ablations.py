@@ -40,6 +40,7 @@ from .seeds import is_finished, train_missing
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
+    "absolute": {"action_mode": "absolute"},
     "neutral": {"equilibrium": "neutral"},
     "phase": {"equilibrium": "phase"},
     "100hz": {"decisions": "100hz"},
@@ -51,10 +52,12 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "ankle-only": {"stiffness_joints": "ankle"},
     "toe-only": {"stiffness_joints": "toe"},
 }
-"""Environment settings in which each training differs from preset `walk` (planned, 50 Hz, all terms, both joints);
+"""Environment settings in which each training differs from preset `walk` (planned, residual, 50 Hz, all terms,
+both joints);
 `phase` also has the schedule of `phase_schedule`."""
 MEANING = {
     "walk": "the preset: planned equilibrium, 50 Hz, every reward term, ankle and toe",
+    "absolute": "K anywhere in its range, in place of a factor on the fixed schedule",
     "neutral": "θ_eq constant, on the leg constants of `neutral`",
     "phase": "θ_eq constant in each of ten phases, the planned one's mean",
     "100hz": "K decided at 100 Hz",

@@ -5,7 +5,7 @@ import dataclasses
 import inspect
 import json
 import textwrap
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
@@ -16,6 +16,9 @@ import tyro
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.own_data import read_gait
+
+TRAINED_ON = BipedSettings(action_mode="residual", episode_seconds=10.0, push_newton=150.0)
+"""The task that is trained on unless flags say otherwise: the fixed schedule's stiffness times the policy's factor."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +49,7 @@ class TrainingConfig:
     """Lambda of the generalised advantage estimate, per 20 ms [0..1]."""
     clip_range: float = 0.2
     """Largest relative change of an action's probability that one update rewards."""
-    log_std: float = -0.7
+    log_std: float = -0.9
     """Logarithm of the standard deviation of the actions at the start."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden tanh layers, the same for actor and critic."""
@@ -54,7 +57,7 @@ class TrainingConfig:
     """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
     eval_episodes: int = 16
     """Episodes of each periodic evaluation, on the same fixed seeds every time."""
-    environment: BipedSettings = field(default_factory=lambda: BipedSettings(episode_seconds=10.0, push_newton=150.0))
+    environment: BipedSettings = field(default_factory=lambda: TRAINED_ON)
     """Settings of the walking task that is trained on."""
 
     def __post_init__(self) -> None:
@@ -78,13 +81,15 @@ PRESETS: dict[str, TrainingConfig] = {
     "any-body": TrainingConfig(
         timesteps=6_000_000,
         eval_interval=262_144,
-        environment=BipedSettings(
+        environment=replace(
+            TRAINED_ON,
             height_range=(1.45, 2.0),
             mass_range=(40.0, 120.0),
             speed_range=(0.8, 1.6),
             speed_interval=4.0,
-            episode_seconds=10.0,
-            push_newton=150.0,
+            slope_range_deg=(-5.0, 5.0),
+            unevenness_m=0.01,
+            stiffness_delay_range_s=(0.0, 0.02),
         ),
     ),
 }

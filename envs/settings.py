@@ -47,7 +47,7 @@ DEFAULT_WEIGHTS = {
     "pose": 0.60,
     "grf": 0.60,
     "stiffness_rate": -0.05,
-    "stiffness": -0.05,
+    "stiffness": -0.02,
 }
 """Weight of each reward term (`springfoot.envs.task`); a positive one rewards, a negative one is a cost."""
 
