@@ -53,8 +53,7 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "toe-only": {"stiffness_joints": "toe"},
 }
 """Environment settings in which each training differs from preset `walk` (planned, residual, 50 Hz, all terms,
-both joints);
-`phase` also has the schedule of `phase_schedule`."""
+both joints); `phase` also has the schedule of `phase_schedule`."""
 MEANING = {
     "walk": "the preset: planned equilibrium, 50 Hz, every reward term, ankle and toe",
     "absolute": "K anywhere in its range, in place of a factor on the fixed schedule",

@@ -97,7 +97,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | Term           | Weight | Meaning                                                                         |
     | -------------- | ------ | ------------------------------------------------------------------------------- |
     | alive          | 0.15   | neither fallen nor diverged                                                     |
-    | speed          | 0.25   | exp(-(e/0.1)^2), e forward speed of the CoM minus plan [m/s]                   |
+    | speed          | 0.6    | exp(-(e/0.08)^2), e forward speed of the CoM minus plan [m/s]                   |
     | com_x          | 0.15   | exp(-(e/0.1)^2), e CoM minus plan, forward [m]                                  |
     | com_z          | 0.1    | exp(-(e/0.03)^2), e CoM minus plan, up [m]                                      |
     | pose           | 0.6    | exp(-E/0.02), E squared distance [rad^2] from people's joint angles             |

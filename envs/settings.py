@@ -41,7 +41,7 @@ LONGEST_DELAY = 0.04
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
-    "speed": 0.25,
+    "speed": 0.60,
     "com_x": 0.15,
     "com_z": 0.10,
     "pose": 0.60,
