@@ -41,11 +41,11 @@ LONGEST_DELAY = 0.04
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
-    "speed": 0.60,
+    "speed": 0.50,
     "com_x": 0.15,
     "com_z": 0.10,
     "pose": 0.60,
-    "grf": 0.60,
+    "grf": 0.70,
     "stiffness_rate": -0.05,
     "stiffness": -0.02,
 }

@@ -36,7 +36,7 @@ TOO_LOW, TOO_TILTED = "fell: hip too low", "fell: trunk too tilted"
 
 COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.1, 0.03
 """Error of the CoM at which its reward is 1/e [m at 1.70 m, scaled with height] (design study)."""
-SPEED_TOLERANCE = 0.08
+SPEED_TOLERANCE = 0.10
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]."""
 POSE_WEIGHTS = {HIP: 3.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
 """Share of each joint in the pose error E; the toe counts little, its curve is of other people."""
