@@ -41,6 +41,7 @@ from .seeds import is_finished, train_missing
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
     "absolute": {"action_mode": "absolute"},
+    "plan-moments": {"feedforward": "plan"},
     "neutral": {"equilibrium": "neutral"},
     "phase": {"equilibrium": "phase"},
     "100hz": {"decisions": "100hz"},
@@ -57,6 +58,7 @@ both joints); `phase` also has the schedule of `phase_schedule`."""
 MEANING = {
     "walk": "the preset: planned equilibrium, 50 Hz, every reward term, ankle and toe",
     "absolute": "K anywhere in its range, in place of a factor on the fixed schedule",
+    "plan-moments": "moments fed forward from the plan's inverse dynamics, not people's; leg constants of its own",
     "neutral": "θ_eq constant, on the leg constants of `neutral`",
     "phase": "θ_eq constant in each of ten phases, the planned one's mean",
     "100hz": "K decided at 100 Hz",
