@@ -26,7 +26,7 @@ IGNORED = 1e12
 
 
 class Learner:
-    """An untrained actor and critic on a batch of environments; the actor's mean action begins at 0, mid-range or schedule.
+    """An untrained actor and critic on a batch of environments; the actor's mean action begins at 0.
 
     Orthogonal weights, on the action layer with gain 0.01, and biases of zero. Observations and rewards are
     normalised by their running statistics.
