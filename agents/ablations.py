@@ -107,7 +107,7 @@ def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
     """
     walk = walk_at(settings, settings.speed)
     planned = replace(settings, equilibrium="planned", schedule=None)
-    rest, stiffness = foot_curves(planned, walk.constants[0], walk.body, walk.human, walk.plan.stride_time)
+    rest, stiffness = foot_curves(planned, walk.constants[0], walk)
     place = np.searchsorted(PLATEAUS, GRID, side="right") - 1
     segments: list[list[Segment]] = [[], []]
     for index, start in enumerate(PLATEAUS):

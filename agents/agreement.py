@@ -216,7 +216,7 @@ def run(flags: Flags) -> None:
     """Walk every policy, print the tables, and write the picture and the curves."""
     for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
         require_count(name, getattr(flags, name), least)
-    how = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
+    how: dict[str, Any] = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
     prepared = [(name, *prepare(name, {"episode_seconds": flags.seconds}, flags.seed)) for name in flags.policies]
     gaits = []
     with tqdm(desc="agreement", unit="s", unit_scale=True, leave=False, disable=None) as bar:

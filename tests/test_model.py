@@ -50,7 +50,8 @@ def test_leaning_under_a_load_the_com_of_trunk_and_load_is_over_the_hip():
     data.joint("pitch").qpos = body.trunk_lean
     mujoco.mj_forward(model, data)
     upper = [data.body(name) for name in ("trunk", "load")]
-    moment = sum(mass * segment.xipos for mass, segment in zip((body.trunk_mass, 0.25 * 75.0), upper, strict=True))
+    masses = np.array([body.trunk_mass, 0.25 * 75.0])
+    moment = masses @ [segment.xipos for segment in upper]
     assert moment[0] == pytest.approx(0.0, abs=1e-12)
     assert moment[2] == pytest.approx(np.hypot(*body.upper_moment), rel=1e-12)
     assert 5 < np.degrees(body.trunk_lean) < 12 and Body().trunk_lean == 0

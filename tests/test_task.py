@@ -104,7 +104,7 @@ def test_planned_speed_is_the_derivative_of_the_planned_com(thesis_body):
 
 @pytest.mark.parametrize(
     ("term", "field", "offset"),
-    [("com_x", "com", (0.1, 0)), ("com_z", "com", (0, -0.03)), ("speed", "com_velocity", (-0.15, 0))],
+    [("com_x", "com", (0.1, 0)), ("com_z", "com", (0, -0.03)), ("speed", "com_velocity", (-0.1, 0))],
 )
 @pytest.mark.parametrize("height", [1.7, 1.3])
 def test_tracking_falls_to_one_over_e_at_its_tolerance(term, field, offset, height):
