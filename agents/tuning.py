@@ -261,7 +261,7 @@ def tune(flags: TuningFlags) -> None:
         require_count(count, getattr(flags, count), least)
     require_number("sigma", flags.sigma, 0, above=True)
     name = constants_name(flags.equilibrium, flags.cadence, flags.speed, flags.feedforward)
-    constants = _read(flags.out)["constants"]
+    constants = read_table(flags.out)["constants"]
     if (start := flags.start or name) not in constants:
         raise SpringfootError(f"no constants {start!r} to start from in {flags.out}; --start: {', '.join(constants)}")
     search = Search(constants_from(constants[start]))
@@ -283,13 +283,13 @@ def tune(flags: TuningFlags) -> None:
         if generation % 10 == 9 or generation == flags.generations - 1:
             mean = search.constants(strategy.mean)
             print(f"generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}", flush=True)
-            table = _read(flags.out)  # anew: another search may have written its own
+            table = read_table(flags.out)  # anew: another search may have written its own
             table["constants"][name] = asdict(mean)
             table.setdefault("found_by", {})[name] = " ".join(["python -m springfoot.agents.tuning", *sys.argv[1:]])
             flags.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_table(path: Path) -> dict[str, Any]:
     """A file of constants."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))

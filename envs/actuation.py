@@ -13,7 +13,6 @@ from springfoot.gait.human import HumanGait
 from springfoot.gait.stiffness import ankle_events, toe_events
 
 from .kernel import kernel
-from .legs import SLOPE_TABLE
 from .model import ANKLE
 from .phase import GRID, PhaseTable
 from .settings import LONGEST_DELAY, BipedSettings
@@ -90,6 +89,7 @@ class FootSprings:
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], a row of the walkers' tables each.
         schedule: (R, SAMPLES, 2) stiffness [N m/rad] that a residual action multiplies.
         walkers: bodies and speeds.
+        incline: what a slope adds (`envs.legs.slope_table`).
     """
 
     def __init__(
@@ -99,6 +99,7 @@ class FootSprings:
         equilibrium: NDArray,
         schedule: NDArray,
         walkers: Walkers,
+        incline: PhaseTable,
     ):
         num = len(walkers.place)
         self._follows = settings.equilibrium in ("planned", "angle")  # a constant stays one on a slope too
@@ -106,7 +107,7 @@ class FootSprings:
         self._fixed = [joint for joint, name in enumerate(("toe", "ankle")) if settings.stiffness_joints == name]
         middle, self._factor = _log_scale(settings, body)
         self._middle = np.tile(middle, (num, 2, 1))
-        self._walkers = walkers
+        self._walkers, self._incline = walkers, incline
         self._equilibrium, self._schedule = PhaseTable(equilibrium), PhaseTable(schedule)
         self.stiffness = np.zeros((num, 2, 2))
         """(N, side, 2) K [N m/rad]; changed in place."""
@@ -171,7 +172,7 @@ class FootSprings:
         """
         equilibrium = self._equilibrium.at(leg_phase, self._walkers.place)
         if self._follows and self._walkers.slope.any():
-            equilibrium[..., 0] += self._walkers.slope[:, None] * SLOPE_TABLE.at(leg_phase)[..., ANKLE]
+            equilibrium[..., 0] += self._walkers.slope[:, None] * self._incline.at(leg_phase)[..., ANKLE]
         running = self._everyone if running is None else running
         state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
         _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .actuation import Decisions, FootSprings
-from .constants import LegConstants
+from .constants import LegConstants, SlopeConstants, slope_constants
 from .contact import CONTACTS
 from .equilibrium import foot_curves
 from .kernel import kernel
-from .legs import Legs
+from .legs import Legs, slope_table
 from .model import ACTIONS, JOINTS, SIDES, passive_damping
 from .outcome import Outcome, report
 from .pushes import Pushes
@@ -66,6 +66,7 @@ class Biped:
         variant: (N,) which of `legs` each body has.
         rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], for each of `legs`.
         model: as for `Simulation`.
+        slope: constants for slopes in place of the committed ones.
     """
 
     tick_dt = WINDOW
@@ -80,6 +81,7 @@ class Biped:
         variant: NDArray | None = None,
         rest: NDArray | None = None,
         model: mujoco.MjModel | None = None,
+        slope: SlopeConstants | None = None,
     ):
         self.settings = settings
         self.num_envs = num_envs
@@ -94,11 +96,12 @@ class Biped:
         table = list(rows(self.walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.walkers = Walkers(settings, speeds, num_envs, variant)
-        self._legs = Legs(table, self.walkers)
+        incline = slope_table(slope or slope_constants())
+        self._legs = Legs(table, self.walkers, incline)
         curves = [foot_curves(settings, c, w) for c, w in table]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
-        self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers)
+        self._springs = FootSprings(settings, self.body, rest, stiffness, self.walkers, incline)
         self._decisions = Decisions(settings, self.human, num_envs)
         self._start = start_table(table)
         uses = settings.start == "standing" or settings.stop_at is not None

@@ -57,6 +57,23 @@ class LegConstants:
     """Fixed toe stiffness [N m/rad]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class SlopeConstants:
+    """What a slope adds to targets of the leg controller, as a part of its angle; the same for every body and speed.
+
+    Of a joint: constant, cosine and sine of the stride phase.
+    """
+
+    hip: tuple[float, float, float]
+    """To the hip's target."""
+    knee: tuple[float, float, float]
+    """To the knee's target."""
+    ankle: tuple[float, float, float]
+    """To the ankle's rest angle, where that follows the stride."""
+    trunk: float
+    """To the held trunk pitch."""
+
+
 def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people") -> str:
     """Name of the committed constants for a setting; "angle" and "phase" share those of "planned"."""
     name = "neutral" if equilibrium == "neutral" else "planned"
@@ -100,13 +117,27 @@ def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstan
 
 def constants_from(values: dict[str, Any]) -> LegConstants:
     """`LegConstants` from its JSON form (lists for tuples)."""
-    as_tuple: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
-    }
-    return LegConstants(**as_tuple)
+    return LegConstants(**_tupled(values))
+
+
+def slope_constants() -> SlopeConstants:
+    """The committed constants for slopes."""
+    return slope_constants_from(_file()["slope"]["constants"])
+
+
+def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
+    """`SlopeConstants` from its JSON form (lists for tuples)."""
+    return SlopeConstants(**_tupled(values))
+
+
+def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+
+
+def _committed() -> dict[str, dict]:
+    return _file()["constants"]
 
 
 @cache
-def _committed() -> dict[str, dict]:
-    text = resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8")
-    return json.loads(text)["constants"]
+def _file() -> dict[str, dict]:
+    return json.loads(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))

@@ -21,7 +21,7 @@ FRICTION = 1.0
 """Coefficient of Coulomb friction between foot and ground; rubber soles on dry floors have 0.6 to 1.2."""
 FRICTION_TIME = 0.004
 """Time constant [s] in which sliding is stopped. MuJoCo leaves the change of the contact's Jacobian out of its
-constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms (docs/physics.md)."""
+constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms (docs/design.md)."""
 HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
 """Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
 SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}

@@ -2,7 +2,8 @@
 
 Each hip and knee is a spring like the ankle (variable impedance) around people's curves at the walking speed, with
 people's moments fed forward; the stance hip also holds the trunk and the speed, and touchdown resets the phase. The
-constants of `legs.json` were found by `python -m springfoot.agents.tuning` (command and seed stand in that file).
+constants of `legs.json` were found by `python -m springfoot.agents.tuning`, those for slopes by
+`python -m springfoot.agents.slopes` (command and seed stand in that file).
 Gains are for 1.70 m and 63 kg and scale with the body (see `envs.model`).
 """
 
@@ -15,9 +16,9 @@ from scipy.interpolate import CubicSpline
 
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
-from .constants import LegConstants
+from .constants import LegConstants, SlopeConstants
 from .kernel import kernel
-from .model import ANKLE, HIP, KNEE, LEFT, RIGHT, damping_times
+from .model import HIP, KNEE, LEFT, RIGHT, damping_times
 from .phase import GRID, PhaseTable, leg_phases
 from .simulation import WINDOW, Measurement
 from .walkers import Walkers
@@ -34,20 +35,17 @@ TOUCHDOWN_PHASE = 0.80
 HOLD = 0.001
 """A leg's phase waits this far before 1 until its foot touches down."""
 
-SLOPE_CURVES = {HIP: (0.72, 1.03, -0.54), KNEE: (0.96, 1.32, -0.93), ANKLE: (0.43, 1.89, 0.86)}
-"""What a slope adds to the targets of hip, knee and ankle, as a part of its angle: constant, cosine and sine of the
-stride phase. Found by CMA-ES over walks on +-2.5 and +-5 deg (docs/design.md)."""
-SLOPE_LEAN = 0.15
-"""What it adds to the held trunk pitch."""
-SLOPE_TABLE = PhaseTable(
-    np.stack([a + b * np.cos(2 * np.pi * GRID) + c * np.sin(2 * np.pi * GRID) for a, b, c in SLOPE_CURVES.values()], -1)
-)
-"""`SLOPE_CURVES` over the stride."""
-
 
 def knot_curve(knots_deg: Sequence[float]) -> NDArray:
     """A tuned correction [rad] on `GRID`: the periodic cubic spline through `KNOTS`."""
     return np.deg2rad(CubicSpline(np.append(KNOTS, 1.0), [*knots_deg, knots_deg[0]], bc_type="periodic")(GRID))
+
+
+def slope_table(constants: SlopeConstants) -> PhaseTable:
+    """What a slope adds over the stride, as a part of its angle: to hip, knee, ankle and held trunk pitch."""
+    cosine, sine = np.cos(2 * np.pi * GRID), np.sin(2 * np.pi * GRID)
+    joints = [a + b * cosine + c * sine for a, b, c in (constants.hip, constants.knee, constants.ankle)]
+    return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
 
 
 class Legs:
@@ -56,10 +54,11 @@ class Legs:
     Args:
         rows: constants and walk of each row of the walkers' tables (`envs.walks.rows`).
         walkers: bodies and speeds.
+        incline: what a slope adds (`slope_table`).
     """
 
-    def __init__(self, rows: Sequence[tuple[LegConstants, Walk]], walkers: Walkers):
-        self._walkers = walkers
+    def __init__(self, rows: Sequence[tuple[LegConstants, Walk]], walkers: Walkers, incline: PhaseTable):
+        self._walkers, self._incline = walkers, incline
         self._rows = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
         self._table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
         self._gains = np.zeros(len(walkers.place), GAINS)
@@ -88,7 +87,7 @@ class Legs:
         state = m.root, m.root_velocity, m.com_velocity
         _command(self._gains, walkers.speed, walkers.scale, curves, *state, control)
         if walkers.slope.any():
-            _incline(walkers.slope, self._gains, curves, SLOPE_TABLE.at(self.phase), control)
+            _incline(walkers.slope, self._gains, curves, self._incline.at(self.phase), control)
 
 
 GAINS = np.dtype(
@@ -142,7 +141,7 @@ def _incline(slope, gains, curves, inclined, control):
     for i in range(len(slope)):
         for side in range(2):
             hip, knee = control[i, side, HIP], control[i, side, KNEE]
-            lean = curves[i, side, 0] * gains[i].trunk_stiffness * SLOPE_LEAN
+            lean = curves[i, side, 0] * gains[i].trunk_stiffness * inclined[i, side, 3]
             hip[1] += slope[i] * (hip[0] * inclined[i, side, 0] + lean)
             knee[1] += slope[i] * knee[0] * inclined[i, side, 1]
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from springfoot.envs.actuation import FootSprings, action_of, stiffness_of, stiffness_ranges
+from springfoot.envs.constants import slope_constants
+from springfoot.envs.legs import slope_table
 from springfoot.envs.phase import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.settings import ActionMode, BipedSettings
 from springfoot.envs.walkers import Walkers
@@ -34,7 +36,9 @@ def springs(mode: ActionMode = "absolute", num: int = 3) -> FootSprings:
     rest = np.stack([0.3 * np.sin(2 * np.pi * GRID), 0.1 * np.cos(2 * np.pi * GRID)], -1)[None]
     schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
     settings = BipedSettings(action_mode=mode)
-    return FootSprings(settings, Body(), rest, schedule, Walkers(settings, np.array([1.2]), num))
+    return FootSprings(
+        settings, Body(), rest, schedule, Walkers(settings, np.array([1.2]), num), slope_table(slope_constants())
+    )
 
 
 def test_a_residual_action_multiplies_the_schedule():

@@ -1,6 +1,7 @@
 """The trade-off: the measure of stiffness is the reward's, the knee is found, finished trainings are kept."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,8 +42,11 @@ def test_a_weight_changes_its_own_term_alone():
 
 
 def test_the_command_trains_what_is_missing_draws_and_keeps_what_is_finished(monkeypatch, capfd, tmp_path):
+    few = replace(tradeoff.PRESETS["walk"], num_envs=8, update_steps=512, eval_episodes=2)
+    monkeypatch.setitem(tradeoff.PRESETS, "walk", few)
+
     def main(*words):
-        short = ["--seeds", "1", "--timesteps", "8192", "--episodes", "1", "--seconds", "6", "--pushes", "150"]
+        short = ["--seeds", "1", "--timesteps", "512", "--episodes", "1", "--seconds", "6", "--pushes", "150"]
         files = ["--out", str(tmp_path / "runs"), "--figure", str(tmp_path / "t.png")]
         monkeypatch.setattr(sys, "argv", ["tradeoff", "--weights", "0.4", "0", *short, *files, *words])
         code = tradeoff.main()
@@ -54,7 +58,7 @@ def test_the_command_trains_what_is_missing_draws_and_keeps_what_is_finished(mon
     best = folder_of(tmp_path / "runs", "stiffness", 0.4, 0) / "best.safetensors"
     written = best.stat().st_mtime_ns
     assert main()[:2] == (0, out) and best.stat().st_mtime_ns == written
-    code, _, error = main("--timesteps", "9000")
+    code, _, error = main("--timesteps", "1024")
     assert code == 2 and "trained with other settings" in error
     code, _, error = main("--no-train", "--term", "stiffness_rate")
     assert code == 2 and "no finished training of stiffness_rate" in error
