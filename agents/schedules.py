@@ -117,11 +117,13 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> Policy:
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
     """The environment settings that a baseline brings with it, for the body and speed of `settings`.
 
-    `thesis` brings the thesis's straight lines between gait events, and their equilibrium angles.
+    Baselines are stiffness in N m/rad, so their actions are absolute. `thesis` brings the thesis's straight lines
+    between gait events, and their equilibrium angles.
     """
+    absolute = {"action_mode": "absolute"}
     if name != "thesis":
-        return {}
-    return {"equilibrium": "phase", "schedule": thesis_schedule(body_of(settings), settings.speed).to_json()}
+        return absolute
+    return absolute | {"equilibrium": "phase", "schedule": thesis_schedule(body_of(settings), settings.speed).to_json()}
 
 
 def _stiffness_from(text: str) -> tuple[float, float]:

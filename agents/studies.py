@@ -11,7 +11,7 @@ and its reward: that of the policy which the others are held against.
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
 from operator import getitem
@@ -99,8 +99,8 @@ def compare(
         best: ankle and toe stiffness [N m/rad] of one more constant, as found by `best_constant`.
         episodes, seed, threads, progress: as for `recording.record`.
 
-    The row `thesis` has its own equilibrium, "phase", and nothing else of its own. Raises `SpringfootError` for a
-    policy of action mode "residual": its cost of changing stiffness is not that of the baselines.
+    Baselines act absolutely, whatever the policy does, and each pays for changing its own action. The row `thesis` has
+    its own equilibrium, "phase".
     """
     policy, settings = prepare(name, given, seed)
     found = [] if best is None else [f"constant:{best[0]:g},{best[1]:g}"]
@@ -129,6 +129,7 @@ def best_constant(
     """
     low, high = np.log([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
     spacing = (high - low) / (np.array(grid) - 1)
+    settings = replace(settings, action_mode="absolute")
     how: dict[str, Any] = {"episodes": episodes, "seed": seed, "threads": threads}
     tried: dict[tuple[float, float], NDArray] = {}
 

@@ -50,7 +50,7 @@ def test_a_row_is_what_evaluate_would_find(rows):
     assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3).returns)
 
 
-def test_baselines_are_not_held_against_a_residual_policy():
+def test_a_baseline_is_not_residual_itself():
     with pytest.raises(SpringfootError, match="absolute"):
         studies.compare("untrained", SHORT | {"action_mode": "residual"}, episodes=1)
 
