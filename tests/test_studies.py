@@ -10,7 +10,6 @@ from springfoot.agents import studies
 from springfoot.agents.recording import prepare, record
 from springfoot.agents.schedules import BASELINES, constant
 from springfoot.envs.settings import BipedSettings, settings_from
-from springfoot.gait.errors import SpringfootError
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
 
@@ -50,9 +49,11 @@ def test_a_row_is_what_evaluate_would_find(rows):
     assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3).returns)
 
 
-def test_a_baseline_is_not_residual_itself():
-    with pytest.raises(SpringfootError, match="absolute"):
-        studies.compare("untrained", SHORT | {"action_mode": "residual"}, episodes=1)
+def test_a_residual_policy_stands_beside_baselines_that_act_absolutely():
+    rows = studies.compare("untrained", SHORT | {"action_mode": "residual"}, episodes=1)
+    speed = {(index > 0, row.name): row.metrics["speed_m_s"]["mean"] for index, row in enumerate(rows)}
+    assert speed[False, "untrained"] == pytest.approx(speed[True, "schedule"], rel=1e-3)  # no action: the schedule
+    assert speed[True, "untrained"] != pytest.approx(speed[True, "schedule"], rel=1e-2)  # mid-range
 
 
 def test_interval_is_that_of_a_normal_mean_and_covers_it_as_often_as_said():
