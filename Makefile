@@ -53,7 +53,7 @@ bench: install
 # What pyright cannot see: the rooms behind an editable install's finder, and the names MuJoCo compiles in (no stubs yet).
 build/typing/made: Makefile
 	rm -rf build/typing && mkdir -p build/typing/springfoot build/typing/mujoco-stubs
-	ln -s ../../../gait ../../../envs ../../../agents build/typing/springfoot/
+	ln -s $(addprefix ../../../,gait envs agents evaluation studies) build/typing/springfoot/
 	echo partial > build/typing/mujoco-stubs/py.typed
 	printf '%s\n' 'from typing import Any' 'def __getattr__(name: str) -> Any: ...' > build/typing/mujoco-stubs/__init__.pyi
 	@touch $@

@@ -10,8 +10,9 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from springfoot.agents.command import exit_code, next_free, policy_label
-from springfoot.agents.config import SettingsFlags, given
+from springfoot.agents.command_line import exit_code, policy_label
+from springfoot.agents.files import next_free
+from springfoot.agents.flags import SettingsFlags, given
 from springfoot.gait.errors import SpringfootError, require_count
 
 
@@ -55,7 +56,8 @@ def run(flags: Flags) -> None:
     out = flags.out or next_free(Path("runs"), f"eval-{label}")
     if out.exists():
         raise SpringfootError(f"{out} exists already; give --out a new folder")
-    from springfoot.agents import evaluation, recording, report  # bad flags are told without waiting for imports
+    from springfoot.evaluation import metrics as evaluation  # bad flags are told without waiting for imports
+    from springfoot.evaluation import recording, report
 
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     policy, environment = recording.prepare(flags.policy, settings, flags.seed)

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from springfoot.agents.command import exit_code
-from springfoot.agents.config import PRESETS, TrainingConfig, given, optional_flags
+from springfoot.agents.command_line import exit_code
+from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.flags import given, optional_flags
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count
 
@@ -88,14 +89,14 @@ def run(flags: Flags) -> int:
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     """Trains from several seeds and says how far they agree and where the results lie."""
-    from springfoot.agents import seeds
+    from springfoot.agents import multi_seed as seeds
 
     record = seeds.train_seeds(config, out, count)
     print(f"\n{seeds.seeds_table(record)}\n")
     print(
         f"Results: {out} ({seeds.SEEDS}, and in each seed-N: best.safetensors, last.safetensors, run.json, TensorBoard)"
     )
-    print(f"Next:    python -m springfoot.agents.studies seeds {out}/seed-*")
+    print(f"Next:    python -m springfoot.studies.comparison seeds {out}/seed-*")
     if record["status"] == "interrupted":
         print(f"Or:      python train.py --resume {out}/seed-N, for each N that was interrupted")
     return {"finished": 0, "interrupted": 130}.get(record["status"], 1)

@@ -23,15 +23,16 @@ from safetensors.numpy import save as to_safetensors
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from springfoot.envs.biped import Biped
+from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import settings_to_json
 from springfoot.gait.errors import SpringfootError
 
-from .bundle import BEST, LAST, fingerprint, load_policy, read_tensors, save_policy, write_atomically
 from .config import TrainingConfig, config_from_json, config_to_json
-from .learner import Learner
+from .files import make_folder, require_new, write_atomically
+from .policy import BEST, LAST, fingerprint, load_policy, read_tensors, save_policy
+from .ppo import Learner
 from .progress import Progress
-from .sb3 import SegmentedFootBipedVecEnv
+from .sb3_vec_env import SegmentedFootBipedVecEnv
 
 RUN, STATE = "run.json", "state.safetensors"
 EVALUATION_SEED = 2**30
@@ -83,22 +84,6 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     return run.learn()
 
 
-def require_new(out: str | Path) -> Path:
-    """`out`, or `SpringfootError` if it exists and is not an empty folder."""
-    out = Path(out)
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise SpringfootError(f"{out} already exists; give another --out, or go on with a run by --resume {out}")
-    return out
-
-
-def make_folder(out: Path) -> None:
-    """Makes the folder and those above it; `SpringfootError` if it cannot be."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SpringfootError(f"cannot make the folder {out}: {error.strerror}") from None
-
-
 def evaluate_returns(
     biped: Biped, policy: Callable[[np.ndarray], np.ndarray], seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -109,12 +94,12 @@ def evaluate_returns(
     biped.reset(np.arange(episodes), [seed + k for k in range(episodes)])
     observation = biped.observe()
     while active.any():
-        outcome = biped.step(policy(observation), active=active)
-        returns += np.where(active, outcome.reward, 0.0)
+        result = biped.step(policy(observation), active=active)
+        returns += np.where(active, result.reward, 0.0)
         seconds += np.where(active, biped.dt, 0.0)
-        fell |= active & outcome.terminated
-        active &= ~(outcome.terminated | outcome.truncated)
-        observation = outcome.observation
+        fell |= active & result.terminated
+        active &= ~(result.terminated | result.truncated)
+        observation = result.observation
     return returns, seconds, fell
 
 

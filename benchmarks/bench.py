@@ -17,10 +17,10 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from springfoot.agents.command import exit_code
+from springfoot.agents.command_line import exit_code
 from springfoot.agents.config import PRESETS
 
-from . import environments, learning
+from ..benchmarks import environments, learning
 from .timing import Case, Figures, load, machine, measure
 from .walking import STEP, batch_case, record_walk, step_over_physics
 
@@ -89,7 +89,7 @@ def bench(effort: Effort) -> dict[str, Any]:
     cases += [environments.adapter(walk, 64, 2), environments.single(walk)]
     cases += [environments.dummy(walk, num) for num in effort.vectors]
     cases += [environments.subproc(walk, env) for env in forked]
-    cases += environments.walkers(asynchronous, 8, 2, effort.steps)
+    cases += environments.subjects(asynchronous, 8, 2, effort.steps)
     figures = _run("Environments", cases, effort.repeats)
 
     recipes = [learning.our_training(2, effort.update_steps), learning.study_training(effort.study_steps)]

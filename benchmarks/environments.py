@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
 
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 
 from .timing import Case
 from .walking import SEED, STEP, Walk, vector
@@ -62,7 +62,7 @@ def walker_async(num: int) -> gym.vector.AsyncVectorEnv | None:
     return gym.vector.AsyncVectorEnv([partial(gym.make, OTHERS)] * num, context=FORK) if find_spec("imageio") else None
 
 
-def walkers(asynchronous: gym.vector.AsyncVectorEnv | None, num: int, threads: int, steps: int) -> list[Case]:
+def subjects(asynchronous: gym.vector.AsyncVectorEnv | None, num: int, threads: int, steps: int) -> list[Case]:
     """Gymnasium's walker under random actions: single, one after the other, in processes, and in EnvPool if here."""
     if asynchronous is None:
         print(f"{OTHERS} is left out: it needs imageio (pip install imageio)")

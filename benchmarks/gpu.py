@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 import tyro
 
-from springfoot.agents.command import exit_code
-from springfoot.envs.model import build_model
-from springfoot.envs.simulation import WINDOW
+from springfoot.agents.command_line import exit_code
+from springfoot.envs.physics.model import build_model
+from springfoot.envs.timing import CONTROL_WINDOW
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError, require_count
 
@@ -49,7 +49,7 @@ def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
     wp, warp = _modules()
     model = build_model(Body())
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # C MuJoCo's own search, which Warp has not
-    substeps, copies = round(WINDOW / model.opt.timestep), -(-num // RECORDED)
+    substeps, copies = round(CONTROL_WINDOW / model.opt.timestep), -(-num // RECORDED)
 
     def over_all(values: np.ndarray) -> np.ndarray:
         return np.tile(values, (copies, 1))[:num].astype(np.float32)
@@ -87,7 +87,7 @@ def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
                 if not found and index + 1 == len(walk.controls[0]):
                     apart = float(np.abs(data.qpos.numpy() - over_all(walk.position[1])).max())
             wp.synchronize()
-            found.append(num * len(windows) * WINDOW / (perf_counter() - clock))
+            found.append(num * len(windows) * CONTROL_WINDOW / (perf_counter() - clock))
     return np.array(found[1:]), apart
 
 

@@ -11,8 +11,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from springfoot.agents.config import PRESETS
-from springfoot.agents.learner import Learner
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
+from springfoot.agents.ppo import Learner
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.settings import body_of, settings_to_json
 from springfoot.gait.body import Body
 from springfoot.gait.plan import plan_walk

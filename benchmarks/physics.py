@@ -18,15 +18,13 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from springfoot.agents.command import exit_code
-from springfoot.agents.evaluation import Gait, measure
-from springfoot.agents.recording import prepare, record
-from springfoot.agents.schedules import Policy
-from springfoot.envs.biped import WINDOWS
-from springfoot.envs.contact import TIMESTEP
-from springfoot.envs.model import build_model
+from springfoot.agents.baselines import Policy
+from springfoot.agents.command_line import exit_code
+from springfoot.envs.physics.model import build_model
 from springfoot.envs.settings import BipedSettings, body_of
-from springfoot.envs.simulation import WINDOW
+from springfoot.envs.timing import CONTROL_WINDOW, PHYSICS_STEP, WINDOWS_PER_STEP
+from springfoot.evaluation.metrics import Gait, measure
+from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.body import Body
 from springfoot.gait.errors import require_count
 
@@ -43,7 +41,7 @@ Edit = Callable[[mujoco.MjModel], None]
 
 def _timestep(substeps: int) -> Edit:
     def edit(model: mujoco.MjModel) -> None:
-        model.opt.timestep = WINDOW / substeps
+        model.opt.timestep = CONTROL_WINDOW / substeps
 
     return edit
 
@@ -65,7 +63,7 @@ def _flag(bit: mujoco.mjtDisableBit, disabled: bool) -> Edit:
 
 
 _SOLVER, _INTEGRATOR, _DISABLE = mujoco.mjtSolver, mujoco.mjtIntegrator, mujoco.mjtDisableBit
-DEFAULT = f"**{1e3 * TIMESTEP:g} ms, the default**"
+DEFAULT = f"**{1e3 * PHYSICS_STEP:g} ms, the default**"
 ROWS: dict[str, Edit] = {
     "0.25 ms (reference)": _timestep(40),
     "0.5 ms": _timestep(20),
@@ -107,7 +105,7 @@ def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:
             for index, each in enumerate(physics):
                 each.place(walk, step)
                 spent[index, round_, step] = each.step(walk, step)
-    return 1e6 * spent[:, 1:].reshape(len(models), -1) / (WINDOWS * walk.actions.shape[1])
+    return 1e6 * spent[:, 1:].reshape(len(models), -1) / (WINDOWS_PER_STEP * walk.actions.shape[1])
 
 
 def walked(policy: Policy, settings: BipedSettings, model: mujoco.MjModel, episodes: int, threads: int) -> Gait:

@@ -9,17 +9,17 @@ from gymnasium.vector import AutoresetMode
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from springfoot.envs.actuation import action_of
-from springfoot.envs.biped import WINDOWS, Tick
-from springfoot.envs.model import build_model
-from springfoot.envs.simulation import WINDOW
-from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.physics.model import build_model
+from springfoot.envs.step_result import Tick
+from springfoot.envs.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
+from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body import Body
 
 from .timing import Case, clock_cost
 
 SEED = 0
-STEP = WINDOWS * WINDOW
+STEP = WINDOWS_PER_STEP * CONTROL_WINDOW
 """Simulated time of one environment step [s]."""
 STUDY_TIMESTEP = 0.001
 """Physics step of the design study [s]; integrator, solver and cone as ours, flags as MuJoCo's default."""
@@ -36,7 +36,7 @@ class Walk:
     velocity: NDArray
     """(T, N, nv)."""
     controls: NDArray
-    """(T, WINDOWS, N, nu) held in each control window."""
+    """(T, WINDOWS_PER_STEP, N, nu) held in each control window."""
 
 
 def record_walk(num: int, steps: int) -> Walk:
@@ -48,8 +48,8 @@ def record_walk(num: int, steps: int) -> Walk:
     actions, position, velocity = [], [], []
     for _ in range(steps):
         now = biped.measurement
-        position.append(np.concatenate([now.root, now.angle.reshape(num, -1)], axis=1))
-        velocity.append(np.concatenate([now.root_velocity, now.velocity.reshape(num, -1)], axis=1))
+        position.append(np.concatenate([now.base, now.angle.reshape(num, -1)], axis=1))
+        velocity.append(np.concatenate([now.base_velocity, now.velocity.reshape(num, -1)], axis=1))
         action = action_of(biped.scheduled_stiffness(), biped.settings, biped.body)
         actions.append(action.reshape(num, -1).astype(np.float32))
         _, _, terminated, *_ = env.step(actions[-1])
@@ -59,7 +59,7 @@ def record_walk(num: int, steps: int) -> Walk:
         actions=np.stack(actions),
         position=np.stack(position),
         velocity=np.stack(velocity),
-        controls=np.stack(held).reshape(steps, WINDOWS, num, -1),
+        controls=np.stack(held).reshape(steps, WINDOWS_PER_STEP, num, -1),
     )
 
 
@@ -80,7 +80,7 @@ class Physics:
     """`mj_step(model, data, nstep)` for the first N bodies of a walk, and nothing else."""
 
     def __init__(self, model: mujoco.MjModel, num: int) -> None:
-        self.model, self.substeps = model, round(WINDOW / model.opt.timestep)
+        self.model, self.substeps = model, round(CONTROL_WINDOW / model.opt.timestep)
         self.bodies = [mujoco.MjData(model) for _ in range(num)]
         self._clock = clock_cost()
 
@@ -131,7 +131,7 @@ def step_over_physics(walk: Walk, num: int, rounds: int) -> tuple[NDArray, float
 def batch_case(walk: Walk, num: int, threads: int) -> Case:
     """`mujoco.batch.Batch` alone, stepped through the walk's controls."""
     model = build_model(Body())
-    batch, substeps = Batch(model, num, threads), round(WINDOW / model.opt.timestep)
+    batch, substeps = Batch(model, num, threads), round(CONTROL_WINDOW / model.opt.timestep)
     position, velocity, control = (batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
     controls = walk.controls[:, :, :num].reshape(-1, num, model.nu)
 

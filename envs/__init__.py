@@ -2,10 +2,10 @@
 
 import gymnasium as gym
 
-from .biped import Biped
-from .faces import SegmentedFootBiped
+from .biped_batch import Biped
+from .env import SegmentedFootBiped
 from .settings import BipedSettings, settings_from, settings_to_json
-from .vector import SegmentedFootBipedVector
+from .vector_env import SegmentedFootBipedVector
 
 __all__ = [
     "Biped",
@@ -18,6 +18,6 @@ __all__ = [
 
 gym.register(
     id="SegmentedFootBiped-v0",
-    entry_point="springfoot.envs.faces:SegmentedFootBiped",
-    vector_entry_point="springfoot.envs.vector:SegmentedFootBipedVector",
+    entry_point="springfoot.envs.env:SegmentedFootBiped",
+    vector_entry_point="springfoot.envs.vector_env:SegmentedFootBipedVector",
 )

@@ -15,8 +15,8 @@ from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
-from .contact import FRICTION
-from .simulation import WINDOW
+from .physics.foot_contact import FRICTION
+from .timing import ACTION_STEP, CONTROL_WINDOW
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 Feedforward = Literal["people", "plan"]
@@ -24,9 +24,6 @@ ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
 
-STEP_SECONDS = 0.02
-"""Time between two actions [s] by default: stiffness is decided at 50 Hz (design study; a 40 ms lag on K falls).
-Rewards and the discount of training are told for this time, whatever a step lasts (`BipedSettings.step_seconds`)."""
 
 FRICTION_RANGE = (0.4, 1.2)
 """Of coefficients of friction, from wet floor to rough rubber."""
@@ -49,7 +46,7 @@ DEFAULT_WEIGHTS = {
     "stiffness_rate": -0.05,
     "stiffness": -0.02,
 }
-"""Weight of each reward term (`springfoot.envs.task`); a positive one rewards, a negative one is a cost."""
+"""Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, a negative one is a cost."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +104,7 @@ class BipedSettings:
     """Time after which an episode is truncated [s]."""
     start: Literal["random", "standing"] | float = "random"
     """Start of an episode: walking at this stride phase of the left leg [0..1), at a random one within single support,
-    or standing: the body sets off by itself within 3 s (`springfoot.envs.standing`)."""
+    or standing: the body sets off by itself within 3 s (`springfoot.envs.control.standing`)."""
     stop_at: float | None = None
     """Time in the episode from which the body slows down, then stops and stands [s]; not before 3 s if it starts
     standing."""
@@ -170,7 +167,7 @@ class BipedSettings:
     @property
     def step_seconds(self) -> float:
         """Time of one step of the environment [s]."""
-        return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * STEP_SECONDS
+        return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP
 
     def _check_draws(self) -> None:
         for name, allowed, unit in (
@@ -206,8 +203,10 @@ class BipedSettings:
             ("stiffness_delay_s", (self.stiffness_delay_s,)),
             ("stiffness_delay_range_s", self.stiffness_delay_range_s or ()),
         ):
-            if any(abs(delay / WINDOW - round(delay / WINDOW)) > 1e-9 for delay in delays):
-                raise SpringfootError(f"{name} must be whole steps of {WINDOW:g} s, got {getattr(self, name)!r}")
+            if any(abs(delay / CONTROL_WINDOW - round(delay / CONTROL_WINDOW)) > 1e-9 for delay in delays):
+                raise SpringfootError(
+                    f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {getattr(self, name)!r}"
+                )
 
     def _check_schedule(self) -> None:
         if self.schedule is None:

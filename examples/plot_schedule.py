@@ -9,8 +9,8 @@ import argparse
 
 from matplotlib.figure import Figure
 
-from springfoot.agents.evaluation import measure
-from springfoot.agents.recording import prepare, record
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.cycle import PERCENT
 
 ROWS = {

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from springfoot.agents import ablations
+from springfoot.agents.baselines import schedule
 from springfoot.agents.config import PRESETS, TrainingConfig
-from springfoot.agents.recording import record
-from springfoot.agents.schedules import schedule
 from springfoot.agents.training import RUN
-from springfoot.envs.settings import STEP_SECONDS, BipedSettings, settings_to_json
+from springfoot.envs.settings import BipedSettings, settings_to_json
+from springfoot.envs.timing import ACTION_STEP
+from springfoot.evaluation.recording import record
+from springfoot.studies import ablations
 
 SHORT = ("--episodes", "1", "--seconds", "0.5", "--threads", "1")
 
@@ -34,7 +35,7 @@ def test_every_row_differs_from_the_preset_in_its_flags_and_walks_as_long():
         )
         step = config.environment.step_seconds
         for field in ("timesteps", "update_steps", "eval_interval"):
-            assert getattr(config, field) * step == pytest.approx(getattr(preset, field) * STEP_SECONDS)
+            assert getattr(config, field) * step == pytest.approx(getattr(preset, field) * ACTION_STEP)
         assert config.seed == 2 and (config.gamma, config.minibatches) == (preset.gamma, preset.minibatches)
 
 

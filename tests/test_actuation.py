@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from springfoot.envs.actuation import FootSprings, action_of, stiffness_of, stiffness_ranges
-from springfoot.envs.constants import slope_constants
-from springfoot.envs.legs import slope_table
-from springfoot.envs.phase import GRID, PLACE, SAMPLES, PhaseTable
+from springfoot.envs.control.foot_springs import FootSprings, action_of, stiffness_of, stiffness_ranges
+from springfoot.envs.control.leg_constants import slope_constants
+from springfoot.envs.control.leg_controller import slope_table
+from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
+from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.settings import ActionMode, BipedSettings
-from springfoot.envs.walkers import Walkers
 from springfoot.gait.body import Body
 
 
@@ -37,7 +37,7 @@ def springs(mode: ActionMode = "absolute", num: int = 3) -> FootSprings:
     schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
     settings = BipedSettings(action_mode=mode)
     return FootSprings(
-        settings, Body(), rest, schedule, Walkers(settings, np.array([1.2]), num), slope_table(slope_constants())
+        settings, Body(), rest, schedule, Subjects(settings, np.array([1.2]), num), slope_table(slope_constants())
     )
 
 

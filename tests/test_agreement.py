@@ -5,10 +5,10 @@ import sys
 import numpy as np
 import pytest
 
-from springfoot.agents import agreement
-from springfoot.agents.agreement import Agreement
-from springfoot.agents.evaluation import Gait
+from springfoot.evaluation.metrics import Gait
 from springfoot.gait import SpringfootError
+from springfoot.studies import seed_agreement as agreement
+from springfoot.studies.seed_agreement import Agreement
 
 
 def joint(stiffness):

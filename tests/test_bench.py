@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks.timing import Case, measure
 from benchmarks.walking import STEP, Physics, batch_case, record_walk, step_over_physics, study_model
-from springfoot.envs.contact import TIMESTEP
-from springfoot.envs.model import build_model
+from springfoot.envs.physics.model import build_model
+from springfoot.envs.timing import PHYSICS_STEP
 from springfoot.gait.body import Body
 
 ROOT = Path(__file__).parents[1]
@@ -43,7 +43,7 @@ def test_a_smaller_batch_repeats_the_same_walk(walk):
 
 def test_the_studys_settings_are_a_millisecond_with_islands():
     ours, study = build_model(Body()), study_model()
-    assert study.opt.timestep == 0.001 < ours.opt.timestep == TIMESTEP
+    assert study.opt.timestep == 0.001 < ours.opt.timestep == PHYSICS_STEP
     assert study.opt.integrator == ours.opt.integrator and study.opt.cone == ours.opt.cone
     assert study.opt.disableflags == 0 != ours.opt.disableflags
 

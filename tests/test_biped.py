@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from springfoot.envs.actuation import FEET, action_of
-from springfoot.envs.biped import Biped, Tick
-from springfoot.envs.model import DAMPING_TIME, SIDES, torque_limits
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import FEET, action_of
+from springfoot.envs.physics.model import DAMPING_TIME, SIDES, torque_limits
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.envs.step_result import Tick
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 from springfoot.gait.errors import SpringfootError
@@ -41,11 +42,11 @@ def test_bodies_of_a_batch_have_the_settings_proportions_and_scale_exactly():
     drawn, alone = Biped(settings_from(mass_range=(40, 120), **built), 1), Biped(settings_from(mass=100, **built), 1)
     drawn.reset(np.arange(1), [3], given={"mass": np.array([100.0])})
     alone.reset(np.arange(1), [3])
-    assert drawn.walkers.bodies == [alone.body] and alone.body.total_mass == pytest.approx(120.0)
+    assert drawn.subjects.bodies == [alone.body] and alone.body.total_mass == pytest.approx(120.0)
     for _ in range(50):
-        outcome = drawn.step(np.zeros((1, 4)))
-        np.testing.assert_allclose(outcome.observation, alone.step(np.zeros((1, 4))).observation, atol=1e-5)
-    assert not outcome.terminated.any()
+        result = drawn.step(np.zeros((1, 4)))
+        np.testing.assert_allclose(result.observation, alone.step(np.zeros((1, 4))).observation, atol=1e-5)
+    assert not result.terminated.any()
 
 
 @pytest.fixture(scope="module")
@@ -98,10 +99,10 @@ def test_left_and_right_are_mirror_images():
         action = scheduled(biped)
         action[:, 0] = 0.3  # left ankle of the one, right ankle of the other
         action[1] = action[0][[2, 3, 0, 1]]
-        outcome = biped.step(action)
+        result = biped.step(action)
     left, right = biped.measurement.angle[0], biped.measurement.angle[1][::-1]
     np.testing.assert_allclose(left, right, atol=1e-6)
-    assert outcome.reward[0] == pytest.approx(outcome.reward[1], abs=1e-6)
+    assert result.reward[0] == pytest.approx(result.reward[1], abs=1e-6)
 
 
 def test_the_start_stands_on_the_floor_at_the_phase_asked_for():
@@ -142,13 +143,13 @@ def test_an_environment_left_out_does_not_notice(mode, begun):
         before = straight.step(action)
     seen = paused.observe()[1]
     for _ in range(7):
-        outcome = paused.step(np.ones((2, 4)), active=np.array([True, False]))
-        np.testing.assert_array_equal(outcome.observation[1], seen)
-        assert outcome.reward[1] == 0.0
+        result = paused.step(np.ones((2, 4)), active=np.array([True, False]))
+        np.testing.assert_array_equal(result.observation[1], seen)
+        assert result.reward[1] == 0.0
         if begun:
-            assert outcome.info["stiffness/toe_right"][1] == before.info["stiffness/toe_right"][1]
+            assert result.info["stiffness/toe_right"][1] == before.info["stiffness/toe_right"][1]
         for name in ("ankle_left", "toe_left", "ankle_right", "toe_right"):
-            assert outcome.info[f"work/stiffness/{name}"][1] == outcome.info[f"work/equilibrium/{name}"][1] == 0.0
+            assert result.info[f"work/stiffness/{name}"][1] == result.info[f"work/equilibrium/{name}"][1] == 0.0
     for action in actions[begun:]:
         a, b = paused.step(action), straight.step(action)
         np.testing.assert_array_equal(a.observation[1], b.observation[1])
@@ -163,10 +164,10 @@ def test_a_fall_ends_the_episode_with_its_reason():
     reasons = set()
     active = np.ones(4, bool)
     for _ in range(400):
-        outcome = biped.step(np.tile([1.0, -1.0, -1.0, 1.0], (4, 1)), active)  # one ankle rigid, one limp
-        reasons |= set(outcome.info["termination"][outcome.terminated])
-        assert not outcome.reward[outcome.terminated].any()
-        active &= ~outcome.terminated
+        result = biped.step(np.tile([1.0, -1.0, -1.0, 1.0], (4, 1)), active)  # one ankle rigid, one limp
+        reasons |= set(result.info["termination"][result.terminated])
+        assert not result.reward[result.terminated].any()
+        active &= ~result.terminated
         if not active.any():
             break
     assert not active.any()
@@ -177,13 +178,13 @@ def test_a_diverged_simulation_ends_its_episode_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
     biped = Biped(BipedSettings(push_newton=1e20, push_interval=1.0), 2)  # a push at another time for each
     biped.reset(np.arange(2), [1, 0])
-    outcome = biped.step(np.zeros((2, 4)))
-    while not outcome.terminated.any():
-        outcome = biped.step(np.zeros((2, 4)))
-    assert outcome.info["termination"][1].startswith("diverged: BAD")
-    assert outcome.info["termination"][0] == ""
-    assert np.isfinite(outcome.observation).all()
-    assert np.isfinite(outcome.reward).all()
+    result = biped.step(np.zeros((2, 4)))
+    while not result.terminated.any():
+        result = biped.step(np.zeros((2, 4)))
+    assert result.info["termination"][1].startswith("diverged: BAD")
+    assert result.info["termination"][0] == ""
+    assert np.isfinite(result.observation).all()
+    assert np.isfinite(result.reward).all()
 
 
 def test_time_runs_out_after_episode_seconds():

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springfoot.agents import bodies, studies
 from springfoot.agents.config import PRESETS
-from springfoot.agents.evaluation import measure
-from springfoot.agents.recording import prepare, record
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.errors import SpringfootError
+from springfoot.studies import body_sweep as bodies
+from springfoot.studies import comparison as studies
 
 SOME: dict[str, Any] = {"height_range": (1.6, 1.75), "mass_range": (40.0, 120.0), "speed_range": (1.15, 1.25)}
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from safetensors.numpy import load, save
 
-from springfoot.agents.bundle import Policy, fingerprint, load_policy, save_policy, write_atomically
-from springfoot.envs.biped import Biped
-from springfoot.envs.constants import leg_constants
+from springfoot.agents.files import write_atomically
+from springfoot.agents.policy import Policy, fingerprint, load_policy, save_policy
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait.errors import SpringfootError
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from springfoot.agents.config import TrainingConfig
-from springfoot.agents.learner import Learner
-from springfoot.agents.recording import record
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.envs.actuation import gait_events, stiffness_of
-from springfoot.envs.biped import Biped
-from springfoot.envs.phase import GRID
+from springfoot.agents.ppo import Learner
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.decisions import gait_events
+from springfoot.envs.control.foot_springs import stiffness_of
+from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.evaluation.recording import record
 from springfoot.gait.body import Body
 from springfoot.gait.stiffness import StiffnessSchedule, thesis_schedule
 
@@ -39,8 +40,8 @@ def test_a_stiffness_that_never_changes_is_the_same_walk_however_often_it_is_dec
         biped = begun(decisions=rate)
         assert biped.dt == pytest.approx(1 / steps)
         for _ in range(steps):
-            outcome = biped.step(action)
-        assert outcome.info["time"] == pytest.approx(1.0)
+            result = biped.step(action)
+        assert result.info["time"] == pytest.approx(1.0)
         walks.append(np.stack([biped.data(index).qpos for index in range(3)]))
     np.testing.assert_array_equal(walks[0], walks[1])
     np.testing.assert_array_equal(walks[0], walks[2])
@@ -51,11 +52,11 @@ def test_returns_and_the_cost_of_changing_stiffness_are_of_time_and_not_of_steps
     for rate, steps in RATES.items():
         biped, total = begun(decisions=rate, episode_seconds=1.0, reward_weights={"grf": 0.0}), 0.0
         for step in range(steps):
-            outcome = biped.step(np.full((3, 4), 0.3 + 0.2 * (step + 1) / steps))
-            total += outcome.reward
+            result = biped.step(np.full((3, 4), 0.3 + 0.2 * (step + 1) / steps))
+            total += result.reward
             if step:
-                costs.append(outcome.info["reward/stiffness_rate"])
-        assert outcome.truncated.all()
+                costs.append(result.info["reward/stiffness_rate"])
+        assert result.truncated.all()
         returns.append(total)
     np.testing.assert_allclose(costs, 4 * (0.2 * 0.02) ** 2, rtol=1e-9)  # 0.2 a second, four actions, per 20 ms
     np.testing.assert_allclose(returns[0], returns[1], rtol=0.01)
@@ -89,8 +90,8 @@ def test_per_event_each_leg_takes_a_new_action_at_its_events_alone():
     for _ in range(100):
         phase = phases(biped)
         action = random.uniform(0.2, 0.6, (4, 4))
-        outcome = biped.step(action, running)
-        k = np.stack([[outcome.info[f"stiffness/{joint}_{side}"] for joint in ("ankle", "toe")] for side in names])
+        result = biped.step(action, running)
+        k = np.stack([[result.info[f"stiffness/{joint}_{side}"] for joint in ("ankle", "toe")] for side in names])
         wanted = np.moveaxis(stiffness_of(action.reshape(4, 2, 2), biped.settings, biped.body), 0, -1)
         if before is not None:
             passed = (np.searchsorted(events, phase, "right") != np.searchsorted(events, before[0], "right")).T
@@ -100,7 +101,7 @@ def test_per_event_each_leg_takes_a_new_action_at_its_events_alone():
         else:
             np.testing.assert_allclose(k, wanted, rtol=1e-12)
         before = np.where(running[:, None], phase, before[0] if before else phase), k
-        running = running & ~outcome.terminated
+        running = running & ~result.terminated
     assert (changes[:, running] >= 6).all() and running.any()  # 2 s: nearly two strides of four events
 
 
@@ -121,10 +122,10 @@ def test_the_joint_that_is_not_decided_follows_the_fixed_schedule(mode, joint, o
     other_action[:, [column, column + 2]] = -1.0
     for _ in range(20):
         fixed = biped.scheduled_stiffness()[:, 0, column]
-        outcome, same = biped.step(action), twin.step(other_action)
-        np.testing.assert_allclose(outcome.info[f"stiffness/{other}_left"], fixed, rtol=1e-12)
-        np.testing.assert_array_equal(outcome.observation, same.observation)
-        np.testing.assert_array_equal(outcome.reward, same.reward)
+        result, same = biped.step(action), twin.step(other_action)
+        np.testing.assert_allclose(result.info[f"stiffness/{other}_left"], fixed, rtol=1e-12)
+        np.testing.assert_array_equal(result.observation, same.observation)
+        np.testing.assert_array_equal(result.reward, same.reward)
     ours = begun(action_mode=mode, stiffness_joints=joint).step(action).info[f"stiffness/{joint}_left"]
     np.testing.assert_array_equal(ours, free.step(action).info[f"stiffness/{joint}_left"])
 

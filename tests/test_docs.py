@@ -12,8 +12,8 @@ import tyro
 
 import evaluate
 import train
-from springfoot.agents import studies
 from springfoot.gait import human_gait
+from springfoot.studies import comparison as studies
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
@@ -57,7 +57,7 @@ def test_readme_commands_are_understood(folder):
     programs = {
         "train.py": train.Flags,
         "evaluate.py": evaluate.Flags,
-        "-m springfoot.agents.studies": studies.BestConstant | studies.Compare | studies.Seeds | studies.Bodies,
+        "-m springfoot.studies.comparison": studies.BestConstant | studies.Compare | studies.Seeds | studies.Bodies,
     }
     assert {program for program, _ in COMMANDS} == set(programs)
     for program, words in COMMANDS:

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springfoot.agents.evaluation import measure
-from springfoot.agents.recording import record
-from springfoot.agents.report import write_gait_cycle
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.agents.schedules import baseline, leg_phase
+from springfoot.agents.baselines import baseline, leg_phase
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs import Biped, BipedSettings, SegmentedFootBiped, SegmentedFootBipedVector
-from springfoot.envs.biped import Tick
-from springfoot.envs.model import ANKLE, LEFT
-from springfoot.envs.task import OBSERVATION
+from springfoot.envs.biped_batch import Tick
+from springfoot.envs.physics.model import ANKLE, LEFT
+from springfoot.envs.task.reward import OBSERVATION
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import record
+from springfoot.evaluation.report import write_gait_cycle
 
 SETTINGS = BipedSettings(episode_seconds=7.0)
 STANCE, SWING, TOE_OFF = 0.45, -0.1, 0.65
@@ -52,12 +52,12 @@ def test_one_number_is_the_same_at_every_station(tmp_path):
     spring, drive = (biped.model.actuator(f"{half}_ankle_left").id for half in ("stiffness", "drive"))
     stiffness = []
     for _ in range(350):
-        outcome = biped.step(policy(biped.observe()))
-        assert not outcome.terminated[0]
+        result = biped.step(policy(biped.observe()))
+        assert not result.terminated[0]
         k = n_m_per_rad(policy.asked[-1])
         stiffness += [k, k]
-        assert outcome.info["stiffness/ankle_left"][0] == pytest.approx(k, rel=1e-6)  # actions are float32
-        k = outcome.info["stiffness/ankle_left"][0]
+        assert result.info["stiffness/ankle_left"][0] == pytest.approx(k, rel=1e-6)  # actions are float32
+        k = result.info["stiffness/ankle_left"][0]
         data, now, before = biped.data(0), ticks[-1], ticks[-2]
         assert data.ctrl[spring] == now.stiffness[0, LEFT, ANKLE] == before.stiffness[0, LEFT, ANKLE] == k
         assert data.ctrl[drive] == pytest.approx(k * now.equilibrium[0, LEFT, ANKLE], rel=1e-12)
@@ -65,7 +65,7 @@ def test_one_number_is_the_same_at_every_station(tmp_path):
         deflection = now.equilibrium[0, LEFT, ANKLE] - m.angle[0, LEFT, ANKLE] - 0.02 * m.velocity[0, LEFT, ANKLE]
         assert np.abs(deflection * k) < 200.0
         assert m.torque[0, LEFT, ANKLE] == pytest.approx(k * deflection, abs=1e-9)
-        assert outcome.info["torque/ankle_left"][0] == m.torque[0, LEFT, ANKLE]
+        assert result.info["torque/ankle_left"][0] == m.torque[0, LEFT, ANKLE]
         assert data.joint("ankle_left").qfrc_actuator[0] == pytest.approx(k * deflection, abs=1e-9)
 
     recording = record(TwoLevels(), SETTINGS, name="two levels", episodes=1)

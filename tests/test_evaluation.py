@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from springfoot.agents.evaluation import CURVES, measure
-from springfoot.agents.recording import SERIES, Recording, load_recording, prepare, record, record_each
-from springfoot.envs.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
+from springfoot.envs.physics.foot_contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.metrics import CURVES, measure
+from springfoot.evaluation.recording import SERIES, Recording, load_recording, prepare, record, record_each
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT
 
@@ -55,7 +55,7 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None) -> Recording:
     step = PERCENT / 100
     plan = np.stack([-0.2 + HUMAN.step_length * step, 0.97 - 0.02 * np.cos(2 * np.pi * step)], -1)
     series = {
-        "root": np.tile([0.0, 0.88, PITCH], (count, 1)),
+        "base": np.tile([0.0, 0.88, PITCH], (count, 1)),
         "angle": angle,
         "velocity": velocity,
         "torque": 0.9 * torque,

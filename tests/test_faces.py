@@ -15,10 +15,10 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
-from springfoot.envs.faces import SegmentedFootBiped
-from springfoot.envs.model import ACTIONS
+from springfoot.envs.env import SegmentedFootBiped
+from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from, settings_to_json
-from springfoot.envs.task import OBSERVATION
+from springfoot.envs.task.reward import OBSERVATION
 from springfoot.gait.errors import SpringfootError
 
 ID = "springfoot.envs:SegmentedFootBiped-v0"
@@ -243,7 +243,7 @@ def test_max_episode_steps_truncates(maker):
 RENDER = """
 import sys
 import numpy as np
-from springfoot.envs.faces import SegmentedFootBiped
+from springfoot.envs.env import SegmentedFootBiped
 from springfoot.gait.errors import SpringfootError
 env = SegmentedFootBiped(render_mode="rgb_array")
 env.reset(seed=0)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from springfoot.agents.schedules import baseline
-from springfoot.envs.biped import Biped
-from springfoot.envs.constants import leg_constants
-from springfoot.envs.model import ANKLE, LEFT, TOE, damping_times
+from springfoot.agents.baselines import baseline
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.physics.model import ANKLE, LEFT, TOE, damping_times
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import SpringfootError
 from springfoot.gait.identification import PARAMETERS, Estimate, PhaseSpring, identify, noise_study
@@ -103,9 +103,9 @@ def test_intervals_hold_the_truth_in_95_percent_of_1000_repeats_with_torque_nois
     data, segments, _ = of_joint(joint)
     outcomes = noise_study(**data, torque_sd=torque_sd, repeats=1000, seed=1)
     assert len(outcomes) == len(segments)
-    for outcome in outcomes:
+    for result in outcomes:
         for name in PARAMETERS:
-            assert 92 <= outcome.coverage[name] <= 98, (outcome.start, name)
+            assert 92 <= result.coverage[name] <= 98, (result.start, name)
 
 
 def test_noise_on_the_angle_makes_the_spring_too_soft_as_errors_in_variables_do():
@@ -113,7 +113,7 @@ def test_noise_on_the_angle_makes_the_spring_too_soft_as_errors_in_variables_do(
     springs = identify(**data)
     found = [noise_study(**data, angle_sd=sd) for sd in np.deg2rad([0.25, 0.5, 1.0])]
     table, expected = (  # noise level, phase
-        np.array([[getattr(outcome, name) for outcome in outcomes] for outcomes in found])
+        np.array([[getattr(result, name) for result in outcomes] for outcomes in found])
         for name in ("stiffness_bias_percent", "expected_percent")
     )
     assert np.all(np.diff(table, axis=0) < 0)
@@ -122,25 +122,25 @@ def test_noise_on_the_angle_makes_the_spring_too_soft_as_errors_in_variables_do(
     assert np.argmin(table[1]) == np.argmin([spring.angle_spread for spring in springs])
 
     torque, angle, velocity, where = spring_data(count=2000)
-    (outcome,) = noise_study(torque, angle, velocity, where, (0.2, 0.401), angle_sd=0.01, repeats=100)
+    (result,) = noise_study(torque, angle, velocity, where, (0.2, 0.401), angle_sd=0.01, repeats=100)
     factor = only(torque, angle, velocity, where).attenuation(0.01)
     assert factor < 0.98
-    assert outcome.expected_percent == pytest.approx(100 * (factor - 1))
-    assert outcome.stiffness_bias_percent == pytest.approx(outcome.expected_percent, abs=0.5)
-    assert outcome.coverage["stiffness"] < 50  # the intervals know nothing of it
+    assert result.expected_percent == pytest.approx(100 * (factor - 1))
+    assert result.stiffness_bias_percent == pytest.approx(result.expected_percent, abs=0.5)
+    assert result.coverage["stiffness"] < 50  # the intervals know nothing of it
 
 
 def test_noise_on_a_differentiated_angle_reaches_the_spring_through_both():
     torque, angle, velocity, phase = spring_data(count=2000)
     sd = 0.01
-    (outcome,) = noise_study(
+    (result,) = noise_study(
         torque, angle, velocity, phase, (0.2, 0.401), angle_sd=sd, velocity_sd=sd / (np.sqrt(2) * 0.01), repeats=50
     )
     noisy = angle + sd * np.random.default_rng(4).standard_normal((50, len(angle)))
     rate = velocity[1:-1] + (noisy - angle)[:, 2:] / 0.02 - (noisy - angle)[:, :-2] / 0.02
     found = [estimates(only(torque[1:-1], x[1:-1], v, phase[1:-1]))[0].value for x, v in zip(noisy, rate, strict=True)]
-    assert 100 * (np.median(found) / K - 1) == pytest.approx(outcome.expected_percent, abs=0.5)
-    assert outcome.expected_percent < -2
+    assert 100 * (np.median(found) / K - 1) == pytest.approx(result.expected_percent, abs=0.5)
+    assert result.expected_percent < -2
 
 
 def test_estimates_and_intervals_are_those_of_the_textbook():

@@ -6,13 +6,13 @@ import sys
 import numpy as np
 import pytest
 
-from springfoot.agents import identified
-from springfoot.agents.identified import SEGMENTS, STARTS, mean_springs, rebuilt, spring_work, stiffness_named
-from springfoot.agents.recording import prepare, record
-from springfoot.envs.actuation import FEET
-from springfoot.envs.biped import Biped
-from springfoot.envs.model import damping_times
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.physics.model import damping_times
+from springfoot.evaluation.recording import prepare, record
 from springfoot.gait import SpringfootError
+from springfoot.studies import identifiability as identified
+from springfoot.studies.identifiability import SEGMENTS, STARTS, mean_springs, rebuilt, spring_work, stiffness_named
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +54,10 @@ def test_work_of_the_springs_is_that_of_the_environments_info(walked):
     biped.reset(np.arange(2), [5, 6])
     observation, sums = biped.observe(), {name: np.zeros(2) for name in ("stiffness", "equilibrium")}
     for _ in range(50):
-        outcome = biped.step(policy(observation))
-        observation = outcome.observation
+        result = biped.step(policy(observation))
+        observation = result.observation
         for name in sums:
-            sums[name] += outcome.info[f"work/{name}/ankle_left"]
+            sums[name] += result.info[f"work/{name}/ankle_left"]
     for name, joules in spring_work(seconds).items():
         assert np.nansum(joules[:, :, 0, 0], axis=1) == pytest.approx(sums[name], rel=1e-3, abs=1e-3)
         assert np.abs(sums[name]).min() > 0.1

@@ -3,11 +3,11 @@
 import dataclasses
 import sys
 
-from springfoot.agents import learning_curves
 from springfoot.agents.config import TrainingConfig
-from springfoot.agents.learning_curves import first_without_falls
 from springfoot.agents.training import train
 from springfoot.envs.settings import BipedSettings
+from springfoot.studies import learning_curves
+from springfoot.studies.learning_curves import first_without_falls
 
 
 def test_the_last_fall_counts():

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from springfoot.envs.biped import Biped
-from springfoot.envs.model import SIDES
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError
 from springfoot.gait.feet import turned

@@ -6,23 +6,23 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from springfoot.envs import legs
-from springfoot.envs.biped import Biped
-from springfoot.envs.constants import constants_at, constants_from, constants_name, leg_constants
-from springfoot.envs.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
-from springfoot.envs.legs import knot_curve
-from springfoot.envs.phase import GRID
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control import leg_controller as legs
+from springfoot.envs.control.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
+from springfoot.envs.control.leg_constants import constants_at, constants_from, constants_name, leg_constants
+from springfoot.envs.control.leg_controller import knot_curve
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.reference_walk import walk_at
 from springfoot.envs.settings import BipedSettings
-from springfoot.envs.walks import walk_at
 from springfoot.gait.errors import SpringfootError
 
 
 def test_every_set_of_constants_says_what_found_it():
-    table = json.loads(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
+    table = json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
     assert set(table["found_by"]) == set(table["constants"])
     for equilibrium, cadence in (("planned", "people"), ("planned", "thesis"), ("neutral", "people")):
         name = constants_name(equilibrium, cadence)
-        assert table["found_by"][name].startswith("python -m springfoot.agents.tuning")
+        assert table["found_by"][name].startswith("python -m springfoot.studies.leg_tuning")
 
 
 def test_angle_and_phase_share_the_planned_constants():
@@ -44,7 +44,7 @@ def test_constants_are_linear_between_speeds_and_the_nearest_beyond():
 
 def test_every_committed_speed_has_its_own_constants():
     """A set whose name tells a speed is what a walk at that speed gets."""
-    table = json.loads(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
+    table = json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
     sets = {constants_name("planned", "people", speed): speed for speed in np.round(np.arange(0.4, 2.0, 0.1), 9)}
     for name in set(sets) & set(table["constants"]):
         expected = constants_from(table["constants"][name])

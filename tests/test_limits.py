@@ -4,11 +4,11 @@ import copy
 
 import pytest
 
-from springfoot.agents.evaluation import measure
-from springfoot.agents.limits import HUMAN_LIKE, WALKS, Limit, numbers, unmet
-from springfoot.agents.recording import prepare, record
+from springfoot.envs.control.reference_walk import walk_at
 from springfoot.envs.settings import BipedSettings, settings_to_json
-from springfoot.envs.walks import walk_at
+from springfoot.evaluation.criteria import HUMAN_LIKE, WALKS, Limit, numbers, unmet
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import prepare, record
 
 PLAN = walk_at(BipedSettings(), 1.2).plan
 METRICS = {

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from springfoot.envs.contact import CONTACTS, contact_offsets, geom_name
-from springfoot.envs.model import JOINTS, SIDES, build_model, build_spec, contact_material
+from springfoot.envs.physics.foot_contact import CONTACTS, contact_offsets, geom_name
+from springfoot.envs.physics.model import JOINTS, SIDES, build_model, build_spec, contact_material
 from springfoot.gait.body import GRAVITY, Body
 
 BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0), Body(1.6, 70.0, 0.94, 1.07, 0.3)]

@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks import physics
 from benchmarks.walking import record_walk
-from springfoot.agents.recording import prepare, record
-from springfoot.envs.biped import Biped
-from springfoot.envs.simulation import WINDOW
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.timing import CONTROL_WINDOW
+from springfoot.evaluation.recording import prepare, record
 
 
 @pytest.mark.parametrize("name", physics.ROWS)
@@ -18,7 +18,7 @@ def test_a_row_differs_from_the_default_in_one_thing_and_its_steps_fill_a_window
     options = [key for key in dir(default.opt) if not key.startswith("_")]
     changed = [key for key in options if not np.array_equal(getattr(default.opt, key), getattr(model.opt, key))]
     assert len(changed) == (name != physics.DEFAULT)
-    steps = WINDOW / model.opt.timestep
+    steps = CONTROL_WINDOW / model.opt.timestep
     assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
@@ -26,13 +26,13 @@ def test_a_finer_timestep_walks_the_same_windows_a_little_otherwise():
     policy, settings = prepare("schedule", {"episode_seconds": 0.2, "start": 0.2})
     fine = physics.edited(physics.ROWS["0.5 ms"])
     coarse, walked = (record(policy, settings, name="", episodes=1, model=model) for model in (None, fine))
-    assert walked.ticks == coarse.ticks == round(0.2 / WINDOW)
+    assert walked.ticks == coarse.ticks == round(0.2 / CONTROL_WINDOW)
     apart = np.abs(walked.series["angle"] - coarse.series["angle"]).max()
     assert 0 < apart < np.deg2rad(3.0)
     biped = Biped(settings, 1, model=fine)
     biped.reset(np.array([0]), [0])
     biped.step(np.zeros((1, 4)))
-    assert biped.data(0).time == pytest.approx(2 * WINDOW)
+    assert biped.data(0).time == pytest.approx(2 * CONTROL_WINDOW)
 
 
 def test_costs_are_of_the_same_states_and_grow_with_the_number_of_steps():

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from springfoot.agents.bundle import find_policy
-from springfoot.agents.evaluation import measure
-from springfoot.agents.limits import WALKS, unmet
-from springfoot.agents.recording import prepare, record
+from springfoot.agents.policy import find_policy
+from springfoot.evaluation.criteria import WALKS, unmet
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import prepare, record
 
 
 def walked(name, **settings):

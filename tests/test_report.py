@@ -15,14 +15,14 @@ from PIL import Image, ImageSequence
 from rich.console import Console
 
 import evaluate
-from springfoot.agents.bodies import draw_pairs, walk_pairs
-from springfoot.agents.bundle import Policy, fingerprint, save_policy
-from springfoot.agents.evaluation import CURVES, measure
-from springfoot.agents.recording import load_recording, prepare, record
-from springfoot.agents.report import people_metrics, print_table, write_report
+from springfoot.agents.policy import Policy, fingerprint, save_policy
 from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.settings import reference_gait, settings_from
+from springfoot.evaluation.metrics import CURVES, measure
+from springfoot.evaluation.recording import load_recording, prepare, record
+from springfoot.evaluation.report import people_metrics, print_table, write_report
 from springfoot.gait import SpringfootError, human_gait
+from springfoot.studies.body_sweep import draw_pairs, walk_pairs
 
 FILES = {
     "metrics.json",

@@ -8,8 +8,8 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
 
 N = 6

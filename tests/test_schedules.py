@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from springfoot.agents.schedules import BASELINES, baseline, leg_phase, own_settings
-from springfoot.envs.actuation import stiffness_of
-from springfoot.envs.biped import Biped
+from springfoot.agents.baselines import BASELINES, baseline, leg_phase, own_settings
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait import Body, SpringfootError
 
@@ -42,10 +42,10 @@ def test_phase_is_read_from_the_observation():
 def test_constant_is_300_and_40_newton_metres_a_radian_scaled_with_the_body():
     for values, scale in (({}, 1.0), ({"height": 1.87, "mass": 90.0}, 1.1 * 90 / 63)):
         settings = settings_of("constant", **values)
-        outcome = started(settings, [0.2]).step(baseline("constant", settings)(np.zeros((1, 60))))
+        result = started(settings, [0.2]).step(baseline("constant", settings)(np.zeros((1, 60))))
         for joint, value in (("ankle", 300.0), ("toe", 40.0)):
             for side in ("left", "right"):
-                assert outcome.info[f"stiffness/{joint}_{side}"][0] == pytest.approx(value * scale, rel=1e-6)
+                assert result.info[f"stiffness/{joint}_{side}"][0] == pytest.approx(value * scale, rel=1e-6)
 
 
 def test_constant_of_other_stiffness():
@@ -75,7 +75,7 @@ def test_schedule_follows_the_body_and_the_speed_of_each_environment(own):
         wanted = biped.scheduled_stiffness()
         biped.step(action)
         set_to = stiffness_of(action.reshape(16, 2, 2), settings, biped.body)
-        set_to *= biped.walkers.scale["torque"][:, None, None]
+        set_to *= biped.subjects.scale["torque"][:, None, None]
         assert set_to == pytest.approx(wanted, rel=1e-4)
 
 

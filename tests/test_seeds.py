@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import train
-from springfoot.agents import seeds
-from springfoot.agents.bundle import BEST, load_policy
+from springfoot.agents import multi_seed as seeds
+from springfoot.agents.policy import BEST, load_policy
 
 SCRIPT, RUN = Path(train.__file__), "run.json"
 SHORT = [

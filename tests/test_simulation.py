@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springfoot.envs.contact import CONTACTS, geom_name
-from springfoot.envs.model import JOINTS, SIDES, damping_times, torque_limits
-from springfoot.envs.simulation import STEPS_PER_WINDOW, Measurement, Simulation
+from springfoot.envs.physics.foot_contact import CONTACTS, geom_name
+from springfoot.envs.physics.measurement import Measurement
+from springfoot.envs.physics.model import JOINTS, SIDES, damping_times, torque_limits
+from springfoot.envs.physics.simulation import Simulation
+from springfoot.envs.timing import PHYSICS_STEPS_PER_WINDOW
 from springfoot.gait.body import Body
 
 LEGS = (len(SIDES), len(JOINTS))
@@ -21,10 +23,10 @@ def advance(simulation: Simulation, stiffness: NDArray, drive: NDArray, ids: NDA
 def started(num: int, threads: int = 1, body: Body | None = None) -> tuple[Simulation, np.random.Generator]:
     """Simulations hanging a little above the floor in random postures."""
     simulation, random = Simulation(body or Body(), num, threads), np.random.default_rng(3)
-    root = np.stack([random.normal(size=num), np.full(num, 0.93), 0.1 * random.normal(size=num)], -1)
+    base = np.stack([random.normal(size=num), np.full(num, 0.93), 0.1 * random.normal(size=num)], -1)
     simulation.reset(
         np.arange(num),
-        root,
+        base,
         random.normal(size=(num, 3)),
         0.2 * random.normal(size=(num, *LEGS)),
         random.normal(size=(num, *LEGS)),
@@ -82,10 +84,10 @@ def test_force_is_the_mean_over_the_windows_physics_steps():
         mujoco.mj_setState(model, again, state, kind)
         again.ctrl[::2] = 300.0
         total = np.zeros(model.nsensordata)
-        for _ in range(STEPS_PER_WINDOW):
+        for _ in range(PHYSICS_STEPS_PER_WINDOW):
             mujoco.mj_step(model, again)
             total += again.sensordata
-        expected = (total / STEPS_PER_WINDOW).reshape(2, 3, 3)[..., [0, 2]]
+        expected = (total / PHYSICS_STEPS_PER_WINDOW).reshape(2, 3, 3)[..., [0, 2]]
         np.testing.assert_allclose(m.force[0], expected, atol=1e-6)
     assert m.force[..., 1].sum() > 100.0  # the replay met the floor
 
@@ -111,8 +113,8 @@ def test_a_batch_gives_the_bits_of_its_members_alone(threads):
     for index in range(num):
         single = Simulation(together.body, 1)
         pick = slice(index, index + 1)
-        root, rate = start.root[pick], start.root_velocity[pick]
-        single.reset(np.arange(1), root, rate, start.angle[pick], start.velocity[pick])
+        base, rate = start.base[pick], start.base_velocity[pick]
+        single.reset(np.arange(1), base, rate, start.angle[pick], start.velocity[pick])
         alone.append(single)
     for _ in range(40):
         stiffness = random.uniform(20, 400, (num, *LEGS))
@@ -127,9 +129,9 @@ def test_a_batch_gives_the_bits_of_its_members_alone(threads):
 def test_divergence_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
     simulation, _ = started(3)
-    root, rate = np.zeros((2, 1, 3))
-    root[:, 1], rate[:, 0] = 1.0, 1e20
-    simulation.reset(np.array([1]), root, rate, np.zeros((1, *LEGS)), np.zeros((1, *LEGS)))
+    base, rate = np.zeros((2, 1, 3))
+    base[:, 1], rate[:, 0] = 1.0, 1e20
+    simulation.reset(np.array([1]), base, rate, np.zeros((1, *LEGS)), np.zeros((1, *LEGS)))
     m = advance(simulation, np.full((3, *LEGS), 100.0), np.zeros((3, *LEGS)))
     assert mujoco.mjtWarning(int(m.diverged[1])).name.startswith("mjWARN_BAD")
     assert m.diverged[0] == m.diverged[2] == -1

@@ -8,11 +8,11 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from springfoot.agents import slopes
-from springfoot.envs.actuation import action_of
-from springfoot.envs.biped import Biped
-from springfoot.envs.constants import slope_constants
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.settings import BipedSettings
+from springfoot.studies import slope_tuning as slopes
 
 COMMITTED = slope_constants()
 LARGE = slopes.constants_at(np.arange(10.0))
@@ -22,7 +22,7 @@ LARGE = slopes.constants_at(np.arange(10.0))
 def constants(tmp_path):
     """A copy of the committed file of constants."""
     path = tmp_path / "legs.json"
-    path.write_text(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
+    path.write_text(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
     return path
 
 
@@ -34,7 +34,7 @@ def run(monkeypatch, *words):
 def test_the_numbers_add_nothing_where_the_ground_is_level_even_beside_a_slope():
     def walked(constants, slope_deg):
         biped = Biped(BipedSettings(), 2, slope=constants)
-        biped.walkers.slope[:] = 0.0, np.radians(slope_deg)
+        biped.subjects.slope[:] = 0.0, np.radians(slope_deg)
         biped.reset(np.arange(2), [3, 3])
         for _ in range(20):
             action = action_of(biped.scheduled_stiffness(), biped.settings, biped.body)
@@ -78,7 +78,9 @@ def test_better_numbers_are_written_with_their_command_and_worse_ones_are_not(mo
     after, said = json.loads(constants.read_text()), capsys.readouterr().out
     assert "wrote what it found" in said
     assert after["constants"] == table["constants"] and after["slope"]["constants"] != table["slope"]["constants"]
-    assert after["slope"]["found_by"].startswith("python -m springfoot.agents.slopes --threads 1 --generations 3")
+    assert after["slope"]["found_by"].startswith(
+        "python -m springfoot.studies.slope_tuning --threads 1 --generations 3"
+    )
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springfoot.agents.evaluation import WARM_UP, measure
-from springfoot.agents.recording import prepare, record
-from springfoot.envs.biped import Biped
-from springfoot.envs.faces import SegmentedFootBiped
-from springfoot.envs.model import ACTIONS, ANKLE, HIP, KNEE
-from springfoot.envs.settings import BipedSettings
-from springfoot.envs.simulation import Simulation
-from springfoot.envs.standing import (
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.standing import (
     OFF_PHASE,
     SLOW_SPEED,
     STAND_COM,
@@ -24,7 +19,12 @@ from springfoot.envs.standing import (
     standing_posture,
     steady_walk,
 )
-from springfoot.envs.walks import tabulated_speeds
+from springfoot.envs.env import SegmentedFootBiped
+from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE
+from springfoot.envs.physics.simulation import Simulation
+from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.metrics import WARM_UP, measure
+from springfoot.evaluation.recording import prepare, record
 from springfoot.gait import scores as score
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError
@@ -65,7 +65,7 @@ def test_a_standing_body_bears_its_weight_under_its_com_and_moves_little():
     biped = standing(mass=80.0, height=1.8)
     actions = np.random.default_rng(0).uniform(-1, 1, (2, 4))
     for _ in range(waiting(biped)):
-        outcome = biped.step(actions)
+        result = biped.step(actions)
         m = biped.measurement
         actions = -actions  # which change nothing
     weight = 80.0 * GRAVITY
@@ -76,7 +76,7 @@ def test_a_standing_body_bears_its_weight_under_its_com_and_moves_little():
     np.testing.assert_allclose(cop, m.com[:, 0], atol=0.01)
     assert (cop > m.contact[:, :, 0, 0].max(axis=1)).all() and (cop < m.contact[:, :, 2, 0].min(axis=1)).all()
     assert np.abs(m.com_velocity).max() < 0.03
-    np.testing.assert_allclose(outcome.info["phase/left"] % 0.5, OFF_PHASE)
+    np.testing.assert_allclose(result.info["phase/left"] % 0.5, OFF_PHASE)
     assert (modes(biped) == STANDING).all()
 
 
@@ -117,11 +117,11 @@ def test_a_policy_acts_in_the_steady_walk_only():
     low, high = biped.settings.ankle_stiffness_range
     seen: dict[int, set[bool]] = {}
     for _ in range(375):
-        outcome = biped.step(np.tile([0.5, 0.2], (2, 2)))
+        result = biped.step(np.tile([0.5, 0.2], (2, 2)))
         k = np.sqrt(low * high) * np.sqrt(high / low) ** 0.5
-        for mode, own in zip(modes(biped).tolist(), np.isclose(outcome.info["stiffness/ankle_left"], k), strict=True):
+        for mode, own in zip(modes(biped).tolist(), np.isclose(result.info["stiffness/ankle_left"], k), strict=True):
             seen.setdefault(mode, set()).add(bool(own))
-        if outcome.terminated.any():
+        if result.terminated.any():
             break
     assert seen[WALKING] == {True}
     assert seen[STANDING] == seen[STARTING] == {False}
@@ -137,13 +137,13 @@ def test_who_stands_walks_and_stops_has_the_same_bits_alone_and_together():
     actions = np.random.default_rng(1).uniform(0.0, 0.6, (3, 4))
     seen: set[int] = set()
     for _ in range(260):
-        outcome = together.step(actions)
+        result = together.step(actions)
         each = [biped.step(actions[i : i + 1]) for i, biped in enumerate(alone)]
         seen.update(modes(together).tolist())
         for name in ("observation", "reward", "values"):
-            np.testing.assert_array_equal(getattr(outcome, name), np.concatenate([getattr(one, name) for one in each]))
+            np.testing.assert_array_equal(getattr(result, name), np.concatenate([getattr(one, name) for one in each]))
     assert {STANDING, STARTING, STOPPED} <= seen
-    assert np.isfinite(outcome.values).all()
+    assert np.isfinite(result.values).all()
 
 
 def test_rest_of_a_body_that_walks_on_or_falls_is_not_counted():

@@ -6,10 +6,10 @@ import sys
 import numpy as np
 import pytest
 
-from springfoot.agents import studies
-from springfoot.agents.recording import prepare, record
-from springfoot.agents.schedules import BASELINES, constant
+from springfoot.agents.baselines import BASELINES, constant
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.evaluation.recording import prepare, record
+from springfoot.studies import comparison as studies
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
 
@@ -134,7 +134,7 @@ def test_bad_input_is_one_line_and_exit_code_2(words, said, monkeypatch, capsys)
 
 def test_module_runs_as_a_command():
     words = ["seeds", "schedule", "--episodes", "1", "--seconds", "4.5"]
-    command = [sys.executable, "-m", "springfoot.agents.studies", *words]
+    command = [sys.executable, "-m", "springfoot.studies.comparison", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "| falls | 0 | 0.0 ± – |" in done.stdout
     assert "1 episodes × 4.5 s, seeds 0–0, no pushes." in done.stdout

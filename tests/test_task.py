@@ -3,12 +3,20 @@
 import numpy as np
 import pytest
 
-from springfoot.envs.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
+from springfoot.envs.control.reference_walk import rows, walks_of
+from springfoot.envs.control.subjects import Subjects
+from springfoot.envs.physics.measurement import Measurement
+from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
-from springfoot.envs.simulation import Measurement
-from springfoot.envs.task import EXCESS_SHARE, FORCE_TOLERANCE, OBSERVATION, TERMS, TOO_LOW, TOO_TILTED, Task
-from springfoot.envs.walkers import Walkers
-from springfoot.envs.walks import rows, walks_of
+from springfoot.envs.task.reward import (
+    EXCESS_SHARE,
+    FORCE_TOLERANCE,
+    OBSERVATION,
+    TERMS,
+    TOO_LOW,
+    TOO_TILTED,
+    Task,
+)
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
@@ -27,7 +35,9 @@ class Setup:
 
     def task(self, num) -> Task:
         """For so many environments."""
-        return Task(self.settings, list(rows(self.walks)), Walkers(self.settings, np.array([self.settings.speed]), num))
+        return Task(
+            self.settings, list(rows(self.walks)), Subjects(self.settings, np.array([self.settings.speed]), num)
+        )
 
     def measurement(self, left_phase, **other) -> Measurement:
         """The body on its plan with people's joint angles, trunk upright, the leading ankle at x = 10 m."""
@@ -38,8 +48,8 @@ class Setup:
         angle = np.stack([self.human.mean(name, legs) for name in ("thigh", "knee", "ankle", "toe")], -1)
         values = {
             "time": np.zeros(n),
-            "root": np.tile([10.0, self.body.leg_length, 0.0], (n, 1)),
-            "root_velocity": np.zeros((n, 3)),
+            "base": np.tile([10.0, self.body.leg_length, 0.0], (n, 1)),
+            "base_velocity": np.zeros((n, 3)),
             "angle": angle,
             "velocity": np.zeros((n, 2, 4)),
             "torque": np.zeros((n, 2, 4)),
@@ -141,7 +151,7 @@ def test_pose_is_the_exponential_of_the_weighted_squared_error(thesis_body, join
 
 def test_pose_takes_the_thigh_to_the_vertical(thesis_body):
     leaning = thesis_body.measurement(PHASES)
-    leaning.root[:, 2] = 0.2
+    leaning.base[:, 2] = 0.2
     leaning.angle[:, :, HIP] += 0.2
     np.testing.assert_allclose(thesis_body.terms(leaning, PHASES)["pose"], 1.0, atol=1e-4)
 
@@ -204,7 +214,7 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     weights = DEFAULT_WEIGHTS | {"pose": 2.0, "grf": 0.5}
     measured = setup.measurement(PHASES)
     measured.angle[:] += 0.03
-    measured.root[0, 1] = 0.5
+    measured.base[0, 1] = 0.5
     terms = setup.terms(measured, PHASES, action=np.full((len(PHASES), 4), 0.1))
     assert set(terms) == set(weights)
     expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
@@ -217,8 +227,8 @@ def test_a_fall_is_a_low_hip_or_a_tilted_trunk(height):
     setup = Setup(height=height, mass=50, speed=1.0)
     limit = 0.65 * height / 1.7
     measured = setup.measurement(np.full(6, 0.2))
-    measured.root[:, 1] = [limit * 1.001, limit * 0.999, 1.0, 1.0, np.nan, 1.0]
-    measured.root[:, 2] = [0.0, 0.0, 0.799, -0.801, 0.0, np.nan]
+    measured.base[:, 1] = [limit * 1.001, limit * 0.999, 1.0, 1.0, np.nan, 1.0]
+    measured.base[:, 2] = [0.0, 0.0, 0.799, -0.801, 0.0, np.nan]
     expected = ["", TOO_LOW, "", TOO_TILTED, TOO_LOW, TOO_TILTED]
     assert list(setup.task(6).fallen(measured)) == expected
     alive = setup.terms(measured, np.full(6, 0.2))["alive"]
@@ -242,8 +252,8 @@ def observe(setup, measured, left_phase, **other):
 def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
     setup = Setup(height=1.5, mass=80, speed=0.9)
     measured = setup.measurement([0.1, 0.7])
-    measured.root[:, 1:] = [0.7, 0.1]
-    measured.root_velocity[:] = [0.9, -0.1, 0.5]
+    measured.base[:, 1:] = [0.7, 0.1]
+    measured.base_velocity[:] = [0.9, -0.1, 0.5]
     measured.angle[:] = np.arange(8).reshape(2, 4) / 10
     measured.velocity[:] = -np.arange(8).reshape(2, 4)
     force = np.zeros((2, 2, 3, 2))
@@ -293,7 +303,7 @@ def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
 def test_observation_is_finite_and_within_bounds_whatever_happens(thesis_body):
     task = thesis_body.task(3)
     measured = thesis_body.measurement([0.2, 0.3, 0.4])
-    for values, wild in ((measured.angle, 1e9), (measured.velocity, -1e9), (measured.root_velocity, np.nan)):
+    for values, wild in ((measured.angle, 1e9), (measured.velocity, -1e9), (measured.base_velocity, np.nan)):
         values[:] = wild
     measured.com[:] = np.inf
     seen = observe(thesis_body, measured, [0.2, 0.3, 0.4])

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from springfoot.agents.thesis_figures import save_figures
-from springfoot.agents.thesis_page import main, page, walks
+from springfoot.studies.thesis_figures import save_figures
+from springfoot.studies.thesis_page import main, page, walks
 
 DOCS = Path(__file__).parents[1] / "docs"
 NUMBER = re.compile(r"[−+]?\d+(?:\.\d+)?")

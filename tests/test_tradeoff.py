@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from springfoot.agents import tradeoff
-from springfoot.agents.evaluation import WARM_UP
-from springfoot.agents.recording import prepare, record
-from springfoot.agents.tradeoff import config_of, folder_of, knee, stiffness_cost
-from springfoot.envs.biped import Biped
+from springfoot.envs.biped_batch import Biped
+from springfoot.evaluation.metrics import WARM_UP
+from springfoot.evaluation.recording import prepare, record
+from springfoot.studies import stiffness_cost as tradeoff
+from springfoot.studies.stiffness_cost import config_of, folder_of, knee, stiffness_cost
 
 
 def test_the_stiffness_cost_is_the_rewards_term():
@@ -19,9 +19,9 @@ def test_the_stiffness_cost_is_the_rewards_term():
     biped.reset(np.arange(1), [0])
     observation = biped.observe()
     for _ in range(round(settings.episode_seconds / biped.dt)):
-        outcome = biped.step(policy(observation))
-        observation = outcome.observation
-        costs.append(outcome.info["reward/stiffness"][0])
+        result = biped.step(policy(observation))
+        observation = result.observation
+        costs.append(result.info["reward/stiffness"][0])
     expected = np.mean(costs[round(WARM_UP / biped.dt) :])
     assert stiffness_cost(record(policy, settings, name="schedule", episodes=1)) == pytest.approx(expected, rel=1e-5)
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 import train
-from springfoot.agents.bundle import load_policy
-from springfoot.agents.config import PRESETS, SettingsFlags, TrainingConfig, given
+from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.flags import SettingsFlags, given
+from springfoot.agents.policy import load_policy
 from springfoot.envs.settings import BipedSettings
 
 SCRIPT, RUN = Path(train.__file__), "run.json"

@@ -9,14 +9,14 @@ import torch
 from safetensors.numpy import load, save
 
 from springfoot.agents import training
-from springfoot.agents.bundle import load_policy
+from springfoot.agents.baselines import baseline
 from springfoot.agents.config import PRESETS, TrainingConfig, config_from_json, config_to_json
-from springfoot.agents.learner import Learner
-from springfoot.agents.recording import prepare
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.agents.schedules import baseline
-from springfoot.envs.biped import Biped
+from springfoot.agents.policy import load_policy
+from springfoot.agents.ppo import Learner
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.recording import prepare
 from springfoot.gait.errors import SpringfootError
 
 SHORT = TrainingConfig(

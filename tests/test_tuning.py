@@ -9,9 +9,9 @@ from math import exp
 import numpy as np
 import pytest
 
-from springfoot.agents import tuning
-from springfoot.envs.constants import leg_constants
+from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.settings import BipedSettings
+from springfoot.studies import leg_tuning as tuning
 
 COMMITTED = leg_constants("planned", "people")
 
@@ -20,7 +20,7 @@ COMMITTED = leg_constants("planned", "people")
 def constants(tmp_path):
     """A copy of the committed file of constants."""
     path = tmp_path / "legs.json"
-    path.write_text(resources.files("springfoot.envs").joinpath("legs.json").read_text(encoding="utf-8"))
+    path.write_text(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
     return path
 
 
@@ -54,7 +54,7 @@ def test_a_search_writes_its_constants_and_its_command_and_leaves_the_others_alo
     found = after["constants"].pop("planned")
     assert found != before["constants"].pop("planned") and set(found) == set(asdict(COMMITTED))
     assert after["constants"] == before["constants"]
-    assert after["found_by"]["planned"] == " ".join(["python -m springfoot.agents.tuning", *map(str, words)])
+    assert after["found_by"]["planned"] == " ".join(["python -m springfoot.studies.leg_tuning", *map(str, words)])
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from springfoot.envs.faces import METADATA, SegmentedFootBiped
-from springfoot.envs.task import OBSERVATION
-from springfoot.envs.vector import SegmentedFootBipedVector
+from springfoot.envs.env import METADATA, SegmentedFootBiped
+from springfoot.envs.task.reward import OBSERVATION
+from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
 
 SHORT: dict[str, Any] = {"episode_seconds": 0.8, "push_newton": 900.0, "push_interval": 0.4, "start_noise": 0.05}

@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springfoot.agents.sb3 import SegmentedFootBipedVecEnv
-from springfoot.envs.actuation import action_of
-from springfoot.envs.biped import Biped, Tick
-from springfoot.envs.faces import SegmentedFootBiped
-from springfoot.envs.observation import OBSERVATION
+from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.subjects import Subjects
+from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.envs.vector import SegmentedFootBipedVector
-from springfoot.envs.walkers import Walkers
-from springfoot.envs.walks import tabulated_speeds
+from springfoot.envs.step_result import Tick
+from springfoot.envs.task.observation import OBSERVATION
+from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 
@@ -25,7 +26,7 @@ HEIGHT = COMMAND + 1
 
 def scheduled(biped: Biped) -> np.ndarray:
     """The fixed schedule as actions, the same for every body."""
-    own = biped.scheduled_stiffness() / biped.walkers.scale["torque"][:, None, None]
+    own = biped.scheduled_stiffness() / biped.subjects.scale["torque"][:, None, None]
     return action_of(own, biped.settings, biped.body).reshape(biped.num_envs, -1)
 
 
@@ -46,14 +47,14 @@ def test_tables_reach_all_that_may_be_asked_for_and_hold_the_own_speed(own):
     speeds = tabulated_speeds(settings)
     assert settings.speed in speeds
     assert (np.diff(speeds) > 0).all() and np.diff(speeds).max() <= 0.1 * np.sqrt(settings.height / 1.7) + 1e-9
-    walkers = Walkers(settings, speeds, 4)
+    subjects = Subjects(settings, speeds, 4)
     corners = [(height, speed) for height in settings.height_range for speed in settings.speed_range]  # type: ignore
     height, speed = np.array(corners).T
-    walkers.reset(np.arange(4), [np.random.default_rng(0)] * 4, given(height=height, mass=[70.0] * 4, speed=speed))
-    np.testing.assert_array_equal(walkers.speed, speed)
-    assert ((walkers.place["row"] >= 0) & (walkers.place["row"] < len(speeds))).all()
-    step = np.diff(speeds, append=speeds[-1])[walkers.place["row"]]
-    equal = speeds[walkers.place["row"]] + walkers.place["weight"] * step
+    subjects.reset(np.arange(4), [np.random.default_rng(0)] * 4, given(height=height, mass=[70.0] * 4, speed=speed))
+    np.testing.assert_array_equal(subjects.speed, speed)
+    assert ((subjects.place["row"] >= 0) & (subjects.place["row"] < len(speeds))).all()
+    step = np.diff(speeds, append=speeds[-1])[subjects.place["row"]]
+    equal = speeds[subjects.place["row"]] + subjects.place["weight"] * step
     np.testing.assert_allclose(equal * np.sqrt(height / settings.height), speed, rtol=1e-12)
 
 
@@ -75,12 +76,12 @@ def test_a_body_is_the_same_drawn_or_set():
     for biped in (fixed, drawn):
         biped.reset(np.arange(1), [3], given=given(height=1.9, mass=60.0, speed=speed))
         for _ in range(10):
-            outcome = biped.step(np.zeros((1, 4)))
+            result = biped.step(np.zeros((1, 4)))
     np.testing.assert_allclose(drawn.observe(), fixed.observe(), atol=1e-5)
     rows = [biped.step(np.zeros((1, 4))).values[0] for biped in (drawn, fixed)]
     # people's forces are taken at the middle of a step of 20 ms, which is another share of the stride
     np.testing.assert_allclose(rows[0], rows[1], rtol=2e-3, atol=2e-3)
-    assert not outcome.terminated.any()
+    assert not result.terminated.any()
 
 
 # Scaling ------------------------------------------------------------------------------------------------------
@@ -89,12 +90,15 @@ def test_a_body_is_the_same_drawn_or_set():
 @pytest.mark.parametrize(("height", "mass"), [(1.45, 110.0), (2.0, 45.0), (1.7, 120.0)])
 def test_at_froude_equal_speed_another_body_does_the_same(height, mass):
     """Start exactly alike; then the same gait at the same dimensionless time, but for the fixed 10 ms and 2 ms."""
-    root = np.sqrt(height / 1.7)
+    time_scale = np.sqrt(height / 1.7)
     biped = Biped(BipedSettings(**ANYBODY), 2)
     ticks: list[Tick] = []
     biped.on_tick = ticks.append
     biped.reset(
-        np.arange(2), [0, 0], start=0.2, given=given(height=[1.7, height], mass=[63, mass], speed=[1.2, 1.2 * root])
+        np.arange(2),
+        [0, 0],
+        start=0.2,
+        given=given(height=[1.7, height], mass=[63, mass], speed=[1.2, 1.2 * time_scale]),
     )
     own, other = biped.observe().astype(float)
     np.testing.assert_allclose(own[:HEIGHT], other[:HEIGHT], atol=1e-6)
@@ -105,8 +109,8 @@ def test_at_froude_equal_speed_another_body_does_the_same(height, mass):
         np.testing.assert_allclose(*biped.observe(), atol=1e-6)
     time = 0.01 * (1 + np.arange(len(ticks)))
     angle = np.stack([tick.measurement.angle.reshape(2, -1) for tick in ticks])
-    same = time * root < time[-1]
-    later = np.stack([np.interp(time[same] * root, time, column) for column in angle[:, 1].T], -1)
+    same = time * time_scale < time[-1]
+    later = np.stack([np.interp(time[same] * time_scale, time, column) for column in angle[:, 1].T], -1)
     difference = np.degrees(later - angle[same, 0])
     assert np.sqrt(np.square(difference).mean(0)).max() < (1e-9 if height == 1.7 else 1.5)
     force = [tick.measurement.force[..., 1].sum((1, 2)) / [63 * 9.81, mass * 9.81] for tick in ticks]
@@ -142,15 +146,15 @@ def test_a_mixed_batch_gives_the_bits_of_its_members_alone(threads, mode):
         for seed, one in zip(seeds, alone, strict=True):
             one.reset(np.arange(1), [seed])
         for actions in np.random.default_rng(0).uniform(-0.4, 0.4, (50, 5, 4)):
-            outcome, singles = (
+            result, singles = (
                 together.step(actions),
                 [one.step(a[None]) for a, one in zip(actions, alone, strict=True)],
             )
             for name in ("observation", "reward", "values", "terminated"):
                 single = np.concatenate([getattr(each, name) for each in singles])
-                np.testing.assert_array_equal(getattr(outcome, name), single, err_msg=name)
+                np.testing.assert_array_equal(getattr(result, name), single, err_msg=name)
         seeds = [None] * 5
-    assert len({body.height for body in together.walkers.bodies}) == 5
+    assert len({body.height for body in together.subjects.bodies}) == 5
 
 
 def test_a_reset_leaves_the_others_alone():
@@ -191,7 +195,7 @@ def test_every_face_takes_bodies_and_speeds_of_one_episode():
     np.testing.assert_allclose(rows[:, COMMAND], froude, rtol=1e-6)
     vector = SegmentedFootBipedVector(2, **ANYBODY)
     np.testing.assert_array_equal(vector.reset(seed=0, options=columns)[0], rows)
-    assert [body.mass for body in vector.biped.walkers.bodies] == [50.0, 100.0]
+    assert [body.mass for body in vector.biped.subjects.bodies] == [50.0, 100.0]
     sb3 = SegmentedFootBipedVecEnv(2, **ANYBODY)
     sb3.seed(0)
     sb3.set_options(asked)
@@ -207,9 +211,9 @@ def test_draws_fill_their_ranges_and_follow_the_seed():
     speeds = tabulated_speeds(settings)
 
     def draw(seed):
-        walkers = Walkers(settings, speeds, 200)
-        walkers.reset(np.arange(200), [np.random.default_rng(seed + index) for index in range(200)])
-        return np.array([(body.height, body.mass) for body in walkers.bodies]), walkers.speed
+        subjects = Subjects(settings, speeds, 200)
+        subjects.reset(np.arange(200), [np.random.default_rng(seed + index) for index in range(200)])
+        return np.array([(body.height, body.mass) for body in subjects.bodies]), subjects.speed
 
     bodies, speed = draw(0)
     for values, (low, high) in zip((*bodies.T, speed), ANYBODY.values(), strict=True):
@@ -224,9 +228,9 @@ def test_draws_fill_their_ranges_and_follow_the_seed():
 
 def test_a_height_and_a_mass_that_make_no_body_are_drawn_again():
     settings = BipedSettings(height_range=(1.0, 2.3), mass_range=(20.0, 250.0))
-    walkers = Walkers(settings, tabulated_speeds(settings), 100)
-    walkers.reset(np.arange(100), [np.random.default_rng(index) for index in range(100)])
-    index = np.array([body.mass / body.height**2 for body in walkers.bodies])
+    subjects = Subjects(settings, tabulated_speeds(settings), 100)
+    subjects.reset(np.arange(100), [np.random.default_rng(index) for index in range(100)])
+    index = np.array([body.mass / body.height**2 for body in subjects.bodies])
     assert 10.0 <= index.min() < 20.0 and 60.0 < index.max() <= 80.0
 
 
@@ -240,7 +244,7 @@ def test_the_commanded_speed_goes_to_a_new_one_at_its_rate():
     seen = []
     for _ in range(15):
         biped.step(scheduled(biped))
-        seen.append(biped.walkers.speed.copy())
+        seen.append(biped.subjects.speed.copy())
     first, second = np.array(seen).T
     np.testing.assert_array_equal(first, 1.2)
     np.testing.assert_allclose(second, np.minimum(1.2 + 0.01 * np.arange(1, 16), 1.305), rtol=1e-12)
@@ -253,11 +257,11 @@ def test_nothing_jumps_as_the_speed_changes():
     """Springs, legs and plan follow the speed without a jump where one tabulated speed takes over from another."""
     biped = Biped(BipedSettings(**ANYBODY), 1)
     biped.reset(np.arange(1), [0], start=0.3)
-    m, walkers = biped.measurement, biped.walkers
+    m, subjects = biped.measurement, biped.subjects
     control = np.zeros((1, 2, 4, 2))
     rows = []
     for speed in np.linspace(0.8, 1.6, 401):
-        walkers.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
+        subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         biped._legs.follow()
         biped._springs.move_equilibrium(biped._legs.phase, m.angle, control)
         biped._legs.command(m, control)
@@ -288,10 +292,10 @@ def test_new_speeds_come_about_once_in_an_interval():
     settings = BipedSettings(speed_range=(1.0, 1.4), speed_interval=0.5, speed_rate=100.0)
     biped = Biped(settings, 4)
     biped.reset(np.arange(4), range(4))
-    seen = [biped.walkers.speed.copy()]
+    seen = [biped.subjects.speed.copy()]
     for _ in range(250):
         biped.step(scheduled(biped))
-        seen.append(biped.walkers.speed.copy())
+        seen.append(biped.subjects.speed.copy())
     speed = np.array(seen)
     assert speed.min() >= 1.0 and speed.max() <= 1.4
     changes = (np.diff(speed, axis=0) != 0).sum(0)

@@ -4,14 +4,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from springfoot.envs.actuation import FEET, action_of
-from springfoot.envs.biped import Biped, Tick
-from springfoot.envs.contact import FRICTION
-from springfoot.envs.model import ANKLE, SIDES, build_spec
-from springfoot.envs.observation import OBSERVATION
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import FEET, action_of
+from springfoot.envs.physics.foot_contact import FRICTION
+from springfoot.envs.physics.model import ANKLE, SIDES, build_spec
+from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings import BipedSettings, settings_from
-from springfoot.envs.simulation import Simulation
-from springfoot.envs.world import MID_SWING
+from springfoot.envs.step_result import Tick
+from springfoot.envs.task.ground import NEXT_FOOTFALL_PHASE
+from springfoot.envs.task.observation import OBSERVATION
 from springfoot.gait.body import GRAVITY, Body
 
 
@@ -21,11 +22,11 @@ def standing(slope_deg: float, friction: float = FRICTION) -> Simulation:
     held = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="pitch")  # or it falls over its ankles
     held.objtype = mujoco.mjtObj.mjOBJ_JOINT
     simulation = Simulation(Body(), 1, model=spec.compile())
-    angle, rate, root = np.zeros((1, len(SIDES), 4)), np.zeros((1, len(SIDES), 4)), np.zeros((1, 3))
+    angle, rate, base = np.zeros((1, len(SIDES), 4)), np.zeros((1, len(SIDES), 4)), np.zeros((1, 3))
     angle[..., ANKLE] = slope
-    root[0, :2] = 2.0, Body().leg_length
+    base[0, :2] = 2.0, Body().leg_length
     simulation.lay(np.arange(1), np.array([slope]), np.zeros((1, len(SIDES))))
-    simulation.reset(np.arange(1), root, np.zeros((1, 3)), angle, rate)
+    simulation.reset(np.arange(1), base, np.zeros((1, 3)), angle, rate)
     simulation.control[..., 0], simulation.control[..., 1] = 3000.0, 3000.0 * angle
     for _ in range(100):
         simulation.advance()
@@ -41,7 +42,7 @@ def test_a_body_at_rest_on_a_slope_is_carried_straight_up_and_heights_are_above_
     assert abs(forward) < 0.02 * up  # at right angles to the slope it would be 0.087
     assert (m.force[0, ..., 1] > 1.0).all() and np.abs(m.contact[0, ..., 1]).max() < 0.008
     data, tangent = simulation.data(0), np.tan(np.radians(slope_deg))
-    assert m.root[0, 1] == pytest.approx(data.qpos[1] - tangent * data.qpos[0], abs=1e-9)
+    assert m.base[0, 1] == pytest.approx(data.qpos[1] - tangent * data.qpos[0], abs=1e-9)
     com = data.subtree_com[0]
     assert m.com[0, 1] == pytest.approx(com[2] - tangent * com[0], abs=1e-9)
 
@@ -61,7 +62,7 @@ def test_feet_slide_when_pushed_harder_than_mu_times_the_normal_force_and_no_soo
             force = m.force[0].sum(axis=(0, 1))
             assert abs(force @ along) <= friction * (force @ normal) * (1 + 1e-9)
             grips.append(-(force @ along) / max(force @ normal, 1.0) / friction)
-        assert (m.root_velocity[0, 0] > 0.2) == slides
+        assert (m.base_velocity[0, 0] > 0.2) == slides
         assert max(grips) > 0.98 or not slides
 
 
@@ -85,7 +86,7 @@ def test_footfalls_lie_within_their_bounds_and_change_in_mid_swing_alone():
     heights, phases, clearance = [], [], []
 
     def keep(tick: Tick) -> None:
-        heights.append(biped._world.height.copy())
+        heights.append(biped._ground.height.copy())
         phases.append(biped._legs.phase.copy())
         clearance.append(biped.measurement.contact[..., 1].min(axis=-1))
 
@@ -96,10 +97,10 @@ def test_footfalls_lie_within_their_bounds_and_change_in_mid_swing_alone():
     changed = np.diff(height, axis=0) != 0
     assert changed.sum() >= 4 * 4 and np.abs(height).max() <= 0.01
     assert height.min() < -0.005 and height.max() > 0.005
-    assert (phase[1:][changed] >= MID_SWING).all() and (phase[1:][changed] < MID_SWING + 0.05).all()
+    assert (phase[1:][changed] >= NEXT_FOOTFALL_PHASE).all() and (phase[1:][changed] < NEXT_FOOTFALL_PHASE + 0.05).all()
     assert (np.array(clearance)[1:][changed] > 0.0).all()  # the new ground is below the foot
     data = biped.data(0)
-    np.testing.assert_array_equal(data.mocap_pos[:, 2], biped._world.height[0])
+    np.testing.assert_array_equal(data.mocap_pos[:, 2], biped._ground.height[0])
 
 
 def test_a_batch_in_any_world_gives_the_bits_of_its_members_alone():
@@ -108,14 +109,14 @@ def test_a_batch_in_any_world_gives_the_bits_of_its_members_alone():
     alone = [Biped(EVERYTHING, 1) for _ in range(3)]
     for index, single in enumerate(alone):
         single.reset(np.arange(1), [5 + index])
-    assert len({float(slope) for slope in together._world.slope}) == 3
+    assert len({float(slope) for slope in together._ground.slope}) == 3
     for _ in range(60):
         actions = scheduled(together)
-        outcome = together.step(actions)
+        result = together.step(actions)
         for index, single in enumerate(alone):
             one = single.step(actions[index : index + 1])
-            np.testing.assert_array_equal(outcome.observation[index], one.observation[0])
-            np.testing.assert_array_equal(outcome.values[index], one.values[0])
+            np.testing.assert_array_equal(result.observation[index], one.observation[0])
+            np.testing.assert_array_equal(result.values[index], one.values[0])
 
 
 @pytest.mark.parametrize("windows", [0, 1, 2, 3, 4])

@@ -1,0 +1,44 @@
+"""Files and folders of results: written whole or not at all, and never over an older one."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from springfoot.gait.errors import SpringfootError
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Writes a whole file or nothing: readers see the old content or the new, never a part."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.chmod(temporary, 0o644)  # mkstemp makes it private; a result is as readable as its neighbours
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def require_new(out: str | Path) -> Path:
+    """`out`, or `SpringfootError` if it exists and is not an empty folder."""
+    out = Path(out)
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise SpringfootError(f"{out} already exists; give another --out, or go on with a run by --resume {out}")
+    return out
+
+
+def make_folder(out: Path) -> None:
+    """Makes the folder and those above it; `SpringfootError` if it cannot be."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpringfootError(f"cannot make the folder {out}: {error.strerror}") from None
+
+
+def next_free(folder: Path, stem: str) -> Path:
+    """`folder`/`stem`-N with the first N from 1 on that is free."""
+    number = 1
+    while (path := folder / f"{stem}-{number}").exists():
+        number += 1
+    return path

@@ -1,0 +1,216 @@
+"""The same training from several seeds at once: one process a processor, one thread each, and the spread of results.
+
+Seed k is trained in the folder `seed-k`, by the same bits as `train.py --seed k` alone; `seeds.json` holds the spread.
+"""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from springfoot.envs.biped_batch import Biped
+from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.scores import mean_sd
+
+from .command_line import exit_code
+from .config import TrainingConfig, config_from_json, config_to_json
+from .files import make_folder, require_new, write_atomically
+from .training import RUN, processors, train
+
+SEEDS = "seeds.json"
+MISSING = "–"
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
+"""Of what `seeds.json` holds mean and standard deviation (n - 1)."""
+
+
+def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str, Any]:
+    """Trains from the seeds `config.seed`, `config.seed` + 1, …, into new folders in `out`; returns `seeds.json`.
+
+    As many processes run at a time as there are processors, each on one thread. The first SIGINT or SIGTERM ends
+    those that run in good order, with usable policies, and begins no more. Raises `SpringfootError`, with nothing
+    written, if `out` exists and is not an empty folder.
+    """
+    require_count("seeds", seeds)
+    require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)
+    out = require_new(out)
+    Biped(config.environment, 1)  # refuses what cannot be walked, before anything is written
+    make_folder(out)
+    configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
+    rows, status = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
+    record = {"config": config_to_json(config), "status": status, "seeds": rows, "spread": spread(rows)}
+    write_atomically(out / SEEDS, (json.dumps(record, indent=2) + "\n").encode())
+    return record
+
+
+def train_all(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> tuple[list[dict[str, Any]], str]:
+    """Trains each configuration into its new folder, its messages marked with its name, as `train_seeds` does.
+
+    Returns what each came to, and `finished`, `failed` or `interrupted`.
+    """
+    at_once = min(max(len(jobs), 1), processors())
+    with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
+        print(f"{len(jobs)} seeds, {at_once} at a time, one thread each", file=sys.stderr, flush=True)
+        rows = list(pool.map(lambda job: trainings.run(*job), jobs))
+    status = "interrupted" if trainings.stopping else "finished"
+    return rows, "failed" if any(row["status"] == "failed" for row in rows) else status
+
+
+def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
+    """As `train_all`, of those that are not finished; what was begun and not finished begins anew.
+
+    Returns `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing changed, for a finished one of
+    other settings.
+    """
+    missing = [job for job in jobs if not is_finished(job[1])]
+    for config, folder, _ in jobs:
+        if is_finished(folder):
+            done = config_from_json(json.loads((folder / RUN).read_text(encoding="utf-8"))["config"])
+            if replace(done, threads=config.threads) != config:
+                raise SpringfootError(f"{folder} was trained with other settings; give another --out")
+    for _, folder, _ in missing:
+        if (folder / RUN).is_file():
+            shutil.rmtree(folder)
+    return train_all(missing)[1] if missing else "finished"
+
+
+def is_finished(folder: Path) -> bool:
+    """Whether a run folder holds a training that came to its end."""
+    run = folder / RUN
+    return run.is_file() and json.loads(run.read_text(encoding="utf-8")).get("status") == "finished"
+
+
+def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+    """Mean and standard deviation (n - 1) of each of `SPREAD` over the seeds that finished; None where unknown."""
+    finished = [row for row in rows if row["status"] == "finished"]
+    return {name: mean_sd([row[name] for row in finished]) for name in SPREAD}
+
+
+def seeds_table(record: dict[str, Any]) -> str:
+    """Markdown: one row a seed, and the mean ± SD over those that finished."""
+    lines = [["seed", "status", "steps", "seconds", "best return", "falls", "after steps"], ["---"] * 7]
+    for row in record["seeds"]:
+        falls = MISSING if row["falls"] is None else f"{row['falls']} of {row['episodes']}"
+        steps, seconds, best, after = (
+            MISSING if row[name] is None else format(row[name], pattern)
+            for name, pattern in (
+                ("timesteps", ",d"),
+                ("seconds", ".0f"),
+                ("return_mean", ".1f"),
+                ("best_timesteps", ",d"),
+            )
+        )
+        lines.append([str(row["seed"]), row["status"], steps, seconds, best, falls, after])
+    seconds, best, falls, after = (_plus_minus(record["spread"][name]) for name in SPREAD)
+    lines.append(["mean ± SD", "", "", seconds, best, falls, after])
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+def _plus_minus(value: dict[str, float | None]) -> str:
+    mean, sd = (MISSING if number is None else f"{number:,.1f}" for number in (value["mean"], value["sd"]))
+    return f"{mean} ± {sd}"
+
+
+class _Trainings:
+    """Training processes, and the signals that end them; a context manager."""
+
+    def __init__(self) -> None:
+        self.stopping = False
+        self._lock = threading.RLock()  # a second signal may interrupt the passing on of the first
+        self._running: list[subprocess.Popen[str]] = []
+        self._before: dict[int, Any] = {}
+
+    def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
+        """Trains in a process of its own, whose messages appear here with `name` before them; a row of the report."""
+        config = replace(config, threads=1)
+        command = [sys.executable, "-m", __name__, str(folder), json.dumps(config_to_json(config))]
+        _block(True)  # also in the process, until it has its imports behind it; this thread waits only
+        with self._lock:
+            if self.stopping:
+                return _row(config, folder, "not begun")
+            # A session of its own: Ctrl-C in a terminal reaches this process alone, which passes it on once.
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+                env=os.environ | {"OMP_NUM_THREADS": "1"},
+            )
+            self._running.append(process)
+        with process:
+            assert process.stderr is not None
+            for line in process.stderr:
+                print(f"{name}: {line}", end="", file=sys.stderr, flush=True)
+        with self._lock:
+            self._running.remove(process)
+        return _row(config, folder, "interrupted" if self.stopping else "failed")
+
+    def _stop(self, number: int, _frame: Any) -> None:
+        with self._lock:
+            self.stopping = True
+            for process in self._running:
+                process.send_signal(number)
+
+    def __enter__(self) -> "_Trainings":
+        """Takes SIGINT and SIGTERM; in another than the main thread nobody can."""
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                self._before[number] = signal.signal(number, self._stop)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Gives the signals back; ends what still runs, which only an error leaves."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        for process in self._running:
+            process.terminate()
+
+
+def _block(blocked: bool) -> None:
+    """Lets SIGINT and SIGTERM wait, or come again, in this thread and in processes begun by it."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, SIGNALS)
+
+
+def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
+    """What a seed came to, from its run.json; `without` is its status if it left none that is complete."""
+    row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
+    record = json.loads((folder / RUN).read_text(encoding="utf-8")) if (folder / RUN).is_file() else {}
+    best = record.get("best") or {}
+    if record.get("status", "running") != "running":
+        row["status"] = record["status"]
+    return row | {
+        "timesteps": record.get("timesteps"),
+        "seconds": record.get("seconds"),
+        "return_mean": best.get("return_mean"),
+        "falls": best.get("falls"),
+        "episodes": best.get("episodes"),
+        "best_timesteps": best.get("timesteps"),
+    }
+
+
+def _main() -> int:
+    """One seed, in a process of its own: a folder, and a configuration as JSON text."""
+    folder, config = sys.argv[1:]
+    return exit_code("train.py", lambda: _train(config_from_json(json.loads(config)), folder))
+
+
+def _train(config: TrainingConfig, folder: str) -> int:
+    _block(False)  # a signal that waited strikes here, where `exit_code` catches it
+    return 130 if train(config, folder)["status"] == "interrupted" else 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())

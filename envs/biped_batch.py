@@ -1,0 +1,316 @@
+"""The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
+
+One step is 20 ms, or what `decisions` says: the action sets the stiffness, which holds for its control windows of 10
+ms; in each, the springs' equilibrium and the hips and knees follow the phase. Row i of everything depends on
+environment i alone, by the same operations for any N, so a batch of N gives the same bits as N batches of one.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.errors import SpringfootError
+
+from .control.decisions import Decisions
+from .control.equilibrium import foot_curves
+from .control.foot_springs import FootSprings, draw_delay
+from .control.leg_constants import LegConstants, SlopeConstants, slope_constants
+from .control.leg_controller import Legs, slope_table
+from .control.reference_walk import rows, walks_of
+from .control.standing import Standing, off_phase
+from .control.subjects import Subjects
+from .physics.foot_contact import CONTACTS
+from .physics.kernel import kernel
+from .physics.measurement import Measurement
+from .physics.model import ACTIONS, JOINTS, SIDES, passive_damping
+from .physics.simulation import Simulation
+from .settings import BipedSettings
+from .step_result import StepResult, Tick, report
+from .task.ground import Ground
+from .task.initial_state import place, random_phase, start_table, walking_posture
+from .task.observation import SensorNoise
+from .task.pushes import Pushes
+from .task.reward import ALIVE, Task
+from .timing import CONTROL_WINDOW
+
+
+class Biped:
+    """N bodies in one task.
+
+    Args:
+        settings: the task.
+        num_envs: N.
+        num_threads: of the physics; any number gives the same bits.
+        legs: leg constants in place of the committed ones, one set or several told apart by `variant`.
+        variant: (N,) which of `legs` each body has.
+        rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], for each of `legs`.
+        model: as for `Simulation`.
+        slope: constants for slopes in place of the committed ones.
+    """
+
+    tick_dt = CONTROL_WINDOW
+    action_names = ACTIONS
+
+    def __init__(
+        self,
+        settings: BipedSettings,
+        num_envs: int,
+        num_threads: int = 1,
+        legs: Sequence[LegConstants] | None = None,
+        variant: NDArray | None = None,
+        rest: NDArray | None = None,
+        model: mujoco.MjModel | None = None,
+        slope: SlopeConstants | None = None,
+    ):
+        self.settings = settings
+        self.num_envs = num_envs
+        self.dt = settings.step_seconds
+        """Time of one step [s]."""
+        self.windows_per_step = round(self.dt / CONTROL_WINDOW)
+        """Control windows in one step."""
+        self.on_tick: Callable[[Tick], None] | None = None
+        self.walks = walks_of(settings, legs)
+        own = next(walk for walk in self.walks if walk.speed == settings.speed)
+        self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
+        table = list(rows(self.walks))
+        speeds = np.array([walk.speed for walk in self.walks])
+        self.subjects = Subjects(settings, speeds, num_envs, variant)
+        incline = slope_table(slope or slope_constants())
+        self._legs = Legs(table, self.subjects, incline)
+        curves = [foot_curves(settings, c, w) for c, w in table]
+        planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
+        rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
+        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, incline)
+        self._decisions = Decisions(settings, self.human, num_envs)
+        self._start = start_table(table)
+        starts_or_stops = settings.start == "standing" or settings.stop_at is not None
+        self._standing = Standing(settings, self.subjects) if starts_or_stops else None
+        self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
+
+        self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
+        self._ground = Ground(settings, self._simulation, self.subjects)
+        self._noise = SensorNoise(settings.sensor_noise, num_envs)
+        self._task = Task(settings, table, self.subjects)
+        self.observation_names = self._task.names
+        self.observation_low, self.observation_high = self._task.low, self._task.high
+
+        self._random: list[np.random.Generator | None] = [None] * num_envs
+        self._everyone = np.ones(num_envs, bool)
+        self._no_reason = np.full(num_envs, "", object)
+        self._no_reason.flags.writeable = False
+        self._steps = np.zeros(num_envs, int)
+        self._last_action = np.zeros((num_envs, len(ACTIONS)))
+        self._window_forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
+        self._force = np.zeros(self._window_forces.shape[1:])
+        self._pushes = Pushes(settings, self.subjects)
+        self._now = self._simulation.measure()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model of the settings' body."""
+        return self._simulation.model
+
+    def model_of(self, index: int) -> mujoco.MjModel:
+        """The compiled model of environment `index`'s body."""
+        return self._simulation.models[index]
+
+    @property
+    def measurement(self) -> Measurement:
+        """What is known of the bodies at present."""
+        return self._now
+
+    def data(self, index: int) -> mujoco.MjData:
+        """A copy of environment `index`'s state, to render or to inspect."""
+        return self._simulation.data(index)
+
+    def scheduled_stiffness(self) -> NDArray:
+        """(N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
+        return self._springs.scheduled(self._legs.phase)
+
+    def command(self, ids: NDArray, speed: NDArray) -> None:
+        """Have environments `ids` (K,) go to `speed` (K,) [m/s], at the settings' `speed_rate`."""
+        self.subjects.command(ids, speed)
+
+    def reset(
+        self,
+        ids: NDArray,
+        seeds: Sequence[int | np.random.Generator | None],
+        start: float | str | None = None,
+        given: Mapping[str, NDArray] | None = None,
+    ) -> None:
+        """Start environments `ids` anew, at people's posture in single support or standing.
+
+        Args:
+            ids: (K,) which.
+            seeds: K seeds, or generators to draw from; None goes on with the environment's own.
+            start: stride phase of the left leg [0, 1), "random" or "standing", in place of the setting.
+            given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of what is set or drawn.
+        """
+        if len(ids) == 0:
+            return
+        start = self.settings.start if start is None else start
+        if start == "standing" != self.settings.start:
+            raise SpringfootError(
+                f"a reset can start 'standing' where the setting start is 'standing' too, got {self.settings.start!r}"
+            )
+        phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
+        randoms: list[np.random.Generator] = []
+        for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
+            random = self._random[index]
+            if seed is not None or random is None:
+                random = self._random[index] = np.random.default_rng(seed)
+            drawn = random_phase(random)
+            phase[row] = drawn if start == "random" else off_phase(drawn) if start == "standing" else start
+            if self.settings.start_noise:
+                noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
+            self._pushes.reset(index, random)
+            randoms.append(random)
+        self._fit(self.subjects.reset(ids, randoms, given))
+        self._legs.reset(ids, phase)
+        self._ground.reset(ids, randoms, self._legs.phase)
+        self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
+        self._noise.draw(ids, randoms)
+        self._decisions.reset(ids)
+        self._steps[ids] = 0
+        self._last_action[ids] = 0.0
+        self._force[ids] = 0.0
+        posture = walking_posture(self._start, self.subjects, ids, phase)
+        if self._standing is not None:
+            posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing") or posture
+        place(self._simulation, self.subjects, ids, posture, noise)
+        self._now = self._simulation.measure()
+
+    def _fit(self, ids: list[int]) -> None:
+        """Give environments `ids` the subjects' bodies, and all of them their speeds."""
+        if ids:
+            bodies = [self.subjects.bodies[index] for index in ids]
+            self._simulation.fit(ids, bodies)
+            self._task.fit(ids)
+            self._passive_damping[ids, 0] = [passive_damping(body) for body in bodies]
+        self._legs.follow()
+
+    def observe(self) -> NDArray:
+        """(N, D) float32 observation of the present."""
+        return self._noise.on(self._task.observe(self._now, self._legs.phase, self._last_action, self._force))
+
+    def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
+        """Apply actions (N, 4) for a step; environments not in the mask `active` (N,) stand still, reward 0."""
+        running, ids = self._everyone, None
+        if active is not None and not active.all():
+            running, ids = active, np.flatnonzero(active)
+        springs, phase = self._springs, self._legs.phase
+        action = self._decode(actions, running)
+        walking, scheduled = running, None
+        if self._standing is not None:
+            walking, scheduled = self._standing.switch(self._now, phase, self._steps * self.dt, running)
+        if self.subjects.advance(self._steps, self._random, walking):
+            self._legs.follow()
+        springs.set_stiffness(action, phase, self._now.angle, walking, scheduled)
+        if self.settings.push_newton:
+            self._simulation.push(self._pushes.force(self._steps, self._random, running))
+        rests = phase.copy() if self.settings.equilibrium == "phase" else phase  # a segment's rest goes with its K
+        for window in range(self.windows_per_step):
+            self._window(running, walking, ids, rests)
+            self._window_forces[window] = self._now.force
+        curves = self._task.at(phase)
+        terms = self._task.terms(
+            self._now, phase, action, self._last_action, springs.stiffness, self._window_forces, curves
+        )
+        reward = self._task.reward(terms)
+        terminated, truncated, termination = self._end(running, terms, reward)
+        self._last_action = action
+        if self.settings.sensor_noise:
+            seen = np.flatnonzero(running)
+            self._noise.draw(seen, [self._random[index] for index in seen])
+        return StepResult(
+            observation=self._noise.on(self._task.observe(self._now, phase, action, self._force, curves)),
+            reward=reward,
+            terminated=terminated,
+            truncated=truncated,
+            values=report(springs, self._now, terms, phase, self._steps, self.dt),
+            termination=termination,
+        )
+
+    def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Count the step and average its forces; which episodes it terminates, truncates, and why the former.
+
+        Who did not take it gets no reward.
+        """
+        terminated, truncated = np.empty(self.num_envs, bool), np.empty(self.num_envs, bool)
+        limit = self.settings.episode_seconds / self.dt - 0.5  # times are sums of steps
+        state = terms, self._window_forces, self._steps, self._force, reward
+        falls = _end(limit, running, *state, terminated, truncated)
+        return terminated, truncated, self._reasons(terminated) if falls else self._no_reason
+
+    def _reasons(self, terminated: NDArray) -> NDArray:
+        """Why those `terminated` (N,) are, "" for the others."""
+        reasons = np.where(terminated, self._task.fallen(self._now), "").astype(object)
+        for index in np.flatnonzero(terminated & (self._now.diverged >= 0)):
+            warning = mujoco.mjtWarning(int(self._now.diverged[index]))
+            reasons[index] = f"diverged: {warning.name.removeprefix('mjWARN_')}"
+        return reasons
+
+    def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
+        """The actions that take effect, in [-1, 1]; who is not `running` keeps the last one."""
+        action = np.array(actions, float, order="C")
+        if action.shape != (self.num_envs, len(ACTIONS)):
+            raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
+        if not self._decisions.take(action, self._last_action, self._legs.phase, running):
+            raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
+        return action
+
+    def _window(self, running: NDArray, walking: NDArray, ids: NDArray | None, rests: NDArray) -> None:
+        """One control window, the foot's springs of those `walking` (N,) resting as at the phases `rests` (N, side)."""
+        legs, m, control = self._legs, self._now, self._simulation.control
+        phase = None if self.on_tick is None else legs.phase.copy()
+        self._springs.move_equilibrium(rests, m.angle, control, walking)
+        legs.command(m, control)
+        if self._standing is not None:
+            standing = running & ~walking
+            self._standing.command(m, standing, control)
+            self._springs.hold(control, m.angle, standing)
+        self._now = self._simulation.advance(ids)
+        legs.advance(self._now, walking)
+        self._ground.advance(self._now, legs.phase, self._random)
+        if self.on_tick is not None and phase is not None:
+            self.on_tick(self._tick(phase, running))
+
+    def _tick(self, phase: NDArray, running: NDArray) -> Tick:
+        m, (stiffness, drive) = self._now, np.moveaxis(self._simulation.control, -1, 0)
+        return Tick(
+            measurement=m,
+            phase=phase,
+            stiffness=stiffness.copy(),
+            equilibrium=drive / stiffness,
+            passive_torque=-self._passive_damping * m.velocity,
+            com_reference=self._task.planned_com(m, self._legs.phase),
+            active=running.copy(),
+        )
+
+
+@kernel
+def _end(limit, running, terms, windows, steps, force, reward, terminated, truncated):
+    falls = 0
+    for i in range(len(running)):
+        terminated[i] = running[i] and terms[i, ALIVE] == 0.0
+        falls += terminated[i]
+        truncated[i] = running[i] and not terminated[i] and steps[i] + 1 >= limit
+        if running[i]:
+            steps[i] += 1
+            _average(windows[:, i], force[i])
+        else:
+            reward[i] = 0.0
+    return falls
+
+
+@kernel
+def _average(windows, force):
+    for side in range(2):
+        for contact in range(3):
+            for axis in range(2):
+                total = 0.0
+                for window in range(len(windows)):
+                    total += windows[window, side, contact, axis]
+                force[side, contact, axis] = total / len(windows)

@@ -1,0 +1,81 @@
+"""Where the ankle and toe springs rest, and how stiff they are when nobody decides: curves over the stride."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+from springfoot.gait.human import HumanGait
+from springfoot.gait.stiffness import StiffnessSchedule
+
+from ..physics.model import ANKLE, damping_times
+from ..settings import BipedSettings
+from .leg_constants import LegConstants
+from .leg_controller import knot_curve
+from .phase_table import GRID
+from .reference_walk import Walk
+
+PLATEAUS = (0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95)
+"""Start and end of loading, early stance, late stance, push-off, swing; stiffness is linear between these plateaus."""
+REFERENCE_STIFFNESS = (75.0, 150.0, 450.0, 200.0, 30.0)
+"""K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase (Fukuchi et al. 2018
+data, overground 1.1-1.3 m/s, rounded); in swing a powered prosthesis's (Sup et al. 2009, Table III)."""
+FOOT_FLAT, TOE_OFF = (0.06, 0.12), (0.62, 0.70)
+"""Phases over which the planned toe goes flat, and over which it returns to its swing posture."""
+TOE_SWING_DEG = 10.0
+"""Toe posture of people in swing, 8-12 deg up (`human_gait(...).mean("toe", ...)`)."""
+
+
+def plateau_curve(values: tuple[float, ...]) -> NDArray:
+    """Five plateau values on `GRID`, linear between the plateaus and periodic."""
+    return np.interp(GRID, PLATEAUS, np.repeat(values, 2), period=1.0)
+
+
+def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Walk) -> tuple[NDArray, NDArray]:
+    """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
+    if settings.schedule is None:
+        stiffness, rest = fixed_stiffness(constants, walk.body), neutral(constants)
+    else:
+        stiffness, rest = StiffnessSchedule.from_json(settings.schedule).at(GRID)
+    match settings.equilibrium:
+        case "planned":
+            rest = planned(constants, walk)
+        case "angle":
+            rest = angle(walk.human)
+        case "neutral":
+            rest = neutral(constants)
+    return rest, stiffness
+
+
+def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
+    """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the schedule that was tuned with the legs."""
+    toe = np.full(len(GRID), constants.toe_schedule)
+    return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.stiffness_scale
+
+
+def planned(constants: LegConstants, walk: Walk) -> NDArray:
+    """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds a moment forward through K_ref.
+
+    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots: on the plan, K = K_ref gives a times the walk's moment M
+    (plantarflexion positive). The toe rests at the tuned angle from foot flat to toe-off and 10 deg up otherwise.
+    """
+    body, human = walk.body, walk.human
+    beta, period = damping_times(body)[ANKLE], constants.period_factor * walk.plan.stride_time
+    quasi = plateau_curve(REFERENCE_STIFFNESS) * body.stiffness_scale
+    lead = beta * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
+    ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
+    return np.stack([ankle, _toe(constants.toe_flat_deg)], axis=-1)
+
+
+def angle(human: HumanGait) -> NDArray:
+    """(SAMPLES, 2) equilibrium [rad]: people's ankle angle alone, and the planned toe."""
+    return np.stack([human.mean("ankle", GRID), _toe(0.0)], axis=-1)
+
+
+def neutral(constants: LegConstants) -> NDArray:
+    """(SAMPLES, 2) equilibrium [rad]: constant."""
+    return np.tile(np.deg2rad(constants.neutral_deg), (len(GRID), 1))
+
+
+def _toe(flat_deg: float) -> NDArray:
+    corners = [*FOOT_FLAT, *TOE_OFF]
+    return np.deg2rad(np.interp(GRID, corners, [TOE_SWING_DEG, flat_deg, flat_deg, TOE_SWING_DEG]))

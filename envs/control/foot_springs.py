@@ -1,0 +1,240 @@
+"""Actions to stiffness to control, for the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
+
+Axes: (N, side, 2), the last one ankle and toe; an action's four numbers are these rows in the order of `ACTIONS`.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from springfoot.gait.body import Body
+
+from ..physics.kernel import kernel
+from ..physics.model import ANKLE
+from ..settings import LONGEST_DELAY, BipedSettings
+from ..timing import CONTROL_WINDOW
+from .phase_table import PhaseTable
+from .subjects import Subjects
+
+FEET = slice(ANKLE, None)
+"""Ankle and toe along the joint axis: the joints whose stiffness is the action."""
+
+
+def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
+    """Lowest and highest (ankle, toe) stiffness of this body [N m/rad]."""
+    low, high = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
+    return low * body.stiffness_scale, high * body.stiffness_scale
+
+
+def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
+    """Absolute mode: actions in [-1, 1], (..., 2) for ankle and toe, on a log scale to N m/rad."""
+    middle, factor = _log_scale(settings, body)
+    return middle * factor**action
+
+
+def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
+    """Stiffness at action 0 [N m/rad], and by what one action more multiplies it."""
+    low, high = stiffness_ranges(settings, body)
+    return np.sqrt(low * high), np.sqrt(high / low)
+
+
+def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDArray:
+    """The action in [-1, 1] that gives a stiffness [N m/rad], (..., 2); beyond the range, the nearer end."""
+    low, high = stiffness_ranges(settings, body)
+    value = np.clip(np.asarray(stiffness, float), low, high)
+    return 2.0 * np.log(value / low) / np.log(high / low) - 1.0
+
+
+def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
+    """Control windows between a commanded stiffness and its action in one episode, drawn if the settings say so."""
+    if settings.stiffness_delay_range_s is None:
+        return round(settings.stiffness_delay_s / CONTROL_WINDOW)
+    shortest, longest = (round(delay / CONTROL_WINDOW) for delay in settings.stiffness_delay_range_s)
+    return int(random.integers(shortest, longest + 1))
+
+
+class FootSprings:
+    """The state of N bodies' ankle and toe springs, and the work done on them by changing them.
+
+    Args:
+        settings, body: ranges and action mode, for the body of the tables.
+        equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], a row of the subjects' tables each.
+        schedule: (R, SAMPLES, 2) stiffness [N m/rad] that a residual action multiplies.
+        subjects: bodies and speeds.
+        incline: what a slope adds (`envs.control.leg_controller.slope_table`).
+    """
+
+    def __init__(
+        self,
+        settings: BipedSettings,
+        body: Body,
+        equilibrium: NDArray,
+        schedule: NDArray,
+        subjects: Subjects,
+        incline: PhaseTable,
+    ):
+        num = len(subjects.place)
+        self._follows = settings.equilibrium in ("planned", "angle")  # a constant stays one on a slope too
+        self._residual = settings.action_mode == "residual"
+        self._fixed = [joint for joint, name in enumerate(("toe", "ankle")) if settings.stiffness_joints == name]
+        middle, self._factor = _log_scale(settings, body)
+        self._middle = np.tile(middle, (num, 2, 1))
+        self._subjects, self._incline = subjects, incline
+        self._equilibrium, self._schedule = PhaseTable(equilibrium), PhaseTable(schedule)
+        self.stiffness = np.zeros((num, 2, 2))
+        """(N, side, 2) K [N m/rad]; changed in place."""
+        self.equilibrium = np.zeros((num, 2, 2))
+        """(N, side, 2) rest angle [rad]; changed in place."""
+        self.work_stiffness = np.zeros((num, 2, 2))
+        """(N, side, 2) work put in by the last change of stiffness [J]; changed in place."""
+        self.work_equilibrium = np.zeros((num, 2, 2))
+        """(N, side, 2) work put in by moving the rest angle since then [J]; changed in place."""
+        self._fresh = np.ones(num, bool)
+        self._everyone = np.ones(num, bool)
+        self._delay = np.zeros(num, int)
+        self._commands = np.zeros(
+            (num, 1 + round(LONGEST_DELAY / CONTROL_WINDOW), 2, 2)
+        )  # in the last windows, newest first
+
+    def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
+        """The next change of springs `ids` (K,) costs no work and acts at once, as if commanded long before; later ones
+        act `delay` (K,) control windows after they were commanded."""
+        self._fresh[ids] = True
+        self._delay[ids] = delay
+
+    def scheduled(self, leg_phase: NDArray) -> NDArray:
+        """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
+        return self._schedule.at(leg_phase, self._subjects.place) * self._subjects.scale["torque"][:, None, None]
+
+    def set_stiffness(
+        self,
+        action: NDArray,
+        leg_phase: NDArray,
+        angle: NDArray,
+        running: NDArray | None = None,
+        scheduled: NDArray | None = None,
+    ) -> None:
+        """Command new stiffness by an action (N, 4), to act after the delay.
+
+        Changing K under a deflection x, that of joint angles (N, side, joint), puts 1/2 (K' - K) x^2 into the spring.
+        Without `running` (N,), all change; those `scheduled` (N,) take the fixed stiffness instead.
+        """
+        action = action.reshape(self.stiffness.shape)
+        if self._residual:
+            middle, factor = self._schedule.at(leg_phase, self._subjects.place), np.exp(action)
+        else:
+            middle, factor = self._middle, self._factor**action
+            if self._fixed:
+                middle = middle.copy()
+                middle[..., self._fixed] = self._schedule.at(leg_phase, self._subjects.place)[..., self._fixed]
+        if scheduled is not None:
+            who = scheduled[:, None, None]
+            middle = np.where(who, self._schedule.at(leg_phase, self._subjects.place), middle)
+            factor = np.where(who, 1.0, factor)
+        running = self._everyone if running is None else running
+        state = self._fresh, running, self._delay, self._commands, self.stiffness
+        works = self.work_stiffness, self.work_equilibrium
+        _stiffen(middle, factor, self._subjects.scale, angle, self.equilibrium, *state, *works)
+
+    def move_equilibrium(
+        self, leg_phase: NDArray, angle: NDArray, control: NDArray, running: NDArray | None = None
+    ) -> None:
+        """Let a control window begin: take the rest angles of the legs' phases, and the stiffness whose delay is over,
+        and put K and K theta_eq into `control` (N, side, joint, 2).
+
+        Moving the rest angle from deflection x to x' puts 1/2 K (x'^2 - x^2) into the spring.
+        """
+        equilibrium = self._equilibrium.at(leg_phase, self._subjects.place)
+        if self._follows and self._subjects.slope.any():
+            equilibrium[..., 0] += self._subjects.slope[:, None] * self._incline.at(leg_phase)[..., ANKLE]
+        running = self._everyone if running is None else running
+        state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
+        _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)
+
+    def hold(self, control: NDArray, angle: NDArray, who: NDArray) -> None:
+        """Take K and K theta_eq of those of `who` (N,) from `control` (N, side, joint, 2), where another has put them;
+        without delay; the work of both changes is counted as above."""
+        works = self.work_stiffness, self.work_equilibrium
+        _hold(control, angle, who, self._fresh, self._commands, self.stiffness, self.equilibrium, *works)
+
+
+@kernel
+def _stiffen(
+    middle,
+    factor,
+    scale,
+    angle,
+    equilibrium,
+    fresh,
+    running,
+    delay,
+    commands,
+    stiffness,
+    work_stiffness,
+    work_equilibrium,
+):
+    for i in range(len(stiffness)):
+        for side in range(2):
+            for joint in range(2):
+                work_stiffness[i, side, joint] = work_equilibrium[i, side, joint] = 0.0
+                if running[i]:
+                    before = stiffness[i, side, joint]
+                    after = middle[i, side, joint] * scale[i].torque * factor[i, side, joint]
+                    deflection = equilibrium[i, side, joint] - angle[i, side, ANKLE + joint]
+                    commands[i, 0, side, joint] = after
+                    if fresh[i]:
+                        commands[i, :, side, joint] = after
+                    if fresh[i] or delay[i] == 0:
+                        stiffness[i, side, joint] = after
+                    if not fresh[i] and delay[i] == 0:
+                        work_stiffness[i, side, joint] = 0.5 * (after - before) * deflection**2
+
+
+@kernel
+def _move(
+    wanted, angle, fresh, running, delay, commands, stiffness, equilibrium, work_stiffness, work_equilibrium, control
+):
+    for i in range(len(equilibrium)):
+        if running[i] and delay[i] > 0:
+            _arrive(delay[i], angle[i], equilibrium[i], commands[i], stiffness[i], work_stiffness[i])
+        for side in range(2):
+            for joint in range(2):
+                k, theta = stiffness[i, side, joint], angle[i, side, ANKLE + joint]
+                if running[i]:
+                    before, after = equilibrium[i, side, joint] - theta, wanted[i, side, joint] - theta
+                    equilibrium[i, side, joint] = wanted[i, side, joint]
+                    if not fresh[i]:
+                        work_equilibrium[i, side, joint] += 0.5 * k * (after * after - before * before)
+                control[i, side, ANKLE + joint, 0] = k
+                control[i, side, ANKLE + joint, 1] = k * equilibrium[i, side, joint]
+        fresh[i] = fresh[i] and not running[i]
+
+
+@kernel
+def _arrive(delay, angle, equilibrium, commands, stiffness, work):
+    """The command of `delay` windows ago acts; then a window passes."""
+    for side in range(2):
+        for joint in range(2):
+            before, after = stiffness[side, joint], commands[delay, side, joint]
+            deflection = equilibrium[side, joint] - angle[side, ANKLE + joint]
+            stiffness[side, joint] = after
+            work[side, joint] += 0.5 * (after - before) * deflection**2
+            for past in range(len(commands) - 1, 0, -1):
+                commands[past, side, joint] = commands[past - 1, side, joint]
+
+
+@kernel
+def _hold(control, angle, who, fresh, commands, stiffness, equilibrium, work_stiffness, work_equilibrium):
+    for i in range(len(who)):
+        if not who[i]:
+            continue
+        for side in range(2):
+            for joint in range(2):
+                k, drive = control[i, side, ANKLE + joint]
+                theta, before = angle[i, side, ANKLE + joint], stiffness[i, side, joint]
+                old, new = equilibrium[i, side, joint] - theta, drive / k - theta
+                stiffness[i, side, joint], equilibrium[i, side, joint] = k, drive / k
+                commands[i, :, side, joint] = k
+                if not fresh[i]:
+                    work_stiffness[i, side, joint] += 0.5 * (k - before) * old * old
+                    work_equilibrium[i, side, joint] += 0.5 * k * (new * new - old * old)
+        fresh[i] = False

@@ -1,0 +1,143 @@
+"""Tuned constants of the leg controller (`envs.control.leg_controller`): the committed sets, and what lies between them in speed."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from springfoot.gait.errors import SpringfootError
+
+TUNED_SPEED = 1.2
+"""Speed [m/s] at 1.70 m of the constants whose name tells none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegConstants:
+    """Tuned constants of the leg controller, for 1.70 m and 63 kg."""
+
+    hip_knots_deg: tuple[float, ...]
+    """Added to people's thigh angle at `envs.control.leg_controller.KNOTS` [deg]."""
+    knee_knots_deg: tuple[float, ...]
+    """Added to people's knee angle at `envs.control.leg_controller.KNOTS` [deg]."""
+    ankle_knots_deg: tuple[float, ...]
+    """Added to people's ankle angle at `envs.control.leg_controller.KNOTS` in the planned equilibrium [deg]."""
+    hip_stiffness: tuple[float, float]
+    """Stance, swing [N m/rad]."""
+    knee_stiffness: tuple[float, float]
+    """Stance, swing [N m/rad]."""
+    feedforward: tuple[float, float, float]
+    """Share of people's hip, knee, ankle moment that is fed forward."""
+    period_factor: float
+    """Period of the phase against the plan's stride time."""
+    period_speed_gain: float
+    """Phase rate rises by this share for each m/s too fast [s/m]."""
+    trunk_pitch_deg: float
+    """Held trunk pitch [deg]."""
+    trunk_stiffness: float
+    """Stance-hip torque for trunk pitch [N m/rad]."""
+    trunk_damping: float
+    """Stance-hip torque for trunk pitch rate [N m s/rad]."""
+    speed_torque: float
+    """Stance-hip torque for each m/s too fast [N s]."""
+    trunk_rise: float
+    """Phase over which the stance hip takes the trunk."""
+    swing_speed_gain: float
+    """Swing-hip target for each m/s too fast (foot placement) [rad s/m]."""
+    neutral_deg: tuple[float, float]
+    """Constant ankle and toe angle of `equilibrium="neutral"` [deg]."""
+    toe_flat_deg: float
+    """Angle at which the toe rests from foot flat to toe-off in the planned equilibrium: down, it presses [deg]."""
+    ankle_schedule: tuple[float, float, float, float, float]
+    """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
+    toe_schedule: float
+    """Fixed toe stiffness [N m/rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlopeConstants:
+    """What a slope adds to targets of the leg controller, as a part of its angle; the same for every body and speed.
+
+    Of a joint: constant, cosine and sine of the stride phase.
+    """
+
+    hip: tuple[float, float, float]
+    """To the hip's target."""
+    knee: tuple[float, float, float]
+    """To the knee's target."""
+    ankle: tuple[float, float, float]
+    """To the ankle's rest angle, where that follows the stride."""
+    trunk: float
+    """To the held trunk pitch."""
+
+
+def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people") -> str:
+    """Name of the committed constants for a setting; "angle" and "phase" share those of "planned"."""
+    name = "neutral" if equilibrium == "neutral" else "planned"
+    name = name if cadence == "people" else f"{name}, {cadence} cadence"
+    name = name if feedforward == "people" else f"{name}, {feedforward}'s moments"
+    return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
+
+
+def leg_constants(
+    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people"
+) -> LegConstants:
+    """The committed constants for a setting at `speed` [m/s at 1.70 m]; `SpringfootError` where none walk.
+
+    Linear between the speeds for which there are some, and those of the nearest beyond.
+    """
+    name, table = constants_name(equilibrium, cadence, feedforward=feedforward), _committed()
+    if name not in table:
+        raise SpringfootError(
+            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s "
+            "moments; equilibrium 'neutral' needs cadence 'people'"
+        )
+    prefix, unit = f"{name}, ", " m/s"
+    others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]
+    names = {TUNED_SPEED: name} | {float(other.removeprefix(prefix).removesuffix(unit)): other for other in others}
+    return constants_at({each: constants_from(table[found]) for each, found in names.items()}, speed)
+
+
+def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
+    """Constants at `speed` [m/s], linear between those of `sets` by speed, and the nearest beyond."""
+    speeds = sorted(sets)
+    place = float(np.interp(speed, speeds, np.arange(len(speeds))))
+    lower, weight = sets[speeds[int(place)]], place - int(place)
+    if weight == 0.0:
+        return lower
+    upper, values = sets[speeds[int(place) + 1]], {}
+    for field in fields(LegConstants):
+        low, high = (np.array(getattr(each, field.name), float) for each in (lower, upper))
+        values[field.name] = (low + weight * (high - low)).tolist()
+    return constants_from(values)
+
+
+def constants_from(values: dict[str, Any]) -> LegConstants:
+    """`LegConstants` from its JSON form (lists for tuples)."""
+    return LegConstants(**_tupled(values))
+
+
+def slope_constants() -> SlopeConstants:
+    """The committed constants for slopes."""
+    return slope_constants_from(_file()["slope"]["constants"])
+
+
+def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
+    """`SlopeConstants` from its JSON form (lists for tuples)."""
+    return SlopeConstants(**_tupled(values))
+
+
+def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+
+
+def _committed() -> dict[str, dict]:
+    return _file()["constants"]
+
+
+@cache
+def _file() -> dict[str, dict]:
+    return json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))

@@ -1,0 +1,128 @@
+"""What a body is asked to do at each speed: people, plan and leg constants, at a few speeds of one body.
+
+The body is the settings' own. Between two tabulated speeds everything is linear in speed, and since mechanics scale
+exactly (`envs.physics.model`), another body at a Froude-equal speed does the same in its own units (`envs.control.subjects`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+from math import ceil, floor, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+from springfoot.gait.human import HumanGait
+from springfoot.gait.kinetics import planned_moments
+from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
+
+from ..settings import BipedSettings, body_of, reference_gait
+from .leg_constants import LegConstants, leg_constants
+from .phase_table import GRID
+from .standing import SLOW_SPEED
+
+SPACING = 0.1
+"""Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
+the one planned for that speed, most of it where people's measured speeds meet."""
+
+
+FED = ("hip", "knee", "ankle")
+"""Joints to which a moment is fed forward."""
+PLAN_HARMONICS = 8
+"""Fourier terms of the plan's moments that are fed forward: its stiff contacts make them jump, people's do not."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Walk:
+    """One speed of the settings' body."""
+
+    body: Body
+    """The settings' body."""
+    speed: float
+    """[m/s]."""
+    human: HumanGait
+    """Whom it is held to."""
+    plan: WalkPlan
+    """Its CoM and the time of its strides."""
+    constants: tuple[LegConstants, ...]
+    """Leg constants: one set, or several variants."""
+    moments: NDArray
+    """(SAMPLES, 3) moments of hip, knee and ankle to feed forward [N m], extension and plantarflexion positive."""
+
+
+def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[Walk, ...]:
+    """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first.
+
+    `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
+    walk that cannot be planned.
+    """
+    return tuple(walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
+
+
+def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None) -> Walk:
+    """The walk of the settings' body at `speed` [m/s]."""
+    body = body_of(settings)
+    settings = replace(settings, speed=speed)
+    human = reference_gait(settings)
+    if settings.human is None:
+        plan = _plan(body, speed, settings.cadence)
+    else:
+        plan = plan_walk(body, speed, settings.cadence, human=human)
+    equal_speed = speed / sqrt(body.length_scale)
+    legs = legs or [leg_constants(settings.equilibrium, settings.cadence, equal_speed, settings.feedforward)]
+    return Walk(
+        body=body,
+        speed=speed,
+        human=human,
+        plan=plan,
+        constants=tuple(legs),
+        moments=_plans_moments(plan) if settings.feedforward == "plan" else _peoples_moments(human, body),
+    )
+
+
+def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
+    """(SAMPLES, 3) of `Walk.moments`, as measured."""
+    moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
+    return np.stack(moments, -1) * body.total_mass * body.length_scale
+
+
+def _plans_moments(plan: WalkPlan) -> NDArray:
+    """(SAMPLES, 3) of `Walk.moments`, by the plan's inverse dynamics; its steps where feet land and leave smoothed."""
+    by_joint = planned_moments(plan, GRID)
+    waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
+    waves[PLAN_HARMONICS + 1 :] = 0.0
+    return np.fft.irfft(waves, len(GRID), axis=0)
+
+
+def rows(walks: Sequence[Walk]) -> Iterator[tuple[LegConstants, Walk]]:
+    """The rows of a table over variants and speeds, in order: speeds within variants."""
+    for variant, walk in product(range(len(walks[0].constants)), walks):
+        yield walk.constants[variant], walk
+
+
+def tabulated_speeds(settings: BipedSettings) -> NDArray:
+    """(G,) ascending speeds [m/s] of the settings' body that are Froude-equal to all that the settings may ask for.
+
+    Without ranges it is the settings' speed alone; with them, the multiples of `SPACING` around and the settings'
+    speed among them.
+    """
+    height, speed = settings.height, settings.speed
+    lowest, highest = (sqrt(height / other) for other in reversed(settings.height_range or (height, height)))
+    slow, fast = settings.speed_range or (speed, speed)
+    slow, fast = min(slow * lowest, speed), max(fast * highest, speed)
+    unit = sqrt(body_of(settings).length_scale)
+    if settings.start == "standing" or settings.stop_at is not None:
+        slow = min(slow, SLOW_SPEED * unit)
+    if slow == fast:
+        return np.array([speed])
+    first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
+    grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # 1.2, and not 12 x 0.1
+    return np.array(sorted({*grid, speed}))
+
+
+@lru_cache(maxsize=256)
+def _plan(body: Body, speed: float, cadence: Cadence) -> WalkPlan:
+    """People's, kept: planning takes a tenth of a second."""
+    return plan_walk(body, speed, cadence)

@@ -1,0 +1,253 @@
+"""Standing, setting off and stopping: the springs that hold a body while it does not walk.
+
+Before a walk both feet stand side by side, every joint a stiff spring; the ankles' rest angle keeps the CoM at its
+place over the feet, the hips keep the trunk upright. To set off, that place moves ahead until the body falls forward at
+`OFF_SPEED`: then it walks, at first slowly. To stop, it is commanded down to `SLOW_SPEED`, and soon after the next
+touchdown the same springs hold it as it is, one foot ahead of the other. Ankle and toe stiffness are these springs' own
+while it stands, and those of the fixed schedule while it sets off and slows down: a policy acts in the steady walk
+between, which is what it has learnt. Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body
+(see `envs.physics.model`).
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from math import inf, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from springfoot.gait.body import Body
+
+from ..physics.kernel import kernel
+from ..physics.measurement import Measurement
+from ..physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES
+from ..settings import BipedSettings, body_of
+from ..timing import CONTROL_WINDOW
+from .subjects import Subjects
+
+STIFFNESS = (1200.0, 800.0, 350.0, 60.0)
+"""Of hip, knee, ankle and toe [N m/rad]: two ankles must outdo gravity, body weight x CoM height (600 N m/rad)."""
+BALANCE = 2.0
+"""Plantarflexion of the ankles' rest angle for each metre the CoM is ahead of its place [rad/m]."""
+TRUNK_STIFFNESS, TRUNK_DAMPING = 750.0, 140.0
+"""Torque of each hip for the trunk's pitch and its rate [N m/rad, N m s/rad]."""
+TRUNK_FREE = 0.8
+"""Share of the trunk's pitch that the hips' rest angle follows: 0 holds the thighs to the trunk, 1 to the vertical."""
+
+STAND_SECONDS = (0.8, 1.2)
+"""Time of standing before it sets off, drawn from this range [s]."""
+STAND_KNEE = (0.05, 0.12)
+"""Flexion of both knees meanwhile, drawn from this range [rad]."""
+STAND_COM = 0.04
+"""Place of the CoM ahead of the ankles [m]: people's, about the middle of the foot."""
+LEAN, LEAN_SECONDS = 0.30, 0.5
+"""How far the place moves ahead to set off [m], and within what time [s] (design study)."""
+OFF_SPEED, OFF_PHASE = 0.30, 0.16
+"""Forward speed of the CoM at which it walks [m/s], and the stride phase of the stance leg then."""
+OFF_SECONDS, EARLY_SECONDS = 1.0, 2.0
+"""From the start of the lean to the walk it takes no longer than the first [s]; its fixed stiffness lasts for at least
+the second, and until the commanded speed is reached [s]."""
+SLOW_SPEED = 0.9
+"""Commanded as it sets off, and reached before it stops [m/s]."""
+LANDED = (0.015, 0.06)
+"""Stride phases of the leg that landed in which a body stops, some 20 ms after touchdown (design study)."""
+STOP_COM, STOP_PITCH = -0.05, 0.05
+"""Stopped: place of the CoM ahead of mid-way between the ankles [m], trunk pitch [rad]."""
+STOP_KNEE = 0.12
+"""Stopped: how far both knees give way [rad], as on stiff legs the body would tip over its front foot."""
+HIP_HEIGHT, DRAW_SECONDS = 0.8, 0.5
+"""Stopped: height of the hips [m], and the time [s] in which they take over what pushes the feet apart: friction alone
+would let them creep."""
+
+WALKING, STANDING, STARTING, STOPPING, STOPPED = range(5)
+
+GAINS = np.dtype([("stiffness", float, len(JOINTS)), ("balance", float), ("trunk", float), ("trunk_damping", float)])
+HELD = np.dtype(
+    [
+        ("mode", np.int64),  # one of the five above
+        ("begin", float),  # time at which it leans, and then that at which it walks [s]
+        ("place", float),  # of the CoM ahead of mid-way between the ankles [m]
+        ("pitch", float),  # held by the trunk [rad]
+        ("draw", float),  # of the hips' rest angles, which brings the legs together [rad]
+        ("rest", float, (len(SIDES), len(JOINTS))),  # [rad], the hips' with an upright trunk
+        ("length", float),  # ratios to 1.70 m
+        ("time", float),
+        ("torque", float),  # mass x height, to those of 63 kg and 1.70 m
+    ]
+)
+"""How one body is held."""
+
+
+class Standing:
+    """Who of N bodies stands, and how.
+
+    Args:
+        settings: when they stop.
+        subjects: bodies and speeds, told the commanded speed of setting off and stopping.
+    """
+
+    def __init__(self, settings: BipedSettings, subjects: Subjects):
+        self._stop_at = inf if settings.stop_at is None else settings.stop_at
+        self._subjects = subjects
+        self._held = np.zeros(len(subjects.place), HELD)
+        self._gains = np.array([(STIFFNESS, BALANCE, TRUNK_STIFFNESS, TRUNK_DAMPING)], GAINS)[0]
+
+    @property
+    def mode(self) -> NDArray:
+        """(N,) `WALKING` steadily, `STANDING` before that, `STARTING` or `STOPPING` (walking both), or `STOPPED`."""
+        return self._held["mode"]
+
+    def reset(
+        self, ids: NDArray, randoms: Sequence[np.random.Generator], slope: NDArray, standing: bool
+    ) -> tuple[NDArray, NDArray, NDArray, NDArray] | None:
+        """Let `ids` (K,) stand, or else walk; the posture to stand in (`envs.task.initial_state.place`), None to walk.
+
+        `slope` (K,) of the ground [rad], uphill positive.
+        """
+        held = self._held
+        held["mode"][ids] = STANDING if standing else WALKING
+        for index, random in zip(ids.tolist(), randoms, strict=True):
+            body = self._subjects.bodies[index]
+            held[["length", "time", "torque"]][index] = body.length_scale, sqrt(body.length_scale), body.stiffness_scale
+            if standing:
+                held["begin"][index] = random.uniform(*STAND_SECONDS)
+                held["rest"][index] = standing_posture(body, random.uniform(*STAND_KNEE))
+            held["pitch"][index] = body.trunk_lean
+        held["draw"][ids] = 0.0
+        held["place"][ids] = STAND_COM * held["length"][ids]
+        if not standing:
+            return None
+        held["rest"][ids, :, ANKLE] += slope[:, None]
+        angle, pitch = held["rest"][ids], held["pitch"][ids]
+        held["rest"][ids, :, HIP] += (1.0 - TRUNK_FREE) * pitch[:, None]
+        return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
+
+    def switch(self, m: Measurement, leg_phase: NDArray, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
+        """Before a step at `time` (N,) [s], let those `running` (N,) set off or stop whose moment it is.
+
+        Returns who of them walks (N,), and who of these on the fixed schedule (N,).
+        """
+        mode, before, subjects = self._held["mode"], self._held["mode"].copy(), self._subjects
+        state = m.com_velocity, subjects.speed, subjects.target, leg_phase
+        if _switch(running, time, self._stop_at, *state, self._held):
+            self._told(before, m)
+        scheduled = running & ((mode == STARTING) | (mode == STOPPING))
+        return scheduled | (running & (mode == WALKING)), scheduled
+
+    def _told(self, before: NDArray, m: Measurement) -> None:
+        held, subjects = self._held, self._subjects
+        new = [np.flatnonzero((before != held["mode"]) & (held["mode"] == mode)) for mode in range(5)]
+        for ids, tell in ((new[STARTING], subjects.begin), (new[STOPPING], subjects.end)):
+            tell(ids, np.minimum(subjects.speed[ids], SLOW_SPEED * held["time"][ids]))
+        ids = new[STOPPED]
+        held["rest"][ids] = m.angle[ids]
+        held["rest"][ids, :, HIP] -= TRUNK_FREE * m.base[ids, 2, None]
+        held["draw"][ids] = 0.0
+        held["rest"][ids, :, KNEE] += STOP_KNEE
+        held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]
+        held["place"][ids] = STOP_COM * held["length"][ids]
+
+    def command(self, m: Measurement, who: NDArray, control: NDArray) -> None:
+        """Put stiffness [N m/rad] and drive torque [N m] of those of `who` (N,) into `control` (N, side, joint, 2)."""
+        _draw(self._gains, who, m.ankle, m.force, self._held)
+        _command(self._gains, who, m.base, m.base_velocity, m.com, m.ankle, self._held, control)
+
+
+def steady_walk(settings: BipedSettings) -> tuple[float, float]:
+    """Times [s] between which a body walks at the settings' speed, neither setting off nor stopping."""
+    begin, end = 0.0, inf if settings.stop_at is None else settings.stop_at
+    if settings.start == "standing":
+        time_scale = sqrt(body_of(settings).length_scale)
+        faster = max(settings.speed - SLOW_SPEED * time_scale, 0.0)
+        begin = (
+            STAND_SECONDS[1] + OFF_SECONDS * time_scale + max(EARLY_SECONDS * time_scale, faster / settings.speed_rate)
+        )
+    return begin, end
+
+
+def off_phase(drawn: float) -> float:
+    """Stride phase of the left leg to set off with, the leg in stance being that of a `drawn` phase."""
+    return OFF_PHASE + (0.0 if drawn < 0.5 else 0.5)
+
+
+@lru_cache(maxsize=1024)
+def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
+    """Thigh (to the vertical), knee, ankle and toe angle [rad], feet flat and the CoM `STAND_COM` ahead of the ankles.
+
+    `knee` [rad]: its flexion.
+    """
+
+    def com(shank: float) -> float:
+        """Ahead of the ankles [m], the shank's front turned up by `shank`."""
+        knee_x = -body.shank_length * sin(shank)
+        hip_x = knee_x - body.thigh_length * sin(shank + knee)
+        moment = (body.trunk_mass + body.carried_mass) * hip_x  # trunk and load balance over the hip
+        moment += 2 * body.thigh_mass * (hip_x + body.thigh_com * sin(shank + knee))
+        moment += 2 * body.shank_mass * (knee_x + body.shank_com * sin(shank))
+        moment += 2 * body.foot_mass * body.foot_com[0] + 2 * body.toe_mass * (body.ankle_to_toe_joint + body.toe_com)
+        return moment / body.total_mass - STAND_COM * body.length_scale
+
+    shank = float(brentq(com, -0.5, 0.5))  # type: ignore[arg-type]
+    return shank + knee, knee, -shank, 0.0
+
+
+@kernel
+def _switch(running, time, stop_at, com_velocity, speed, target, leg_phase, held):
+    """Whether any mode changed; also moves the CoM's place of those about to set off."""
+    changed = False
+    for i in range(len(held)):
+        body = held[i]
+        if not running[i]:
+            continue
+        before, slow = body.mode, SLOW_SPEED * body.time
+        if before == STANDING and time[i] >= body.begin:
+            share = min((time[i] - body.begin) / (LEAN_SECONDS * body.time), 1.0)
+            body.place = body.length * (STAND_COM + LEAN * share)
+            if com_velocity[i, 0] > OFF_SPEED * body.time:
+                body.mode, body.begin = STARTING, time[i]
+        elif before == STARTING and time[i] >= body.begin + EARLY_SECONDS * body.time and speed[i] == target[i]:
+            body.mode = WALKING
+        elif before in (WALKING, STARTING) and time[i] >= stop_at:
+            body.mode = STOPPING
+        elif before == STOPPING and speed[i] <= slow * (1.0 + 1e-9):
+            for side in range(2):
+                if LANDED[0] <= leg_phase[i, side] <= LANDED[1]:
+                    body.mode = STOPPED
+        changed = changed or body.mode != before
+    return changed
+
+
+@kernel
+def _command(gains, who, base, base_velocity, com, ankle, held, control):
+    for i in range(len(held)):
+        if not who[i]:
+            continue
+        body = held[i]
+        ahead = com[i, 0] - 0.5 * (ankle[i, 0, 0] + ankle[i, 1, 0]) - body.place
+        trunk = gains.trunk * (base[i, 2] - body.pitch) + gains.trunk_damping * body.time * base_velocity[i, 2]
+        for side in range(2):
+            front = 1.0 if ankle[i, side, 0] > ankle[i, 1 - side, 0] else -1.0
+            for joint in range(4):
+                k, rest = gains.stiffness[joint], body.rest[side, joint]
+                if joint == ANKLE:
+                    rest -= gains.balance * ahead / body.length
+                if joint == HIP:
+                    rest += TRUNK_FREE * base[i, 2] - trunk / k - front * body.draw
+                control[i, side, joint, 0] = k * body.torque
+                control[i, side, joint, 1] = k * body.torque * rest
+
+
+@kernel
+def _draw(gains, who, ankle, force, held):
+    """Moves the hips' rest angles for the torque that stands for the feet's push against each other."""
+    for i in range(len(held)):
+        body = held[i]
+        if not who[i] or body.mode != STOPPED:
+            continue
+        front = 0 if ankle[i, 0, 0] > ankle[i, 1, 0] else 1
+        push = 0.0
+        for contact in range(3):
+            push += 0.5 * (force[i, 1 - front, contact, 0] - force[i, front, contact, 0])
+        torque = push * HIP_HEIGHT * body.length
+        body.draw += CONTROL_WINDOW / (DRAW_SECONDS * body.time) * torque / (gains.stiffness[HIP] * body.torque)

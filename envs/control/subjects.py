@@ -1,0 +1,187 @@
+"""Who walks and how fast: the body and the commanded speed of each environment of a batch.
+
+Mechanics scale exactly (`envs.physics.model`). So curves are tabulated for one body, the settings' own, at a few speeds
+(`envs.control.reference_walk`), and each environment carries its ratios to that body and its place between two Froude-equal speeds.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import radians, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+from springfoot.gait.errors import SpringfootError
+
+from ..physics.kernel import kernel
+from ..settings import BipedSettings, body_of
+from .phase_table import PLACE
+
+SCALE = np.dtype([("length", float), ("time", float), ("mass", float), ("torque", float)])
+"""Ratios of a body to the settings' own: of height, its square root (of times and speeds), of mass, and mass x height
+(of torque and stiffness)."""
+DRAWN: tuple[str, ...] = ("height", "mass", "speed")
+"""What may be drawn for each environment: settings `<name>_range`, and options of a reset."""
+MOST_DRAWS = 1000
+"""Bodies drawn for one reset before it is given up: ranges of height and mass may hardly have one in common."""
+
+
+class Subjects:
+    """Bodies and commanded speeds of N environments; arrays are changed in place.
+
+    Args:
+        settings: whose body is the tables' own, and the ranges to draw from.
+        speeds: (G,) tabulated speeds [m/s], ascending (`envs.control.reference_walk.tabulated_speeds`).
+        num: N.
+        variant: (N,) which of several tables each environment reads.
+    """
+
+    def __init__(self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None):
+        self._settings = settings
+        self._home = body_of(settings)
+        self._speeds = speeds
+        self._first = np.zeros(num, int) if variant is None else np.asarray(variant, int) * len(speeds)
+        self.bodies = [self._home] * num
+        """Of each environment."""
+        self.speed = np.full(num, settings.speed)
+        """(N,) commanded now [m/s]."""
+        self.place = np.zeros(num, PLACE)
+        """(N,) where that is in tables of variants x speeds."""
+        self.scale = np.ones(num, SCALE)
+        """(N,) ratios of the bodies to the settings' own."""
+        self.slope = np.full(num, radians(settings.slope_deg))
+        """(N,) of the ground [rad], uphill positive (`envs.task.ground`)."""
+        self.target = self.speed.copy()
+        """(N,) which it goes to [m/s]."""
+        self._change = np.full(num, np.inf)  # time of the next speed drawn [s]
+        self._changing = False
+        self._everyone = np.arange(num)
+        self._locate(self._everyone)
+
+    def reset(
+        self, ids: NDArray, randoms: Sequence[np.random.Generator], given: Mapping[str, NDArray] | None = None
+    ) -> list[int]:
+        """Draw bodies and speeds of environments `ids` (K,) from their generators.
+
+        `given` holds (K,) values to be taken instead, by the names of `DRAWN`. Returns those whose body is another.
+        Raises `SpringfootError` for a body that cannot be or a speed beyond the tables, and changes nothing.
+        """
+        drawn = [
+            self._draw(random, {name: float(values[row]) for name, values in (given or {}).items()})
+            for row, random in enumerate(randoms)
+        ]
+        others = []
+        for index, random, (body, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
+            if body != self.bodies[index]:
+                others.append(index)
+                self.bodies[index] = body
+                length, mass = body.height / self._home.height, body.mass / self._home.mass
+                self.scale[index] = length, sqrt(length), mass, mass * length
+            self.speed[index] = self.target[index] = speed
+            self._change[index] = self._wait(0.0, random)
+        self._locate(ids)
+        return others
+
+    def command(self, ids: NDArray, speed: NDArray) -> None:
+        """From now on go to `speed` (K,) [m/s], at the settings' `speed_rate`."""
+        for index, value in zip(ids.tolist(), speed.tolist(), strict=True):
+            self._check(self.bodies[index], value)
+        self.target[ids] = speed
+        self._changing = True
+
+    def begin(self, ids: NDArray, speed: NDArray) -> None:
+        """Command `speed` (K,) [m/s] of environments `ids` (K,) now, from where they go on to their own."""
+        self.speed[ids] = speed
+        self._changing = True
+
+    def end(self, ids: NDArray, speed: NDArray) -> None:
+        """From now on go to `speed` (K,) [m/s], and to no other."""
+        self.target[ids], self._change[ids] = speed, np.inf
+        self._changing = True
+
+    def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
+        """Let a step pass for those `running` (N,), after `steps` (N,); whether any commanded speed changed."""
+        settings = self._settings
+        if settings.speed_interval is not None:
+            time = steps * settings.step_seconds
+            for index in np.flatnonzero(running & (time >= self._change)).tolist():
+                random = randoms[index]
+                if random is not None and settings.speed_range is not None:
+                    self.target[index] = random.uniform(*settings.speed_range)
+                    self._change[index] = self._wait(time[index], random)
+                    self._changing = True
+        if not self._changing:
+            return False
+        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self.target, self.speed)
+        self._locate(self._everyone)
+        return True
+
+    def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, float]:
+        """The speed first, then bodies until one can be."""
+        settings = self._settings
+        ranges = {name: getattr(settings, f"{name}_range") for name in DRAWN}
+        values = {name: getattr(settings, name) for name in DRAWN}
+        if ranges["speed"]:
+            values["speed"] = random.uniform(*ranges["speed"])
+        values |= given
+        for last in range(MOST_DRAWS, 0, -1):
+            drawn = {name: random.uniform(*ranges[name]) for name in ("height", "mass") if ranges[name]}
+            chosen = values | drawn | given
+            try:
+                body = replace(self._home, height=chosen["height"], mass=chosen["mass"])
+                break
+            except SpringfootError:
+                if last == 1 or not drawn.keys() - given.keys():
+                    raise
+        self._check(body, values["speed"])
+        return body, values["speed"]
+
+    def _wait(self, time: float, random: np.random.Generator) -> float:
+        """When the next speed is drawn after `time` [s]."""
+        interval = self._settings.speed_interval
+        return np.inf if interval is None else time + interval * random.uniform(0.5, 1.5)
+
+    def _check(self, body: Body, speed: float) -> None:
+        time_scale = sqrt(body.height / self._home.height)
+        low, high = self._speeds[0] * time_scale, self._speeds[-1] * time_scale
+        if not low - 1e-9 <= speed <= high + 1e-9:
+            raise SpringfootError(
+                f"speed of a body of {body.height:.4g} m must be in [{low:.4g}, {high:.4g}] m/s, got {speed:.4g}; "
+                "speed_range and height_range set what is prepared for"
+            )
+
+    def _locate(self, ids: NDArray) -> None:
+        _locate(ids, self.speed, self.scale, self._speeds, self._first, self.place)
+
+
+@kernel
+def _approach(most, running, target, speed):
+    """Take a step of at most `most` towards the targets; whether there is still a way to go."""
+    under_way = False
+    for i in range(len(speed)):
+        way = target[i] - speed[i]
+        if running[i]:
+            if abs(way) <= most:
+                speed[i] = target[i]
+            else:
+                speed[i] += most if way > 0.0 else -most
+        under_way = under_way or speed[i] != target[i]
+    return under_way
+
+
+@kernel
+def _locate(ids, speed, scale, speeds, first, place):
+    """Places of environments `ids` between the speeds that are Froude-equal to theirs."""
+    last = len(speeds) - 1
+    for i in ids:
+        equal = speed[i] / scale[i].time
+        lower = 0
+        while lower < last - 1 and equal >= speeds[lower + 1]:
+            lower += 1
+        weight = 0.0
+        if last > 0:
+            weight = min(max((equal - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
+        if weight == 1.0:
+            lower, weight = lower + 1, 0.0
+        place[i].row, place[i].weight = first[i] + lower, weight

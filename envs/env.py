@@ -1,0 +1,274 @@
+"""The Gymnasium `Env`: the core with one body. `springfoot.envs.vector_env` is the core with N, and gives the same bits."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+
+from springfoot.gait.errors import SpringfootError
+
+from .biped_batch import Biped
+from .control.subjects import DRAWN
+from .physics.rendering import RENDER_MODES, Camera
+from .settings import check_start, settings_from
+from .step_result import INFO
+from .timing import ACTION_STEP
+
+METADATA: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": round(1 / ACTION_STEP)}
+
+
+class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
+    """A planar body with segmented feet that walks by the stiffness of its ankles and toes.
+
+    ## Description
+    Trunk, thighs, shanks, feet and toes of a person of given height and mass. Hips and knees follow a phase controller
+    with human-like curves; ankles and toes are springs, torque = K (equilibrium - angle - beta x angular rate). The
+    policy sets K and nothing else, 50 times a second (see `decisions`). The equilibrium follows the plan (see
+    `equilibrium`).
+
+    ## Action space
+    `Box(-1, 1, (4,), float32)`, from -1 to 1 on a log scale over the stiffness range (`action_mode="absolute"`) or as
+    K = K_schedule exp(action) (`"residual"`). What lies outside is clipped; NaN is refused.
+
+    | Num | Action      | Stiffness at -1 | Stiffness at +1 | Unit     |
+    | --- | ----------- | --------------- | --------------- | -------- |
+    | 0   | ankle_left  | 20              | 800             | N m/rad  |
+    | 1   | toe_left    | 5               | 200             | N m/rad  |
+    | 2   | ankle_right | 20              | 800             | N m/rad  |
+    | 3   | toe_right   | 5               | 200             | N m/rad  |
+
+    The stiffnesses are those of 1.70 m and 63 kg; they scale with mass x height.
+
+    ## Observation space
+    `Box(Min, Max, (43,), float32)`, dimensionless: each value is divided by its unit and clipped to its bounds. l is
+    the leg length (hip to floor when standing, 0.53 of height), g gravity.
+
+    | Num | Observation             | Divided by  | Min  | Max | Meaning                                   |
+    | --- | ----------------------- | ----------- | ---- | --- | ----------------------------------------- |
+    | 0   | hip_height              | leg length  | 0    | 2   | height of the hip                         |
+    | 1   | pitch                   | rad         | -3.2 | 3.2 | pitch of the trunk, forward positive      |
+    | 2   | hip_left                | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 3   | knee_left               | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 4   | ankle_left              | rad         | -3.2 | 3.2 | angle, dorsiflexion positive              |
+    | 5   | toe_left                | rad         | -3.2 | 3.2 | angle, toe up positive                    |
+    | 6   | hip_right               | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 7   | knee_right              | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 8   | ankle_right             | rad         | -3.2 | 3.2 | angle, dorsiflexion positive              |
+    | 9   | toe_right               | rad         | -3.2 | 3.2 | angle, toe up positive                    |
+    | 10  | hip_velocity_x          | sqrt(g l)   | -5   | 5   | velocity of the hip, forward positive     |
+    | 11  | hip_velocity_z          | sqrt(g l)   | -5   | 5   | velocity of the hip, up positive          |
+    | 12  | pitch_rate              | sqrt(g/l)   | -15  | 15  | rate of the pitch, forward positive       |
+    | 13  | hip_rate_left           | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 14  | knee_rate_left          | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 15  | ankle_rate_left         | sqrt(g/l)   | -15  | 15  | angular rate, dorsiflexion positive       |
+    | 16  | toe_rate_left           | sqrt(g/l)   | -15  | 15  | angular rate, toe up positive             |
+    | 17  | hip_rate_right          | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 18  | knee_rate_right         | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 19  | ankle_rate_right        | sqrt(g/l)   | -15  | 15  | angular rate, dorsiflexion positive       |
+    | 20  | toe_rate_right          | sqrt(g/l)   | -15  | 15  | angular rate, toe up positive             |
+    | 21  | phase_sin               | 1           | -1   | 1   | sine of 2 pi x left stride phase          |
+    | 22  | phase_cos               | 1           | -1   | 1   | cosine of 2 pi x left stride phase        |
+    | 23  | phase_sin_2             | 1           | -1   | 1   | sine of 4 pi x left stride phase          |
+    | 24  | phase_cos_2             | 1           | -1   | 1   | cosine of 4 pi x left stride phase        |
+    | 25  | load_heel_left          | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 26  | load_ball_left          | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 27  | load_toe_left           | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 28  | load_heel_right         | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 29  | load_ball_right         | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 30  | load_toe_right          | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 31  | com_x_error             | leg length  | -2   | 2   | CoM minus plan, forward positive          |
+    | 32  | com_z_error             | leg length  | -2   | 2   | CoM minus plan, up positive               |
+    | 33  | speed_error             | sqrt(g l)   | -5   | 5   | forward speed of the CoM minus plan       |
+    | 34  | last_action_ankle_left  | 1           | -1   | 1   | action of the step before                 |
+    | 35  | last_action_toe_left    | 1           | -1   | 1   | action of the step before                 |
+    | 36  | last_action_ankle_right | 1           | -1   | 1   | action of the step before                 |
+    | 37  | last_action_toe_right   | 1           | -1   | 1   | action of the step before                 |
+    | 38  | planned_ankle_left      | rad         | -3.2 | 3.2 | plan, dorsiflexion positive               |
+    | 39  | planned_ankle_right     | rad         | -3.2 | 3.2 | plan, dorsiflexion positive               |
+    | 40  | leading_leg             | 1           | -1   | 1   | stance that began last: +1 left, -1 right |
+    | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
+    | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |
+
+    ## Rewards
+    Sum of weight x term. All terms are dimensionless and stand unweighted in `info`. On the step of a fall the reward
+    is 0. Tolerances are those of 1.70 m; lengths scale with height, speeds with its square root.
+
+    | Term           | Weight | Meaning                                                                         |
+    | -------------- | ------ | ------------------------------------------------------------------------------- |
+    | alive          | 0.15   | neither fallen nor diverged                                                     |
+    | speed          | 0.5    | exp(-(e/0.1)^2), e forward speed of the CoM minus plan [m/s]                   |
+    | com_x          | 0.15   | exp(-(e/0.1)^2), e CoM minus plan, forward [m]                                  |
+    | com_z          | 0.1    | exp(-(e/0.03)^2), e CoM minus plan, up [m]                                      |
+    | pose           | 0.6    | exp(-E/0.02), E squared distance [rad^2] from people's joint angles             |
+    | grf            | 0.7    | exp(-D/0.15), D body weights by which the feet's forces leave people's range    |
+    | stiffness_rate | -0.05  | squared change of the action, per 20 ms                                         |
+    | stiffness      | -0.02  | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
+
+    ## Starting state
+    People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at
+    the commanded speed, with `start_noise`. `reset(options={"start": phase})` sets the left leg's phase once.
+    With `start="standing"` the body stands for about a second, sets off and speeds up to the commanded speed; from
+    `stop_at` on it slows down, stops with one foot ahead and stands. Ankle and toe stiffness are then those of springs
+    that hold it, or of the fixed schedule while it sets off and slows down; info tells them, and the action acts in the
+    steady walk between. While it stands the phase waits, and reward and observation are against people and plan there.
+
+    With `height_range`, `mass_range` or `speed_range` every episode draws its own body or speed; `options` may set them
+    once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. Everything scales with the body as mechanics do, and is linear
+    between walks tabulated every 0.1 m/s. With `speed_interval` the commanded speed goes, at `speed_rate`, to a new
+    one now and then; the observation tells the speed commanded now.
+
+    ## Episode end
+    Termination: the hip is lower than 0.65 m (x height / 1.70 m), the trunk is tilted by more than 0.8 rad, or the
+    simulation diverges; `info["termination"]` says which ("" while walking).
+    Truncation: after `episode_seconds` (1000 steps by default).
+
+    ## Info
+    Of each action's name: `stiffness/` [N m/rad], `torque/` [N m], `equilibrium/` [rad], `work/stiffness/` and
+    `work/equilibrium/` [J], the work done in the step by changing stiffness and by moving the equilibrium. Of each
+    reward term `reward/`. `phase/left`, `phase/right` [0, 1), `time` [s], `speed` [m/s], `termination`.
+
+    ## Arguments
+    Every field of `springfoot.envs.settings.BipedSettings`, as plain JSON values:
+
+    | Argument              | Default        | Meaning                                                           |
+    | --------------------- | -------------- | ----------------------------------------------------------------- |
+    | `height`              | `1.7`          | standing height [m]                                               |
+    | `mass`                | `63.0`         | body mass [kg]                                                    |
+    | `leg_ratio`           | `1.0`          | thigh and shank over the average at that height, trunk the rest   |
+    | `foot_ratio`          | `1.0`          | length of the foot over the average at that height                |
+    | `carried_ratio`       | `0.0`          | mass of a load on the back over body mass                         |
+    | `speed`               | `1.2`          | commanded speed [m/s]                                             |
+    | `height_range`        | `None`         | heights drawn at each reset [m], in place of `height`             |
+    | `mass_range`          | `None`         | body masses drawn at each reset [kg], in place of `mass`          |
+    | `speed_range`         | `None`         | speeds drawn at each reset [m/s], in place of `speed`             |
+    | `speed_interval`      | `None`         | mean time between changes of the commanded speed [s]              |
+    | `speed_rate`          | `0.25`         | rate at which it goes to a new one [m/s^2]                        |
+    | `cadence`             | `"people"`     | step length and time of `"people"` or of the `"thesis"`           |
+    | `equilibrium`         | `"planned"`    | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                  |
+    | `feedforward`         | `"people"`     | moments fed forward: measured on `"people"`, or the `"plan"`'s own |
+    | `action_mode`         | `"absolute"`   | `"absolute"` or `"residual"`                                      |
+    | `decisions`           | `"50hz"`       | steps of 10, 20, 40 ms (`"100hz"`, `"50hz"`, `"25hz"`), `"event"` |
+    | `stiffness_joints`    | `"both"`       | joints the action decides: `"both"`, `"ankle"` or `"toe"`         |
+    | `ankle_stiffness_range`| `(20.0, 800.0)` | ankle stiffness at action -1 and +1 [N m/rad]                     |
+    | `toe_stiffness_range` | `(5.0, 200.0)` | toe stiffness at action -1 and +1 [N m/rad]                       |
+    | `schedule`            | `None`         | a stiffness schedule in JSON form                                 |
+    | `human`               | `None`         | someone's own walk in people's place, JSON form of `OwnGait`      |
+    | `episode_seconds`     | `20.0`         | time until truncation [s]                                         |
+    | `start`               | `"random"`     | left leg's stride phase at the start, `"random"` or `"standing"`  |
+    | `stop_at`             | `None`         | time from which the body slows down, stops and stands [s]         |
+    | `start_noise`         | `0.0`          | relative spread of joint angles and velocities at the start       |
+    | `push_newton`         | `0.0`          | size of each push on the trunk [N] for 63 kg, scales with mass    |
+    | `push_seconds`        | `0.1`          | duration of each push [s]                                         |
+    | `push_interval`       | `4.0`          | one push at a random time in each interval [s]                    |
+    | `friction`            | `1.0`          | coefficient of friction between feet and ground                   |
+    | `slope_deg`           | `0.0`          | slope of the ground, uphill positive [deg]                        |
+    | `slope_range_deg`     | `None`         | slopes drawn at each reset [deg], in place of `slope_deg`         |
+    | `unevenness_m`        | `0.0`          | each footfall's ground is up to this much higher or lower [m]     |
+    | `sensor_noise`        | `0.0`          | SD of noise on what is measured of the observation                |
+    | `stiffness_delay_s`   | `0.0`          | a commanded stiffness acts this much later [s]                    |
+    | `stiffness_delay_range_s` | `None`         | delays drawn at each reset [s], in place of it                    |
+    | `reward_weights`      | `{}`           | weights that differ from the table above                          |
+    | `human`               | `None`         | own gait data in people's place: `read_gait(FILE).to_json()`      |
+
+    and `render_mode`: `"human"`, `"rgb_array"` or None.
+
+    ## Version history
+    * v0: first version; may change until springfoot's first release, 0.1.0.
+    """
+
+    metadata = dict(METADATA)
+
+    def __init__(self, render_mode: str | None = None, **settings: Any) -> None:
+        self.settings = settings_from(**settings)
+        self.render_mode = check_render_mode(render_mode)
+        self.biped = Biped(self.settings, 1)
+        self.metadata = METADATA | {"render_fps": round(1 / self.biped.dt)}
+        self.observation_space, self.action_space = spaces_of(self.biped)
+        self._camera: Camera | None = None
+        self._over = True
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray, dict[str, Any]]:
+        """Start an episode; `options` may set its `start`, `height`, `mass` and `speed` (see Starting state)."""
+        chosen = check_options(options)
+        super().reset(seed=seed)
+        self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), bodies_and_speeds(chosen, 1))
+        self._over = False
+        if self.render_mode == "human":
+            self.render()
+        return self.biped.observe()[0], {}
+
+    def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
+        """Hold the stiffness that `action` (4,) stands for during a step, 20 ms by default."""
+        if self._over:
+            raise SpringfootError("no episode is running: call reset() before step()")
+        if np.shape(action) != self.action_space.shape:
+            raise SpringfootError(f"action must have shape {self.action_space.shape}, got {np.shape(action)}")
+        result = self.biped.step(np.asarray(action)[None])
+        terminated, truncated = bool(result.terminated[0]), bool(result.truncated[0])
+        self._over = terminated or truncated
+        if self.render_mode == "human":
+            self.render()
+        info: dict[str, Any] = dict(zip(INFO, result.values[0].tolist(), strict=True))
+        info["termination"] = str(result.termination[0])
+        return result.observation[0], float(result.reward[0]), terminated, truncated, info
+
+    def render(self) -> Any:
+        """A frame, uint8 (480, 640, 3), or None after drawing the window ("human"); `SpringfootError` without GL."""
+        mode = check_can_render(self.render_mode)
+        self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
+        return self._camera.show(self.biped.data(0), self.biped.model_of(0))
+
+    def close(self) -> None:
+        """Close the window, if any."""
+        if self._camera is not None:
+            self._camera.close()
+
+
+def spaces_of(biped: Biped) -> tuple[Box, Box]:
+    """Observation and action space of one environment."""
+    low, high = biped.observation_low, biped.observation_high
+    return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
+
+
+def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The options of a reset; refuses unknown ones and a start that is neither a phase nor "random"."""
+    options, allowed = options or {}, ("start", *DRAWN, *more)
+    for name in options:
+        if name not in allowed:
+            raise SpringfootError(f"unknown reset option {name!r}; valid: {', '.join(allowed)}")
+    if "start" in options:
+        check_start(options["start"])
+    return options
+
+
+def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
+    """What the options of a reset say of the N environments' bodies and speeds, (N,) by the names of `DRAWN`."""
+    given = {}
+    for name in DRAWN:
+        if name in options:
+            try:
+                given[name] = np.broadcast_to(np.asarray(options[name], float), (num,))
+            except (TypeError, ValueError):
+                raise SpringfootError(
+                    f"reset option {name!r} must be a number, or one for each of {num} environments, "
+                    f"got {options[name]!r:.60}"
+                ) from None
+    return given
+
+
+def check_render_mode(mode: str | None) -> str | None:
+    """The render mode; refuses an unknown one."""
+    if mode is not None and mode not in RENDER_MODES:
+        raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {mode!r}")
+    return mode
+
+
+def check_can_render(mode: str | None) -> str:
+    """The render mode; refuses to render without one."""
+    if mode is None:
+        raise SpringfootError(f"make the environment with render_mode {' or '.join(map(repr, RENDER_MODES))} to render")
+    return mode

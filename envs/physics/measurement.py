@@ -1,0 +1,246 @@
+"""What is known of N bodies at the end of a control window, computed from joint positions and contact forces."""
+
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+
+from .foot_contact import CONTACTS, contact_offsets
+from .kernel import kernel
+from .model import ANKLE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
+
+
+@dataclass(kw_only=True, eq=False)  # making it frozen takes longer than measuring
+class Measurement:
+    """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
+
+    Every height z is above the ground: below the point, and for a foot's contacts the ground of that foot; the others'
+    is the mean ground, a plane through the origin. So is every velocity up. Angles are to the true vertical, and
+    forces horizontal and vertical.
+
+    Axes called side, joint and contact follow `SIDES`, `JOINTS` and `CONTACTS` of `envs.physics.model`.
+    """
+
+    time: NDArray
+    """(N,) time since the episode began [s]."""
+    base: NDArray
+    """(N, 3) hip x [m], hip z [m], trunk pitch [rad]."""
+    base_velocity: NDArray
+    """(N, 3) its rate [m/s, m/s, rad/s]."""
+    angle: NDArray
+    """(N, side, joint) joint angles [rad]."""
+    velocity: NDArray
+    """(N, side, joint) joint velocities [rad/s]."""
+    torque: NDArray
+    """(N, side, joint) actuator torques at the window's end, after the torque limit [N m]."""
+    com: NDArray
+    """(N, 2) centre of mass (x, z) [m]."""
+    com_velocity: NDArray
+    """(N, 2) its velocity [m/s]."""
+    ankle: NDArray
+    """(N, side, 2) ankle axes (x, z) [m]."""
+    contact: NDArray
+    """(N, side, contact, 2) lowest points of the contact spheres (x, z) [m]."""
+    force: NDArray
+    """(N, side, contact, 2) ground reaction force (forward, up) on each, mean over the window [N]."""
+    diverged: NDArray
+    """(N,) number of the first MuJoCo warning raised since the episode began (`mjtWarning`), -1 where all is well."""
+
+
+def measure(
+    time: NDArray,
+    segments: NDArray,
+    ground: NDArray,
+    position: NDArray,
+    rate: NDArray,
+    control: NDArray,
+    sensors: NDArray,
+    warnings: NDArray,
+) -> Measurement:
+    """The measurement of N bodies.
+
+    Args:
+        time: (N,) since the episode began [s].
+        segments: (N,) of `SEGMENTS`.
+        ground: (N, 3) tangent of the slope, height below each foot [m].
+        position, rate: (N, 11) MuJoCo's qpos and qvel.
+        control: (N, side, joint, 2) as in `envs.physics.simulation.Simulation.control`.
+        sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
+        warnings: (N, kinds) how often MuJoCo has warned of each kind.
+    """
+    num, sides = len(time), len(SIDES)
+    legs, feet = (num, sides, len(JOINTS)), (num, sides, len(CONTACTS), 2)
+    m = Measurement(
+        time=time.copy(),
+        base=np.empty((num, 3)),
+        base_velocity=np.empty((num, 3)),
+        angle=np.empty(legs),
+        velocity=np.empty(legs),
+        torque=np.empty(legs),
+        com=np.empty((num, 2)),
+        com_velocity=np.empty((num, 2)),
+        ankle=np.empty((num, sides, 2)),
+        contact=np.empty(feet),
+        force=np.empty(feet),
+        diverged=np.empty(num, int),
+    )
+    state = segments, ground, position, rate, control, sensors, warnings
+    joints = m.base, m.base_velocity, m.angle, m.velocity, m.torque
+    _measure(*state, *joints, m.com, m.com_velocity, m.ankle, m.contact, m.force, m.diverged)
+    return m
+
+
+@kernel
+def _measure(
+    segments,
+    ground,
+    position,
+    rate,
+    control,
+    sensors,
+    warnings,
+    base,
+    base_velocity,
+    angle,
+    velocity,
+    torque,
+    com,
+    com_velocity,
+    ankle,
+    contact,
+    force,
+    diverged,
+):
+    for i in range(len(base)):
+        for k in range(3):
+            base[i, k], base_velocity[i, k] = position[i, k], rate[i, k]
+        _read_joints(segments[i], position[i], rate[i], control[i], angle[i], velocity[i], torque[i])
+        _locate(segments[i], position[i], rate[i], com[i], com_velocity[i], ankle[i], contact[i])
+        _above(ground[i], base[i], base_velocity[i], com[i], com_velocity[i], ankle[i], contact[i])
+        _average(sensors[i], force[i])
+        diverged[i] = -1
+        for kind in range(warnings.shape[1] - 1, -1, -1):
+            if warnings[i, kind] > 0:
+                diverged[i] = kind
+
+
+@kernel
+def _read_joints(segments, position, rate, control, angle, velocity, torque):
+    beta, limit = segments.beta, segments.limit
+    for side in range(2):
+        for joint in range(4):
+            theta, theta_rate = position[3 + 4 * side + joint], rate[3 + 4 * side + joint]
+            stiffness, drive = control[side, joint]
+            spring = drive - stiffness * (theta + beta[joint] * theta_rate)
+            angle[side, joint], velocity[side, joint] = theta, theta_rate
+            torque[side, joint] = min(max(spring, -limit[joint]), limit[joint])
+
+
+@kernel
+def _average(sensors, force):
+    steps = len(sensors)
+    for side in range(2):
+        for contact in range(3):
+            forward = up = 0.0
+            for step in range(steps):
+                forward += sensors[step, side, contact, 0]
+                up += sensors[step, side, contact, 2]
+            force[side, contact, 0], force[side, contact, 1] = forward / steps, up / steps
+
+
+SEGMENTS = np.dtype(
+    [
+        ("trunk", float, 2),  # part of trunk and load in hip -> CoM [m], in the trunk's frame (forward, up)
+        ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see segments_of
+        ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
+        ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
+        ("radius", float, len(CONTACTS)),
+        ("beta", float, len(JOINTS)),  # [s]
+        ("limit", float, len(JOINTS)),  # [N m]
+    ]
+)
+"""A body as its kinematics and springs need it."""
+
+
+def segments_of(body: Body) -> NDArray:
+    """(1,) of `SEGMENTS`.
+
+    The CoM is the hip plus one offset for each segment, turned with it: its own share of the mass times its CoM, plus
+    the share of all that hangs from its far end times that end.
+    """
+    foot, toe = body.foot_mass, body.toe_mass
+    beyond_knee = body.shank_mass + foot + toe
+    forward, below = body.foot_com
+    toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
+    offsets = contact_offsets(body)
+    segments = np.zeros(1, SEGMENTS)
+    segments["trunk"] = np.array(body.upper_moment) / body.total_mass
+    segments["part"] = (
+        np.array(
+            [
+                (0.0, -(body.thigh_mass * body.thigh_com + beyond_knee * body.thigh_length)),
+                (0.0, -(body.shank_mass * body.shank_com + (foot + toe) * body.shank_length)),
+                (foot * forward + toe * toe_joint[0], -foot * below + toe * toe_joint[1]),
+                (toe * body.toe_com, 0.0),
+            ]
+        )
+        / body.total_mass
+    )
+    segments["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
+    segments["contact"] = [(forward, up) for forward, up, _ in offsets.values()]
+    segments["radius"] = [radius for *_, radius in offsets.values()]
+    segments["beta"], segments["limit"] = damping_times(body), torque_limits(body)
+    return segments
+
+
+@kernel
+def _locate(segments, position, rate, com, com_velocity, ankle, contact):
+    """Planar forward kinematics.
+
+    A segment turned up-forward by s (a thigh's flexion, a foot's toes-up pitch) carries the offset (u, w) in its frame
+    to (u cos s - w sin s, u sin s + w cos s), and spinning at ds/dt moves it at ds/dt (-z, x).
+    """
+    hip_x, hip_z, pitch = position[0], position[1], position[2]
+    x, z = _turned(segments.trunk, cos(-pitch), sin(-pitch))
+    com_x, com_z = hip_x + x, hip_z + z
+    com_rate_x, com_rate_z = rate[0] + z * rate[2], rate[1] - x * rate[2]
+    for side in range(2):
+        joint_x, joint_z, turn, spin = hip_x, hip_z, -pitch, -rate[2]
+        for joint in range(4):
+            sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
+            turn += sign * position[3 + 4 * side + joint]
+            spin += sign * rate[3 + 4 * side + joint]
+            c, s = cos(turn), sin(turn)
+            x, z = _turned(segments.part[joint], c, s)
+            com_x, com_z = com_x + x, com_z + z
+            com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
+            if joint == ANKLE:
+                ankle[side, 0], ankle[side, 1] = joint_x, joint_z
+            for k in range(3):
+                if joint == (ANKLE if k == 0 else TOE):  # the heel is on the foot
+                    x, z = _turned(segments.contact[k], c, s)
+                    contact[side, k, 0], contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
+            x, z = _turned(segments.end[joint], c, s)
+            joint_x, joint_z = joint_x + x, joint_z + z
+    com[0], com[1], com_velocity[0], com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
+
+
+@kernel
+def _above(ground, base, base_velocity, com, com_velocity, ankle, contact):
+    """From the world's heights to those above the ground."""
+    slope = ground[0]
+    for position, velocity in ((base, base_velocity), (com, com_velocity)):
+        position[1] -= slope * position[0]
+        velocity[1] -= slope * velocity[0]
+    for side in range(2):
+        ankle[side, 1] -= slope * ankle[side, 0]
+        for k in range(3):
+            contact[side, k, 1] -= slope * contact[side, k, 0] + ground[1 + side]
+
+
+@kernel
+def _turned(offset, c, s):
+    return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c

@@ -1,0 +1,126 @@
+"""N bodies walking side by side on `mujoco.batch.Batch`: the only owner of MuJoCo data and the only reader of sensors.
+
+One call of `advance` is one control window of 10 ms: it holds `control`, runs the physics steps and returns a
+`Measurement`. Kinematics are computed here from joint positions at the window's end (MuJoCo's derived fields lag one
+physics step); contact forces are the mean over the window's physics steps, so that no heel strike is missed.
+"""
+
+from collections.abc import Sequence
+from math import cos, sin, tan
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from springfoot.gait.body import Body
+from springfoot.gait.errors import SpringfootError
+
+from ..timing import CONTROL_WINDOW
+from .foot_contact import CONTACTS, FRICTION
+from .measurement import Measurement, measure, segments_of
+from .model import JOINTS, SIDES, build_model
+
+
+class Simulation:
+    """N simulations, of one body at first.
+
+    Args:
+        body: whose model is simulated.
+        num: N.
+        threads: of the physics; any number gives the same bits.
+        model: the body's model with other options, such as a timestep that divides `CONTROL_WINDOW`, in place of the default.
+        friction: between feet and ground, of the default models [-].
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        num: int,
+        threads: int = 1,
+        model: mujoco.MjModel | None = None,
+        friction: float = FRICTION,
+    ):
+        self.body = body
+        self.num = num
+        self.model = model or build_model(body, friction)
+        self.models = [self.model] * num
+        """Of each simulation."""
+        self._own_options = model is not None
+        self._friction = friction
+        self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
+        self._batch = Batch(self.model, num, threads)
+        self._qpos = self._batch.bind("qpos")
+        self._qvel = self._batch.bind("qvel")
+        self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
+        """(N, side, joint, 2) K [N m/rad] and K theta_eq plus any feed-forward torque [N m]; changed in place."""
+        self._time = self._batch.bind("time").reshape(num)
+        self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
+        self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
+        self._ground = np.zeros((num, 1 + len(SIDES)))  # tangent of the slope, height below each foot [m]
+        self._warnings = self._batch.warning[:, :, 1]
+        self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
+        self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
+        self._segments = np.repeat(segments_of(body), num)
+        self._no_control = np.zeros_like(self.control)
+
+    def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
+        """Simulate `bodies` (K,) in `ids` (K,) from their next reset on; compiling a model takes about 1.5 ms."""
+        if self._own_options:
+            raise SpringfootError("a simulation with a model of one's own keeps its body")
+        for index, body in zip(ids, bodies, strict=True):
+            self.models[index] = self.model if body == self.body else build_model(body, self._friction)
+            self._segments[index] = segments_of(body)[0]
+        self._batch.set_models(self.models)
+
+    def reset(self, ids: NDArray, base: NDArray, base_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
+        """Put simulations `ids` (K,) into the states given: (K, 3), (K, 3), (K, side, joint), (K, side, joint)."""
+        position, turn = self._position[ids], self._turn[ids]  # the ground stays
+        self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._position[ids], self._turn[ids] = position, turn
+        self._qpos[ids, :3], self._qpos[ids, 3:] = base, angle.reshape(len(ids), -1)
+        self._qvel[ids, :3], self._qvel[ids, 3:] = base_velocity, velocity.reshape(len(ids), -1)
+        for state, given in ((self._qpos, base), (self._qvel, base_velocity)):
+            state[ids, 1] += self._ground[ids, 0] * given[:, 0]
+
+    def lay(self, ids: NDArray, slope: NDArray, height: NDArray) -> None:
+        """Give simulations `ids` (K,) ground of a slope (K,) [rad], uphill positive, whose plane below each foot lies
+        `height` (K, side) [m] above the mean one, which goes through the origin."""
+        for index, angle, heights in zip(ids.tolist(), slope.tolist(), height, strict=True):
+            self._ground[index] = tan(angle), *heights
+            self._position[index, :, 2] = heights  # mocap bodies are the grounds, in the order of SIDES
+            self._turn[index] = cos(angle / 2), 0.0, -sin(angle / 2), 0.0
+
+    def push(self, force: NDArray) -> None:
+        """Hold a horizontal force [N], (N,), on the trunk's CoM until told otherwise."""
+        self._push[:, 0] = force
+
+    def advance(self, ids: NDArray | None = None) -> Measurement:
+        """Run one control window with `control` held; the measurement of all N at its end.
+
+        Only simulations `ids` run, all by default; the others stay as they are, and their forces read 0.
+        """
+        if ids is None:
+            self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)
+        else:
+            self._sensors[:] = 0.0
+            if len(ids):
+                self._record["sensordata"][ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)[
+                    "sensordata"
+                ]
+        return self._measure(self.control)
+
+    def measure(self) -> Measurement:
+        """The state as it stands, with no torque and no force: what is known right after a reset."""
+        self._sensors[:] = 0.0
+        return self._measure(self._no_control)
+
+    def data(self, index: int) -> mujoco.MjData:
+        """A copy of one simulation's state after `mj_forward`, to render or to inspect."""
+        data = self._batch.get_data(index)
+        mujoco.mj_forward(self.models[index], data)
+        return data
+
+    def _measure(self, control: NDArray) -> Measurement:
+        state = self._ground, self._qpos, self._qvel, control, self._sensors, self._warnings
+        return measure(self._time, self._segments, *state)

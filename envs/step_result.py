@@ -1,0 +1,124 @@
+"""What one step of the batch returns, and what each of its control windows was."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .control.foot_springs import FootSprings
+from .physics.kernel import kernel
+from .physics.measurement import Measurement
+from .physics.model import ACTIONS, ANKLE, SIDES
+from .task.reward import TERMS
+
+REPORT = np.dtype(
+    [
+        ("stiffness", float, (len(SIDES), 2)),
+        ("torque", float, (len(SIDES), 2)),
+        ("equilibrium", float, (len(SIDES), 2)),
+        ("work_stiffness", float, (len(SIDES), 2)),
+        ("work_equilibrium", float, (len(SIDES), 2)),
+        ("reward", float, len(TERMS)),
+        ("phase", float, len(SIDES)),
+        ("time", float),
+        ("speed", float),
+    ]
+)
+"""What is reported of one body's step besides observation and reward."""
+INFO = (
+    *(
+        f"{name}/{action}"
+        for name in ("stiffness", "torque", "equilibrium", "work/stiffness", "work/equilibrium")
+        for action in ACTIONS
+    ),
+    *(f"reward/{term}" for term in TERMS),
+    *(f"phase/{side}" for side in SIDES),
+    "time",
+    "speed",
+)
+"""The names of its numbers, in order: of each action `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad]
+at the step's end, `work/stiffness/` and `work/equilibrium/` [J] of the step; of each term `reward/`, unweighted; of
+each leg `phase/` [0, 1); `time` [s], `speed` [m/s]."""
+
+
+@dataclass(kw_only=True, eq=False)
+class StepResult:
+    """What one step returns; every array has N rows."""
+
+    observation: NDArray
+    """(N, D) float32."""
+    reward: NDArray
+    """(N,)."""
+    terminated: NDArray
+    """(N,) fallen or diverged."""
+    truncated: NDArray
+    """(N,) out of time."""
+    values: NDArray
+    """(N, len(INFO)) in the order of `INFO`."""
+    termination: NDArray
+    """(N,) why an episode was terminated, "" where it was not; read only."""
+
+    @property
+    def info(self) -> dict[str, NDArray]:
+        """Name -> (N,): `values` by their names in `INFO`, and `termination`."""
+        return dict(zip(INFO, self.values.T, strict=True)) | {"termination": self.termination}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tick:
+    """One control window as an evaluation records it; arrays over N, axes as in `Measurement`."""
+
+    measurement: Measurement
+    phase: NDArray
+    """(N, side) stride phase of each leg at the window's start."""
+    stiffness: NDArray
+    """(N, side, joint) K held in the window [N m/rad]."""
+    equilibrium: NDArray
+    """(N, side, joint) rest angle theta_eq held in the window, feed-forward torque included as torque / K [rad]."""
+    passive_torque: NDArray
+    """(N, side, joint) torque of the joint damping at the window's end [N m]."""
+    com_reference: NDArray
+    """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
+    active: NDArray
+    """(N,) which environments ran."""
+
+
+def report(
+    springs: FootSprings, m: Measurement, terms: NDArray, leg_phase: NDArray, steps: NDArray, seconds: float
+) -> NDArray:
+    """`StepResult.values` of a step of `seconds`, with its `terms` (N, len(TERMS)), `leg_phase` (N, side) and `steps` (N,)
+    so far."""
+    values = np.empty((len(terms), len(INFO)))
+    works = springs.work_stiffness, springs.work_equilibrium
+    state = springs.stiffness, m.torque, springs.equilibrium, *works, terms, leg_phase
+    _report(*state, steps, seconds, m.com_velocity, values.view(REPORT))
+    return values
+
+
+@kernel
+def _report(
+    stiffness,
+    torque,
+    equilibrium,
+    work_stiffness,
+    work_equilibrium,
+    terms,
+    leg_phase,
+    steps,
+    seconds,
+    com_velocity,
+    rows,
+):
+    for i in range(len(rows)):
+        row = rows[i, 0]
+        row.time, row.speed = seconds * steps[i], com_velocity[i, 0]
+        for term in range(terms.shape[1]):
+            row.reward[term] = terms[i, term]
+        for side in range(2):
+            row.phase[side] = leg_phase[i, side]
+            for joint in range(2):
+                row.stiffness[side, joint] = stiffness[i, side, joint]
+                row.torque[side, joint] = torque[i, side, ANKLE + joint]
+                row.equilibrium[side, joint] = equilibrium[i, side, joint]
+                row.work_stiffness[side, joint] = work_stiffness[i, side, joint]
+                row.work_equilibrium[side, joint] = work_equilibrium[i, side, joint]

@@ -1,0 +1,45 @@
+"""Pushes on the trunk, as hard on every body: their force goes with its mass, as its weight does."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import REFERENCE_MASS
+
+from ..control.subjects import Subjects
+from ..settings import BipedSettings
+
+
+class Pushes:
+    """When each environment is pushed: once at a random time in each interval, forward or backward at random."""
+
+    def __init__(self, settings: BipedSettings, subjects: Subjects):
+        num, self._scale = len(subjects.bodies), subjects.scale
+        self._size = settings.push_newton * (settings.mass / REFERENCE_MASS)
+        self._latest = settings.push_interval - settings.push_seconds
+        self._interval, self._duration = settings.push_interval, settings.push_seconds
+        self._step = settings.step_seconds
+        self._ends = np.zeros(num)
+        self._begin = np.zeros(num)
+        self._force = np.zeros(num)
+
+    def reset(self, index: int, random: np.random.Generator) -> None:
+        """Start an episode of environment `index`."""
+        self._ends[index] = 0.0
+        self._draw(index, random)
+
+    def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
+        """(N,) push [N] at these step counts; only those running draw their next one."""
+        time = steps * self._step
+        for index in np.flatnonzero(running & (time >= self._ends)).tolist():
+            generator = random[index]
+            if generator is not None:
+                self._draw(index, generator)
+        since = time - self._begin
+        return np.where((since >= 0) & (since < self._duration), self._force * self._scale["mass"], 0.0)
+
+    def _draw(self, index: int, random: np.random.Generator) -> None:
+        self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)
+        self._force[index] = self._size * (-1.0, 1.0)[random.integers(2)]
+        self._ends[index] += self._interval

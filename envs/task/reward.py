@@ -1,0 +1,319 @@
+"""The walking task: observation, named reward terms and falls, on arrays over N environments.
+
+Row i of every result depends on row i of the arguments alone, by the same operations for any N: a batch of N
+gives the same bits as N batches of one.
+"""
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from math import exp, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.human import ANGLES, HumanGait
+from springfoot.gait.plan import WalkPlan
+
+from ..control.leg_constants import LegConstants
+from ..control.phase_table import GRID, PhaseTable
+from ..control.reference_walk import Walk
+from ..control.subjects import Subjects
+from ..physics.kernel import kernel
+from ..physics.model import ANKLE, HIP, JOINTS, KNEE, LEFT, RIGHT, TOE
+from ..settings import DEFAULT_WEIGHTS, BipedSettings
+from ..timing import ACTION_STEP
+from .observation import OBSERVATION, Observer
+
+if TYPE_CHECKING:
+    from ..physics.measurement import Measurement
+
+MIN_HIP_HEIGHT = 0.65
+"""A hip lower than this [m at 1.70 m, scaled with height] is a fall (design study)."""
+MAX_PITCH = 0.8
+"""A trunk tilted further than this, forward or backward, is a fall [rad] (design study)."""
+TOO_LOW, TOO_TILTED = "fell: hip too low", "fell: trunk too tilted"
+
+COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.1, 0.03
+"""Error of the CoM at which its reward is 1/e [m at 1.70 m, scaled with height] (design study)."""
+SPEED_TOLERANCE = 0.10
+"""Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]."""
+POSE_WEIGHTS = {HIP: 3.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
+"""Share of each joint in the pose error E; the toe counts little, its curve is of other people."""
+POSE_TOLERANCE = 0.02
+"""Pose error E at which its reward is 1/e [rad^2]: 3.4 deg at every joint (design study)."""
+ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
+"""Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height] (design study)."""
+TOE_SHARE = 0.25
+"""Weight of the toe against the ankle in the cost of stiffness (design study)."""
+MAX_FORCE = 1.2
+"""Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.13."""
+EXCESS_SHARE = 4.0
+"""Weight of that excess against the distance from people's range: a peak is short, and is what hurts."""
+FORCE_TOLERANCE = 0.15
+"""Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
+
+
+CURVES = np.dtype(
+    [
+        ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
+        ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
+        ("force_sd", float, 2),  # its standard deviation
+        ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
+        ("speed", float),  # the plan's forward speed of the CoM [m/s]
+        ("stride_length", float),  # of the plan [m], the same at every phase
+    ]
+)
+"""What people and the plan do at a phase of one leg's stride; `com` and `speed` where its stance began last."""
+SCALES = np.dtype(
+    [
+        ("min_hip_height", float),  # [m]
+        ("tolerance", float, 3),  # of the CoM's x, z [m] and forward speed [m/s]
+        ("pose_share", float, len(JOINTS)),
+        ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
+        ("stiffness_share", float, 2),
+        ("weight", float),  # of body and load [N]
+    ]
+)
+"""What one body is measured by."""
+TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
+"""The reward's terms, in the order in which they are summed."""
+ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
+
+
+class Task:
+    """What is seen, what is rewarded and what counts as a fall.
+
+    Args:
+        settings: the weights.
+        rows: constants and walk of each row of the subjects' tables (`envs.control.reference_walk.rows`).
+        subjects: bodies and speeds.
+    """
+
+    def __init__(self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, Walk]], subjects: Subjects) -> None:
+        self.names = tuple(entry.name for entry in OBSERVATION)
+        self._subjects = subjects
+        self._observer = Observer(subjects)
+        self.low, self.high = self._observer.low, self._observer.high
+        self.weights = DEFAULT_WEIGHTS | settings.reward_weights
+
+        self._weights = np.array([self.weights[name] for name in TERMS])
+        self._share = settings.step_seconds / ACTION_STEP
+        curves = {walk: _curves(walk.plan, walk.human, settings.step_seconds) for _, walk in rows}
+        self._curves = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows]))
+        self._scales = np.concatenate([_scales(body) for body in subjects.bodies])
+
+    def fit(self, ids: Iterable[int]) -> None:
+        """Take the bodies of environments `ids` as they are now."""
+        self._observer.fit(ids)
+        for index in ids:
+            self._scales[index] = _scales(self._subjects.bodies[index])[0]
+
+    def observe(
+        self,
+        m: "Measurement",
+        leg_phase: NDArray,
+        last_action: NDArray,
+        force: NDArray,
+        curves: NDArray | None = None,
+    ) -> NDArray:
+        """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
+
+        `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean
+        over the step; `curves` are `at(leg_phase)`, where known. What is not a number reads as the upper bound.
+        """
+        curves = self.at(leg_phase) if curves is None else curves
+        error, planned_ankle = self._error(m, leg_phase, curves), curves["pose"][..., ANKLE]
+        return self._observer.observe(m, leg_phase, error, planned_ankle, last_action, force)
+
+    def planned_com(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
+        """The plan's CoM (x in the world, z) [m], shape (N, 2)."""
+        return m.com - self.tracking(m, leg_phase)[:, :2]
+
+    def tracking(self, m: "Measurement", leg_phase: NDArray) -> NDArray:
+        """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3)."""
+        return self._error(m, leg_phase, self.at(leg_phase))
+
+    def terms(
+        self,
+        m: "Measurement",
+        leg_phase: NDArray,
+        action: NDArray,
+        last_action: NDArray,
+        stiffness: NDArray,
+        force_windows: NDArray,
+        curves: NDArray | None = None,
+    ) -> NDArray:
+        """The reward's terms, unweighted and dimensionless, (N, len(TERMS)) in the order of `TERMS`.
+
+        Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
+        the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance
+        [rad^2] of thigh (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
+        `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
+        beyond 1.2 (fourfold), both components beyond mean +- SD at the leg's phase.
+        Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
+        [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
+
+        `action`, `last_action` (N, 4); `stiffness` (N, 2, 2) as [side][ankle, toe] [N m/rad]; `force_windows`
+        (W, N, 2, 3, 2) on the body [N] in the W control windows of the step; `curves` as in `observe`.
+        """
+        terms = np.empty((len(leg_phase), len(TERMS)))
+        state = m.base, m.angle, m.com, m.com_velocity, m.ankle, m.diverged
+        curves = self.at(leg_phase) if curves is None else curves
+        _judge(
+            self._scales,
+            self._subjects.scale,
+            curves,
+            *state,
+            leg_phase,
+            action,
+            last_action,
+            stiffness,
+            force_windows,
+            self._share,
+            terms,
+        )
+        return terms
+
+    def reward(self, terms: NDArray) -> NDArray:
+        """Weighted sum of the terms, (N,), in proportion to the time of a step, 1 for 20 ms; 0 where `alive` is 0."""
+        total = np.empty(len(terms))
+        _sum(self._weights, self._share, terms, total)
+        return total
+
+    def fallen(self, m: "Measurement") -> NDArray:
+        """Why each environment has fallen, a string array (N,): empty while it has not."""
+        tilted = np.where(np.abs(m.base[:, 2]) <= MAX_PITCH, "", TOO_TILTED)
+        return np.where(m.base[:, 1] >= self._scales["min_hip_height"], tilted, TOO_LOW)
+
+    def _error(self, m: "Measurement", leg_phase: NDArray, curves: NDArray) -> NDArray:
+        error = np.empty((len(leg_phase), 3))
+        _track(self._subjects.scale, curves, m.com, m.com_velocity, m.ankle, leg_phase, error)
+        return error
+
+    def at(self, leg_phase: NDArray) -> NDArray:
+        """(N, side) of `CURVES`."""
+        return self._curves.at(leg_phase, self._subjects.place).view(CURVES)[..., 0]
+
+
+@lru_cache(maxsize=256)
+def _scales(body: Body) -> NDArray:
+    """(1,) of `SCALES`."""
+    length = body.length_scale
+    scales = np.zeros(1, SCALES)
+    scales["min_hip_height"] = MIN_HIP_HEIGHT * length
+    scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
+    scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
+    scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
+    scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
+    scales["weight"] = body.total_mass * GRAVITY
+    return scales
+
+
+def _curves(plan: WalkPlan, human: HumanGait, step_seconds: float) -> NDArray:
+    """(SAMPLES,) of `CURVES`, for steps of `step_seconds`."""
+    curves = np.zeros(len(GRID), CURVES)
+    curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
+    middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
+    for axis, name in enumerate(("grf_forward", "grf_vertical")):
+        curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
+    step = (2 * GRID) % 1.0
+    x, z = plan.com(step)
+    curves["com"] = np.stack((x - plan.step_length * step, z), -1)
+    curves["speed"], _ = plan.com_velocity(step)
+    curves["stride_length"] = 2 * plan.step_length
+    return curves
+
+
+@kernel
+def _track(ratios, curves, com, com_velocity, ankle, leg_phase, error):
+    for i in range(len(error)):
+        x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        error[i, 0], error[i, 1], error[i, 2] = x, z, speed
+
+
+@kernel
+def _error(ratio, curves, com, com_velocity, ankle, leg_phase):
+    """CoM minus plan: x, z, forward speed. The plan counts x from the ankle of the leg whose stance began last."""
+    leader = LEFT if leg_phase[LEFT] < 0.5 else RIGHT
+    planned = curves[leader]
+    planned_x = ankle[leader, 0] + ratio.length * planned.stride_length * leg_phase[leader]
+    planned_x += ratio.length * planned.com[0]
+    return com[0] - planned_x, com[1] - ratio.length * planned.com[1], com_velocity[0] - ratio.time * planned.speed
+
+
+@kernel
+def _judge(
+    scales,
+    ratios,
+    curves,
+    base,
+    angle,
+    com,
+    com_velocity,
+    ankle,
+    diverged,
+    leg_phase,
+    action,
+    last_action,
+    stiffness,
+    windows,
+    share,
+    terms,
+):
+    for i in range(len(base)):
+        scale = scales[i]
+        upright = base[i, 1] >= scale.min_hip_height and abs(base[i, 2]) <= MAX_PITCH  # a NaN is not
+        terms[i, ALIVE] = 1.0 if upright and diverged[i] < 0 else 0.0
+        x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
+        terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
+        terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
+        terms[i, SPEED] = exp(-((speed / scale.tolerance[2]) ** 2))
+        pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
+        for side in range(2):
+            people = curves[i, side]
+            pose_error += 0.5 * _pose_error(scale, base[i, 2], angle[i, side], people)
+            force_distance += _force_distance(scale, windows[:, i, side], people)
+            for joint in range(2):
+                k = stiffness[i, side, joint] / scale.stiffness_unit[joint]
+                stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
+        for k in range(4):
+            stiffness_rate += ((action[i, k] - last_action[i, k]) / share) ** 2
+        terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
+        terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
+        terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
+
+
+@kernel
+def _pose_error(scale, pitch, angle, people):
+    error = 0.0
+    for joint in range(4):
+        lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
+        error += scale.pose_share[joint] * (angle[joint] - people.pose[joint] - lean) ** 2
+    return error
+
+
+@kernel
+def _force_distance(scale, windows, people):
+    """Body weights by which one foot's forces in the windows of a step leave people's range."""
+    count = len(windows)
+    forward = up = excess = 0.0
+    for window in range(count):
+        contacts = windows[window]
+        vertical = (contacts[0, 1] + contacts[1, 1] + contacts[2, 1]) / scale.weight
+        forward += (contacts[0, 0] + contacts[1, 0] + contacts[2, 0]) / scale.weight / count
+        up += vertical / count
+        excess += max(vertical - MAX_FORCE, 0.0) / count
+    beyond_forward = max(abs(forward - people.force[0]) - people.force_sd[0], 0.0)
+    beyond_up = max(abs(up - people.force[1]) - people.force_sd[1], 0.0)
+    return EXCESS_SHARE * excess + beyond_forward + beyond_up
+
+
+@kernel
+def _sum(weights, share, terms, total):
+    for i in range(len(total)):
+        total[i] = 0.0
+        for term in range(len(weights)):
+            total[i] += weights[term] * terms[i, term]
+        total[i] *= share * terms[i, ALIVE]

@@ -1,0 +1,211 @@
+"""`SegmentedFootBiped` N times over in one batched simulation, as a Gymnasium `VectorEnv`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from springfoot.gait.errors import SpringfootError, require_count
+
+from .biped_batch import Biped
+from .env import METADATA, bodies_and_speeds, check_can_render, check_options, check_render_mode, spaces_of
+from .physics.rendering import Camera
+from .settings import BipedSettings, settings_from
+from .step_result import INFO, StepResult
+
+_NAMES = (*INFO, "termination")
+
+
+class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
+    """N of `SegmentedFootBiped` in one batched simulation: same settings, spaces, rewards and bits.
+
+    Environment i of a vector seeded with s does what `SegmentedFootBiped` seeded with s + i does.
+
+    Args:
+        num_envs: N.
+        autoreset_mode: `AutoresetMode` or its value: "NextStep" (the step after an episode's last one ignores the
+            action and resets), "SameStep" (`final_obs`, `final_info` in the info), "Disabled"
+            (`reset(options={"reset_mask": mask})` by the caller).
+        num_threads: of the physics; any number gives the same bits.
+        max_episode_steps: truncate after so many steps, where `episode_seconds` is longer.
+        render_mode: "rgb_array" (a frame of each), "human" (a window on the first) or None.
+        settings: as for `SegmentedFootBiped`.
+    """
+
+    _camera: Camera | None = None
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int = 1,
+        max_episode_steps: int | None = None,
+        **settings: Any,
+    ) -> None:
+        for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
+            require_count(name, count)
+        self.settings = _limit_steps(settings_from(**settings), max_episode_steps)
+        self.num_envs = num_envs
+        self.render_mode = check_render_mode(render_mode)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.biped = Biped(self.settings, num_envs, num_threads)
+        self.metadata = METADATA | {"autoreset_mode": self.autoreset_mode, "render_fps": round(1 / self.biped.dt)}
+        self.single_observation_space, self.single_action_space = spaces_of(self.biped)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds = [-1] * num_envs
+        self._over = np.ones(num_envs, bool)
+        self._started = False
+        everyone = np.ones(num_envs, bool)
+        everyone.flags.writeable = False  # it is handed out at every step at which nobody resets
+        self._all_true: dict[str, Any] = dict.fromkeys((*_NAMES, *(f"_{name}" for name in _NAMES)), everyone)
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The generator of each environment; None before its first reset."""
+        return tuple(self._generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The seed of each environment's generator; -1 before its first reset."""
+        return tuple(self._seeds)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray, dict[str, Any]]:
+        """Start episodes in all environments, or in those of `options["reset_mask"]`, a bool array (N,).
+
+        `seed` s gives environment i the seed s + i; a list gives each its own. `options` else as in the Env, `height`,
+        `mass` and `speed` also as (N,) arrays.
+        """
+        chosen = check_options(options, ("reset_mask",))
+        given = bodies_and_speeds(chosen, self.num_envs)
+        ids = np.flatnonzero(self._reset_mask(chosen.get("reset_mask")))
+        seeds = self._spread(seed)
+        for index in ids.tolist():
+            if seeds[index] is not None or self._generators[index] is None:
+                self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
+        self._restart(ids, chosen.get("start"), given)
+        self._over[ids] = False
+        if self.render_mode == "human":
+            self.render()
+        return self.biped.observe(), {}
+
+    def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
+        """Hold the stiffnesses that `actions` (N, 4) stand for during a step, 20 ms by default."""
+        self._check_running()
+        resetting, same_step = self._over, self.autoreset_mode is AutoresetMode.SAME_STEP
+        result = self.biped.step(actions, active=~resetting if np.count_nonzero(resetting) else None)
+        ended = result.terminated | result.truncated
+        if same_step:
+            resetting = ended
+        else:
+            self._over = ended
+        if np.count_nonzero(resetting):
+            infos = _masked(result, ~resetting) | (_final(result, ended) if same_step else {})
+            self._restart(np.flatnonzero(resetting))
+            observation = self.biped.observe()
+        else:
+            infos = self._all_true.copy()
+            infos.update(zip(_NAMES, (*result.values.T, result.termination.copy()), strict=True))
+            observation = result.observation
+        if self.render_mode == "human":
+            self.render()
+        return observation, result.reward, result.terminated, result.truncated, infos
+
+    def render(self) -> Any:
+        """A tuple of N frames, uint8 (480, 640, 3); "human" draws the first environment and gives None."""
+        mode = check_can_render(self.render_mode)
+        self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
+        if mode == "human":
+            return self._camera.show(self.biped.data(0), self.biped.model_of(0))
+        biped, camera = self.biped, self._camera
+        return tuple(camera.show(biped.data(index), biped.model_of(index)) for index in range(self.num_envs))
+
+    def close_extras(self, **_: Any) -> None:
+        """Close the window, if any."""
+        if self._camera is not None:
+            self._camera.close()
+
+    def _restart(
+        self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
+    ) -> None:
+        given = {name: values[ids] for name, values in (given or {}).items()}
+        self.biped.reset(ids, [self._generators[index] for index in ids], start, given)
+
+    def _check_running(self) -> None:
+        """Refuses a step of environments that someone should have reset before."""
+        if self._started and self.autoreset_mode is not AutoresetMode.DISABLED:
+            return
+        waiting = np.array([generator is None for generator in self._generators])
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            waiting |= self._over
+        if waiting.any():
+            which = ", ".join(map(str, np.flatnonzero(waiting)))
+            raise SpringfootError(f"no episode is running in environments {which}: call reset() before step()")
+        self._started = True
+
+    def _spread(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """One seed for each environment."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + index for index in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise SpringfootError(f"seed must be an integer or a list of {self.num_envs}, got {len(seed)} seeds")
+        return seed
+
+    def _reset_mask(self, mask: Any) -> NDArray:
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        if not isinstance(mask, np.ndarray) or mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
+            raise SpringfootError(
+                f"reset_mask must be a bool array of shape ({self.num_envs},) with at least one True, got {mask!r}"
+            )
+        return mask
+
+
+def _masked(result: StepResult, mask: NDArray) -> dict[str, Any]:
+    """Gymnasium's form of a vector's info: fresh arrays, each with `_name`, the mask of whom it is about."""
+    if not np.count_nonzero(mask):
+        return {}
+    values, reasons = np.where(mask, result.values.T, 0.0), result.termination.copy()
+    reasons[~mask] = None
+    return dict(zip(_NAMES, (*values, reasons), strict=True)) | {f"_{name}": mask.copy() for name in _NAMES}
+
+
+def _final(result: StepResult, ended: NDArray) -> dict[str, Any]:
+    """Last observation and info of the episodes that ended in this step."""
+    last = np.full(len(ended), None, dtype=object)
+    for index in np.flatnonzero(ended):
+        last[index] = result.observation[index].copy()
+    return {
+        "final_obs": last,
+        "_final_obs": ended.copy(),
+        "final_info": _masked(result, ended.copy()),
+        "_final_info": ended.copy(),
+    }
+
+
+def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        valid = ", ".join(repr(choice.value) for choice in AutoresetMode)
+        raise SpringfootError(f"autoreset_mode must be one of {valid}, got {mode!r}") from None
+
+
+def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> BipedSettings:
+    """Gymnasium puts no TimeLimit around a vector entry point: the limit goes into the settings."""
+    if max_episode_steps is None:
+        return settings
+    limit = require_count("max_episode_steps", max_episode_steps) * settings.step_seconds
+    return replace(settings, episode_seconds=min(settings.episode_seconds, limit))

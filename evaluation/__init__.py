@@ -1,0 +1,1 @@
+"""From recorded walks to a verdict: how human a walk is."""

@@ -1,0 +1,269 @@
+"""Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from springfoot.agents.baselines import BASELINES, Policy, baseline, own_settings
+from springfoot.agents.policy import load_policy
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.subjects import DRAWN
+from springfoot.envs.physics.foot_contact import CONTACTS
+from springfoot.envs.physics.model import JOINTS, SIDES
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.envs.step_result import Tick
+from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import SpringfootError
+from springfoot.gait.plan import WalkPlan
+
+_WHO = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed")
+_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg", "stiffness_delay_range_s")
+_WORLD = ("push_newton", "friction", "slope_deg", "unevenness_m", "sensor_noise", "stiffness_delay_s")
+_START = ("start", "stop_at", "start_noise")
+CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, *_WORLD, *_START)}
+"""The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
+TICK = Biped.tick_dt
+"""Time between two samples [s]."""
+BATCH = 32
+"""Episodes simulated side by side."""
+
+SERIES: dict[str, Callable[[Tick], NDArray]] = {
+    "base": lambda tick: tick.measurement.base,  # (3,) hip x [m], hip z [m], trunk pitch [rad]
+    "angle": lambda tick: tick.measurement.angle,  # (side, joint) [rad]
+    "velocity": lambda tick: tick.measurement.velocity,  # (side, joint) [rad/s]
+    "torque": lambda tick: tick.measurement.torque,  # (side, joint) actuator torque [N m]
+    "passive_torque": lambda tick: tick.passive_torque,  # (side, joint) joint damping [N m]
+    "com": lambda tick: tick.measurement.com,  # (x, z) [m]
+    "com_velocity": lambda tick: tick.measurement.com_velocity,  # (x, z) [m/s]
+    "com_reference": lambda tick: tick.com_reference,  # (x, z) where the plan wants it now [m]
+    "ankle": lambda tick: tick.measurement.ankle,  # (side, (x, z)) ankle axes [m]
+    "contact": lambda tick: tick.measurement.contact,  # (side, contact, (x, z)) lowest points [m]
+    "force": lambda tick: tick.measurement.force,  # (side, contact, (forward, up)) mean of the tick [N]
+    "phase": lambda tick: tick.phase,  # (side,) of the leg controller [0, 1)
+    "stiffness": lambda tick: tick.stiffness[..., FEET],  # (side, (ankle, toe)) [N m/rad]
+    "equilibrium": lambda tick: tick.equilibrium[..., FEET],  # (side, (ankle, toe)) [rad]
+}
+"""Name -> what is taken of a tick. Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.physics.model`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """E episodes of up to T ticks of 10 ms; sample k stands at its end, (k + 1) * 10 ms; forces are its mean."""
+
+    policy: str
+    """What was run."""
+    settings: BipedSettings
+    """The environment it was run in."""
+    seed: int
+    """Episode i was seeded with seed + i."""
+    ticks: NDArray
+    """(E,) samples of each episode; series hold NaN beyond."""
+    returns: NDArray
+    """(E,) sum of the reward over each episode."""
+    fall_reason: NDArray
+    """(E,) why an episode ended early, "" where it did not."""
+    plan_com: NDArray
+    """(101, 2) planned CoM over percent of the step: x from the ankle of the foot whose stance began last, z [m]."""
+    series: dict[str, NDArray]
+    """Name -> (E, T, ...) float32, as listed in `SERIES`."""
+
+    def save(self, path: Path) -> None:
+        """Write `strides.npz`: the series and, as JSON text, what they are of. No object arrays."""
+        header = {
+            "policy": self.policy,
+            "settings": settings_to_json(self.settings),
+            "seed": self.seed,
+            "tick_s": TICK,
+            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS},
+        }
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com")}
+        np.savez(path, header=np.array(json.dumps(header)), **(arrays | dict[str, Any](self.series)))
+
+
+def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, BipedSettings]:
+    """A policy by name and the environment it is evaluated in.
+
+    Args:
+        name: a .safetensors file, a run folder (its best policy), `pretrained`, or a baseline of `schedules`.
+        given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
+        seed: of the baseline `random`.
+
+    Raises `SpringfootError` for an unknown name or a bad setting.
+    """
+    wanted = CONDITIONS | given
+    if name.partition(":")[0] in BASELINES:
+        who = settings_from(**{key: wanted[key] for key in _WHO})
+        settings = settings_from(**(own_settings(name, who) | wanted))
+        return baseline(name, settings, seed), settings
+    if name != "pretrained" and not Path(name).exists():
+        known = ", ".join(["pretrained", *BASELINES])
+        raise SpringfootError(f"no policy {name!r}: give a .safetensors file, a run folder, or one of {known}")
+    policy = load_policy(name)
+    return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
+
+
+def load_recording(path: Path) -> Recording:
+    """The recording in a `strides.npz`; raises `SpringfootError` for any other file."""
+    try:
+        with path.open("rb") as opened, np.load(opened) as file:
+            arrays = dict(file)
+        header: dict[str, Any] = json.loads(str(arrays.pop("header")))
+        series = {name: arrays.pop(name) for name in SERIES}
+        settings = settings_from(**header["settings"])
+        return Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
+    except SpringfootError as error:
+        raise SpringfootError(f"{path}: {error}") from None
+    except (OSError, EOFError, BadZipFile, ValueError, KeyError, TypeError, AttributeError):
+        raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py") from None
+
+
+def record(
+    policy: Policy,
+    settings: BipedSettings,
+    *,
+    name: str,
+    episodes: int = 20,
+    seed: int = 0,
+    threads: int = 2,
+    model: mujoco.MjModel | None = None,
+    legs: LegConstants | None = None,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> Recording:
+    """Run `episodes` episodes of `settings.episode_seconds` each, episode i seeded with `seed` + i.
+
+    Args:
+        policy: deterministic, observations to actions.
+        settings: of the environment.
+        name: what the policy is called in reports.
+        episodes: how many.
+        seed: of the first.
+        threads: of the physics; any number gives the same bits.
+        model: the body's with other options, as for `envs.physics.simulation.Simulation`.
+        legs: leg constants in place of the committed ones.
+        progress: told the simulated time [s] of all episodes together after every step.
+
+    Raises `SpringfootError` for settings that draw what may differ between episodes.
+    """
+    if any(getattr(settings, name) is not None for name in _RANGES):
+        raise SpringfootError(
+            f"a recording is of one body at one speed in one world: {', '.join(_RANGES)} must be None"
+        )
+    ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, (model, legs), progress)
+    return Recording(
+        policy=name,
+        settings=settings,
+        seed=seed,
+        ticks=ticks,
+        returns=returns,
+        fall_reason=reason,
+        plan_com=planned_com(walk_at(settings, settings.speed).plan),
+        series=series,
+    )
+
+
+def record_each(
+    policy: Policy,
+    settings: BipedSettings,
+    who: Mapping[str, ArrayLike],
+    *,
+    name: str,
+    seed: int = 0,
+    threads: int = 2,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> list[Recording]:
+    """As `record`, one episode for each of E bodies and speeds, side by side; a recording each, with its own settings.
+
+    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from. Raises
+    `SpringfootError` for settings whose commanded speed changes within an episode.
+    """
+    if settings.speed_interval is not None:
+        raise SpringfootError(
+            f"a recording is at one speed: speed_interval must be None, got {settings.speed_interval}"
+        )
+    columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
+    given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
+    ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, (None, None), progress)
+    recordings = []
+    for index in range(episodes):
+        own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(_RANGES)
+        alone, row = replace(settings, **own), slice(index, index + 1)
+        recordings.append(
+            Recording(
+                policy=name,
+                settings=alone,
+                seed=seed + index,
+                ticks=ticks[row],
+                returns=returns[row],
+                fall_reason=reason[row],
+                plan_com=planned_com(walk_at(alone, alone.speed).plan),
+                series={key: values[row] for key, values in series.items()},
+            )
+        )
+    return recordings
+
+
+def _walk(
+    policy: Policy,
+    settings: BipedSettings,
+    given: Mapping[str, NDArray],
+    episodes: int,
+    seed: int,
+    threads: int,
+    other: tuple[mujoco.MjModel | None, LegConstants | None],
+    progress: Callable[[float], object],
+) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
+    """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`; `other`
+    model and leg constants as in `record`."""
+    model, legs = other
+    step = settings.step_seconds
+    length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
+    ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
+    reason = np.full(episodes, "", dtype="U64")
+    series: dict[str, NDArray] = {}
+    for first in range(0, episodes, BATCH):
+        rows = slice(first, min(first + BATCH, episodes))
+        count = rows.stop - first
+        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs])
+        biped.reset(
+            np.arange(count), [seed + first + i for i in range(count)], None, {k: v[rows] for k, v in given.items()}
+        )
+
+        def keep(tick: Tick, rows: slice = rows) -> None:
+            index = int(ticks[rows].max())
+            for key, take in SERIES.items():
+                value = take(tick)
+                if key not in series:
+                    series[key] = np.full((episodes, length, *value.shape[1:]), np.nan, np.float32)
+                series[key][rows, index] = np.where(tick.active.reshape(-1, *[1] * (value.ndim - 1)), value, np.nan)
+            ticks[rows] += tick.active
+
+        biped.on_tick = keep
+        active = np.ones(count, bool)
+        observation = biped.observe()
+        while active.any():
+            result = biped.step(policy(observation), active=active)
+            observation = result.observation
+            returns[rows][active] += result.reward[active]
+            fell = active & result.terminated
+            reason[rows][fell] = result.info["termination"][fell]
+            progress(float(active.sum()) * biped.dt)
+            active &= ~(result.terminated | result.truncated)
+    return ticks, returns, reason, series
+
+
+def planned_com(plan: WalkPlan) -> NDArray:
+    """(101, 2) CoM of a `WalkPlan` over percent of the step: x from the stance ankle, z [m]."""
+    # Percent 100 is the end of this step, not the beginning of the next.
+    step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
+    return np.stack(plan.com(step_phase), -1)

@@ -1,0 +1,213 @@
+"""What an evaluation leaves behind: the table in the terminal, and a folder of files.
+
+metrics.json                    every number
+gait_cycle.csv, _left, _right   mean curves over percent of stride, and their spread
+strides.npz                     the 100 Hz series all of it is computed from
+gait.png, walk.gif              pictures
+"""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from springfoot.envs.settings import reference_gait, settings_from
+from springfoot.gait import HumanGait
+from springfoot.gait import scores as score
+from springfoot.gait.cycle import PERCENT
+
+from .animation import save_animation
+from .gait_figure import save_gait_figure
+from .metrics import Gait
+from .recording import Recording
+from .stride_curves import Curves
+
+MISSING = "–"
+
+
+def write_report(folder: Path, recording: Recording, gait: Gait) -> None:
+    """Write every file of an evaluation into the existing `folder`."""
+    text = json.dumps(gait.metrics, indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+    left, right = gait.feet
+    for name, curves in (("gait_cycle", gait.both), ("gait_cycle_left", left), ("gait_cycle_right", right)):
+        write_gait_cycle(folder / f"{name}.csv", curves, gait.metrics)
+    recording.save(folder / "strides.npz")
+    save_gait_figure(folder / "gait.png", recording, gait)
+    save_animation(folder / "walk.gif", recording)
+
+
+def write_gait_cycle(path: Path, curves: Curves, metrics: dict[str, Any]) -> None:
+    """One gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
+
+    The leading columns repeat the whole gait's values on each row, as in the reference data.
+    """
+    cadence = metrics["cadence_steps_min"]
+    leading = {
+        "speed_m_s": metrics["speed_m_s"]["mean"],
+        "condition": metrics["policy"],
+        "source": "springfoot",
+        "n": curves.count,
+        "stride_time_s": 120 / cadence if cadence else None,
+        "step_length_m": metrics["step_length_m"],
+        "toe_off_percent": metrics["toe_off_percent"],
+    }
+    columns = {}
+    for name in curves.names:
+        columns[name], columns[f"{name}_sd"] = curves.mean(name), curves.sd(name)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["percent", *leading, *columns])
+        for percent in PERCENT:
+            values = [*leading.values(), *(column[percent] for column in columns.values())]
+            writer.writerow([percent, *map(_cell, values)])
+
+
+def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
+    """The evaluation in a readable table, people beside the model; plain text where the output is no terminal."""
+    console = console or Console(highlight=False)
+    environment, people = metrics["environment"], metrics["reference"]
+    pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
+    console.print(
+        f"\n[bold]{metrics['policy']}[/] on {environment['height']:g} m, {environment['mass']:g} kg, "
+        f"{environment['speed']:g} m/s, equilibrium {environment['equilibrium']}{pushes}",
+        soft_wrap=True,
+    )
+    who = "people" if environment["human"] is None else "own"
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    for name in ("", "", "model", who, "r", "in ±SD"):
+        table.add_column(
+            name, justify="right" if name else "left", style="bold" if name == "model" else "", no_wrap=True
+        )
+    for section in _sections(metrics):
+        for row in section:
+            table.add_row(*row)
+        table.add_section()
+    console.print(table)
+    for reason, count in metrics["fall_reasons"].items():
+        console.print(f"{count} × {reason}")
+    if environment["human"] is not None:
+        borrowed = ", ".join(people["borrowed"]) or "nothing"
+        console.print(f"own: {people['condition']}; people's instead: {borrowed}", soft_wrap=True)
+    console.print(
+        f"{who} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean curves,\n"
+        "the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing",
+        soft_wrap=True,
+    )
+
+
+Row = tuple[str, str, str, str, str, str]
+"""What, unit, model, people, r, share inside people's mean ± SD."""
+
+
+def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
+    """The table's rows, in groups."""
+    people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
+    grf, their_grf, com = metrics["grf"], people["grf"], metrics["com"]
+    works, rest = metrics["ankle_work_J_kg"], metrics["came_to_rest"]
+    at_rest = [] if rest is None else [("came to rest", "", f"{rest} of {metrics['episodes']}", "", "", "")]
+
+    def row(
+        label: str, unit: str, value: Any, pattern: str, their: Any = None, r: Any = None, inside: Any = None
+    ) -> Row:
+        if isinstance(value, dict):
+            spread = f" ± {_text(value['sd'], pattern)}" if value["sd"] is not None else ""
+            value, text = value["mean"], _text(value["mean"], pattern) + spread
+        else:
+            text = _text(value, pattern)
+        share = "" if inside is None else f"{inside:.0f} %"
+        return label, unit, text, "" if their is None else _text(their, pattern), "" if r is None else f"{r:.2f}", share
+
+    def mm(label: str, value: float | None, r: float | None = None) -> Row:
+        return row(label, "mm", None if value is None else 1000 * value, ".0f", None, r)
+
+    return [
+        [
+            ("falls", "", f"{metrics['falls']} of {metrics['episodes']}", "", "", ""),
+            *at_rest,
+            row("return", "", metrics["return"], ".1f"),
+            row("speed", "m/s", metrics["speed_m_s"], ".3f", people["speed_m_s"]),
+            row("step length", "m", metrics["step_length_m"], ".3f", people["step_length_m"]),
+            row("cadence", "steps/min", metrics["cadence_steps_min"], ".1f", people["cadence_steps_min"]),
+            row("double support", "s", metrics["double_support_s"], ".3f", people["double_support_s"]),
+            row("toe-off", "%", metrics["toe_off_percent"], ".1f", people["toe_off_percent"]),
+        ],
+        [
+            row(f"{name} angle, RMSE", "deg", v["rmse_deg"], ".1f", None, v["r"], v["within_1sd_percent"])
+            for name, v in metrics["joints"].items()
+        ],
+        [
+            row("vertical force, peak 1", "BW", grf["vertical_peak1_bw"], ".2f", their_grf["vertical_peak1_bw"]),
+            row(
+                *("vertical force, valley", "BW", grf["vertical_valley_bw"], ".2f"),
+                their_grf["vertical_valley_bw"],
+                grf["vertical_r"],
+            ),
+            row("vertical force, peak 2", "BW", grf["vertical_peak2_bw"], ".2f", their_grf["vertical_peak2_bw"]),
+            row("vertical force, largest", "BW", grf["vertical_max_bw"], ".2f"),
+            row(
+                *("braking force", "BW", grf["braking_peak_bw"], ".2f"),
+                their_grf["braking_peak_bw"],
+                grf["forward_r"],
+            ),
+            row("forward force", "BW", grf["forward_peak_bw"], ".2f", their_grf["forward_peak_bw"]),
+        ],
+        [
+            row(f"{name} moment, peak", "N·m/kg", v["peak_Nm_kg"], ".2f", people["moments"].get(name), v["r"])
+            for name, v in metrics["moments"].items()
+        ]
+        + [
+            row(f"ankle work, {sign}", "J/kg", works[sign], ".2f", people["ankle_work_J_kg"][sign])
+            for sign in ("positive", "negative")
+        ]
+        + [row("cost of transport", "", metrics["cost_of_transport"], ".3f")],
+        [
+            mm("CoM x to plan, RMSE", com["x_rmse_m"]),
+            mm("CoM z to plan, RMSE", com["z_rmse_m"], com["z_r"]),
+            mm("CoM rise", com["rise_m"]),
+            mm("toe clearance", metrics["toe_clearance_m"]),
+            mm("contact travel a stance", metrics["contact_travel_m"]),
+        ],
+        [
+            (f"{name} stiffness", "N·m/rad", "/".join(_text(v, ".0f") for v in values.values()), "", "", "")
+            for name, values in metrics["stiffness_Nm_rad"].items()
+        ],
+    ]
+
+
+def people_metrics(human: HumanGait) -> dict[str, Any]:
+    """People's own values, or those of own data, from their mean curves; keys as in metrics."""
+    phase = PERCENT / 100
+    features = score.force_features(human.mean("grf_vertical", phase), human.mean("grf_forward", phase))
+    positive, negative = score.stride_work(human.mean("ankle_power", phase)[None], np.array([human.stride_time]))
+    return {
+        "speed_m_s": human.speed,
+        "step_length_m": human.step_length,
+        "cadence_steps_min": 120 / human.stride_time,
+        "double_support_s": (human.toe_off - 0.5) * human.stride_time,
+        "toe_off_percent": 100 * human.toe_off,
+        "grf": {
+            "vertical_peak1_bw": features.vertical_peak1,
+            "vertical_valley_bw": features.vertical_valley,
+            "vertical_peak2_bw": features.vertical_peak2,
+            "braking_peak_bw": features.braking_peak,
+            "forward_peak_bw": features.forward_peak,
+        },
+        "moments": {name: score.largest(human.mean(f"{name}_moment", phase))[0] for name in ("hip", "knee", "ankle")},
+        "ankle_work_J_kg": {"positive": float(positive[0]), "negative": float(negative[0])},
+    }
+
+
+def _text(value: float | None, pattern: str) -> str:
+    return MISSING if value is None else format(value, pattern)
+
+
+def _cell(value: Any) -> Any:
+    if value is None or (isinstance(value, float) and not np.isfinite(value)):
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else value

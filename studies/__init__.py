@@ -1,0 +1,1 @@
+"""Many walks held against each other; each runs as `springfoot study NAME`."""

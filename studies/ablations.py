@@ -1,0 +1,322 @@
+"""Ablations: what each part of preset `walk` contributes, trained without it, and each input of the fixed walk.
+
+    python -m springfoot.studies.ablations --out runs/ablations --seeds 3 --constant 298 112 --page docs/results.md
+
+Every row differs from the preset in its flags and in nothing else. A seed that is finished is not trained again, nor
+measured again, so the command may be stopped, begun anew with more rows or seeds, and run with `--no-train` to write
+the page from what there is. All rows earn the default reward when measured, so their returns compare.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+from itertools import product
+from operator import getitem
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from springfoot.agents.command_line import exit_code
+from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.files import write_atomically
+from springfoot.agents.multi_seed import is_finished, train_missing
+from springfoot.envs.control.equilibrium import PLATEAUS, foot_curves
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.settings import BipedSettings, reference_gait, settings_from, settings_to_json
+from springfoot.envs.timing import ACTION_STEP
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.report import people_metrics
+from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.gait.scores import mean_sd
+from springfoot.gait.stiffness import SPRINGS, Segment, StiffnessSchedule
+
+from .markdown import MISSING, table, text_of, write_section
+
+ABLATIONS: dict[str, dict[str, Any]] = {
+    "walk": {},
+    "absolute": {"action_mode": "absolute"},
+    "plan-moments": {"feedforward": "plan"},
+    "neutral": {"equilibrium": "neutral"},
+    "phase": {"equilibrium": "phase"},
+    "100hz": {"decisions": "100hz"},
+    "25hz": {"decisions": "25hz"},
+    "event": {"decisions": "event"},
+    "no-com": {"reward_weights": {"com_x": 0.0, "com_z": 0.0}},
+    "no-pose": {"reward_weights": {"pose": 0.0}},
+    "no-k-cost": {"reward_weights": {"stiffness": 0.0, "stiffness_rate": 0.0}},
+    "ankle-only": {"stiffness_joints": "ankle"},
+    "toe-only": {"stiffness_joints": "toe"},
+}
+"""Environment settings in which each training differs from preset `walk` (planned, residual, 50 Hz, all terms,
+both joints); `phase` also has the schedule of `phase_schedule`."""
+MEANING = {
+    "walk": "the preset: planned equilibrium, 50 Hz, every reward term, ankle and toe",
+    "absolute": "K anywhere in its range, in place of a factor on the fixed schedule",
+    "plan-moments": "moments fed forward from the plan's inverse dynamics, not people's; leg constants of its own",
+    "neutral": "θ_eq constant, on the leg constants of `neutral`",
+    "phase": "θ_eq constant in each of ten phases, the planned one's mean",
+    "100hz": "K decided at 100 Hz",
+    "25hz": "K decided at 25 Hz",
+    "event": "K decided at heel strike, foot flat, heel-off and toe-off of each leg",
+    "no-com": "without reward for the CoM's x and z",
+    "no-pose": "without reward for joint angles",
+    "no-k-cost": "without cost of K and of changing it",
+    "ankle-only": "toe with the fixed schedule",
+    "toe-only": "ankle with the fixed schedule",
+}
+KNOTS = ("hip_knots_deg", "knee_knots_deg", "ankle_knots_deg")
+INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
+    "all inputs": lambda c: c,
+    "no moments of hip and knee fed forward": lambda c: replace(c, feedforward=(0.0, 0.0, c.feedforward[2])),
+    "no ankle moment fed forward": lambda c: replace(c, feedforward=(*c.feedforward[:2], 0.0)),
+    "no knots": lambda c: replace(c, **{name: (0.0,) * len(getattr(c, name)) for name in KNOTS}),
+    "no speed feedback to the stance hip": lambda c: replace(c, speed_torque=0.0),
+    "no foot placement by speed": lambda c: replace(c, swing_speed_gain=0.0),
+}
+"""Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
+_JOINTS = ("thigh", "knee", "ankle")
+QUANTITIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("falls", ".1f", ("undisturbed", "falls")),
+    ("pushed", ".1f", ("pushed", "falls")),
+    ("return", ".0f", ("undisturbed", "return", "mean")),
+    ("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
+    *((f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in _JOINTS),
+    *((f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
+    ("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
+    ("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
+    ("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
+    ("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
+)
+"""Columns of every table: format of each number, and its place in the metrics of a row."""
+
+RESULT = "ablation.json"
+"""In a trained row's folder, what was measured of it."""
+
+
+def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
+    """The planned equilibrium and fixed schedule of `settings`, constant on and between the plateaus of K: ten springs.
+
+    Each has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer, as between gait events,
+    the fixed schedule falls.
+    """
+    walk = walk_at(settings, settings.speed)
+    planned = replace(settings, equilibrium="planned", schedule=None)
+    rest, stiffness = foot_curves(planned, walk.constants[0], walk)
+    place = np.searchsorted(PLATEAUS, GRID, side="right") - 1
+    segments: list[list[Segment]] = [[], []]
+    for index, start in enumerate(PLATEAUS):
+        for joint, own in enumerate(segments):
+            k, theta = stiffness[place == index, joint], rest[place == index, joint]
+            own.append(Segment(start, float(k.mean()), float((k * theta).mean() / k.mean())))
+    return StiffnessSchedule(**dict(zip(SPRINGS, map(tuple, segments), strict=True)))
+
+
+def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> TrainingConfig:
+    """The training of a row: as much walking as the preset's, or as `timesteps` of 20 ms, whatever the step."""
+    preset = PRESETS["walk"]
+    own = dict(ABLATIONS[name])
+    if name == "phase":
+        own["schedule"] = phase_schedule(preset.environment).to_json()
+    environment = settings_from(**settings_to_json(preset.environment) | own)
+    pace = ACTION_STEP / environment.step_seconds
+    return replace(
+        preset,
+        seed=seed,
+        environment=environment,
+        timesteps=round(pace * (timesteps or preset.timesteps)),
+        update_steps=round(pace * preset.update_steps),
+        eval_interval=round(pace * preset.eval_interval),
+    )
+
+
+def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> list[tuple[TrainingConfig, Path, str]]:
+    """Each row and seed to train: configuration, folder and what it is called."""
+    order = product(range(seeds), names)  # every row once before any twice
+    return [
+        (config_of(name, seed, timesteps), out / name / f"seed-{seed}", f"{name}, seed {seed}") for seed, name in order
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """How every row is measured."""
+
+    episodes: int = 20
+    """Episodes of each row, and of each seed, undisturbed, and as many pushed."""
+    seconds: float = 20.0
+    """Length of each."""
+    push_newton: float = 150.0
+    """Size of the pushes [N]."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+
+    def of(self, policy: str, given: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
+        """The policy's metrics `undisturbed` and `pushed`, with the default reward."""
+        metrics = {}
+        for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
+            wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})
+            walker, settings = prepare(policy, wanted)
+            how: dict[str, Any] = {"episodes": self.episodes, "threads": self.threads, "legs": legs}
+            metrics[condition] = measure(record(walker, settings, name=policy, **how)).metrics
+        return metrics
+
+    @property
+    def sentence(self) -> str:
+        """What the columns are of."""
+        return (
+            f"Falls of {self.episodes} episodes × {self.seconds:g} s, undisturbed and pushed by "
+            f"±{self.push_newton:g} N, the same seeds in every row; all else undisturbed: return of the default "
+            "reward, speed, RMSE of thigh, knee and ankle to people's mean, vertical force peaks, r of both forces "
+            "with people's, largest ankle moment and where in the stride. What falls is measured before its falls."
+        )
+
+
+def measured(path: Path, how: Measurement, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """What `make` found, kept in the file `path` as long as neither `how` nor `key` changes."""
+    asked = json.loads(json.dumps({"how": {**vars(how), "threads": None}, "of": key}))
+    if path.is_file():
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["asked"] == asked:
+            return kept["metrics"]
+    metrics = make()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, (json.dumps({"asked": asked, "metrics": metrics}, indent=1) + "\n").encode())
+    return metrics
+
+
+def trained(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
+    """Row -> the metrics of each of its finished seeds, in order; rows without any are left out."""
+    rows = {}
+    for name in ABLATIONS:
+        folders = sorted((out / name).glob("seed-*"), key=lambda each: int(each.name.removeprefix("seed-")))
+        done = [folder for folder in folders if is_finished(folder)]
+        if done:
+            rows[name] = [measured(each / RESULT, how, name, partial(how.of, str(each))) for each in done]
+    return rows
+
+
+def inputs(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
+    """Each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
+    own = walk_at(BipedSettings(), BipedSettings().speed).constants[0]
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for number, (name, change) in enumerate(INPUTS.items()):
+        legs = change(own)
+        make = partial(how.of, "schedule", legs=legs)
+        rows[name] = [measured(out / f"input-{number}.json", how, vars(legs), make)]
+    make = partial(how.of, "schedule", {"equilibrium": "angle"})
+    return rows | {"θ_eq: people's ankle angle alone": [measured(out / "input-angle.json", how, vars(own), make)]}
+
+
+def fixed(out: Path, how: Measurement, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
+    """The thesis's straight lines, and before them the best `constant` (ankle, toe) [N m/rad] where it is known."""
+    names = {"thesis lines": "thesis"}
+    if constant is not None:
+        names = {"best fixed spring": "constant:{:g},{:g}".format(*constant)} | names
+    return {
+        f"{label} (`{name}`)": [measured(out / f"{name.partition(':')[0]}.json", how, name, partial(how.of, name))]
+        for label, name in names.items()
+    }
+
+
+def rows_table(rows: dict[str, list[dict[str, Any]]], head: str, people: bool = False) -> str:
+    """Markdown: rows down, `QUANTITIES` across, mean ± SD (n - 1) over the seeds of a row that has several."""
+    lines = []
+    for name, seeds in rows.items():
+        cells = [name, str(len(seeds))]
+        for _, pattern, keys in QUANTITIES:
+            found: list[Any] = [reduce(getitem, keys, each) for each in seeds]
+            values = [value for value in found if value is not None]
+            spread = mean_sd(values)
+            whole = pattern == ".1f" and keys[-1] == "falls" and len(values) == 1
+            mean = text_of(spread["mean"], ".0f" if whole else pattern)
+            cells.append(mean if spread["sd"] is None else f"{mean} ± {text_of(spread['sd'], pattern)}")
+        lines.append(cells)
+    if people:
+        theirs = people_metrics(reference_gait(BipedSettings()))
+        known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
+        known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
+        lines.append(["people", MISSING, *(_known(known, pattern, keys) for _, pattern, keys in QUANTITIES)])
+    return table([head, "seeds", *(label for label, _, _ in QUANTITIES)], lines)
+
+
+def _known(metrics: dict[str, Any], pattern: str, keys: tuple[str, ...]) -> str:
+    """A number of people's, where there is one."""
+    value: Any = metrics
+    for key in keys[1:]:
+        value = value.get(key) if isinstance(value, dict) else None
+    return text_of(value, pattern)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flags:
+    """Train preset `walk` without each of its parts, measure, and write the tables."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/ablations")
+    """Folder of all trainings and results; what is finished in it is kept."""
+    seeds: int = 3
+    """Seeds of each training, 0 and the next ones."""
+    only: tuple[str, ...] = ()
+    """Rows to train, all of them unless given."""
+    timesteps: int | None = None
+    """Steps of 20 ms of each training, the preset's unless given."""
+    train: bool = True
+    """Train what is missing; without, use what there is."""
+    constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
+    """Best fixed spring [N m/rad], as `springfoot.studies.comparison best-constant` finds it."""
+    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Also write the ablations into this page, between the markers of ABLATIONS and INPUTS."""
+    readme: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Also write the table of springs into this page, between the markers of SPRINGS."""
+    how: tyro.conf.OmitArgPrefixes[Measurement] = Measurement()
+    """How to measure."""
+
+
+def run(flags: Flags) -> int:
+    """Train, measure, print and write."""
+    how = flags.how
+    for name, count in (("seeds", flags.seeds), ("episodes", how.episodes), ("threads", how.threads)):
+        require_count(name, count)
+    if flags.timesteps is not None:
+        require_count("timesteps", flags.timesteps)
+    require_number("seconds", how.seconds, ACTION_STEP, unit="s")
+    for name in flags.only:
+        if name not in ABLATIONS:
+            raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
+    status = "finished"
+    if flags.train:
+        status = train_missing(jobs(flags.out, flags.only or tuple(ABLATIONS), flags.seeds, flags.timesteps))
+        if status == "interrupted":
+            return 130
+    rows = trained(flags.out, how)
+    springs = fixed(flags.out, how, flags.constant)
+    learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
+    springs |= {f"{label} (`{name}`)": rows[name] for name, label in learned.items() if name in rows}
+    sections = {
+        "SPRINGS": rows_table(springs, "spring", people=True),
+        "ABLATIONS": rows_table({f"`{name}`: {MEANING[name]}": each for name, each in rows.items()}, "training"),
+        "INPUTS": rows_table(inputs(flags.out, how), "fixed schedule"),
+    }
+    ran = f"{how.sentence} Mean ± SD over training seeds. Made by `python -m springfoot.studies.ablations`."
+    for name, text in sections.items():
+        print(f"{text}\n")
+        target = flags.readme if name == "SPRINGS" else flags.page
+        if target is not None:
+            write_section(target, name, f"{text}\n\n{ran}" if name != "INPUTS" else text)
+    return 1 if status == "failed" else 0
+
+
+def main() -> int:
+    """Exit code: 0 done, 1 a training failed, 2 bad input, 130 ended by Ctrl-C."""
+    flags = tyro.cli(Flags, prog="springfoot.studies.ablations", description=__doc__)
+    return exit_code("ablations", lambda: run(flags))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

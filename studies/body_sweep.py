@@ -1,0 +1,183 @@
+"""Many bodies at many speeds: one episode of a policy for each pair drawn, held against people at its Froude speed.
+
+    python -m springfoot.studies.comparison bodies pretrained --pairs 300
+
+Heights, masses and speeds are drawn independently and evenly over the ranges of `train.py --preset any-body`; a
+height and a mass that make no body (`springfoot.gait.body.BMI_RANGE`) are drawn again.
+"""
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from springfoot.agents.baselines import Policy
+from springfoot.agents.command_line import policy_label
+from springfoot.agents.config import PRESETS
+from springfoot.agents.files import next_free, write_atomically
+from springfoot.agents.flags import SettingsFlags, given
+from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.subjects import DRAWN, Subjects
+from springfoot.envs.settings import BipedSettings, body_of, reference_gait
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.recording import BATCH, Recording, prepare, record_each
+from springfoot.gait.errors import SpringfootError, require_count
+
+from .markdown import table
+
+RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
+"""What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
+JOINTS = ("thigh", "knee", "ankle")
+"""Whose angles are compared; people's toe is that of other people."""
+PAIRS = "pairs.csv"
+"""Name of the file with a row for each pair."""
+WORST_FALLS = 10
+"""Falls that are told one by one."""
+
+QUANTITIES = (
+    ("speed error %", "speed_error_percent", ".1f", abs),
+    *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in JOINTS),
+    ("vertical force r", "grf_vertical_r", ".3f", lambda r: -r),
+)
+"""Label, column, format, and how bad a value is."""
+
+
+def draw_pairs(settings: BipedSettings, pairs: int, seed: int = 0) -> dict[str, NDArray]:
+    """`height` [m], `mass` [kg] and `speed` [m/s], (pairs,) each, drawn as at a reset of `settings`."""
+    subjects = Subjects(settings, tabulated_speeds(settings), pairs)
+    subjects.reset(np.arange(pairs), [np.random.default_rng(seed)] * pairs)
+    height, mass = np.array([(body.height, body.mass) for body in subjects.bodies]).T
+    return {"height": height, "mass": mass, "speed": subjects.speed}
+
+
+def walk_pairs(
+    policy: Policy,
+    settings: BipedSettings,
+    who: Mapping[str, NDArray],
+    *,
+    name: str,
+    seed: int = 0,
+    threads: int = 2,
+    block: int = BATCH,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> list[dict[str, Any]]:
+    """One episode of each pair, and its numbers as in pairs.csv (docs/metrics.md); None where there is none.
+
+    Arguments as for `recording.record_each`; `block` pairs at a time, whose series are then let go.
+    """
+    rows = []
+    for first in range(0, len(who["height"]), block):
+        part = {key: values[first : first + block] for key, values in who.items()}
+        recordings = record_each(
+            policy, settings, part, name=name, seed=seed + first, threads=threads, progress=progress
+        )
+        rows += [_row(recording) for recording in recordings]
+    return rows
+
+
+def _row(recording: Recording) -> dict[str, Any]:
+    metrics, settings = measure(recording).metrics, recording.settings
+    speed = metrics["speed_m_s"]["mean"]
+    return {
+        "height_m": settings.height,
+        "mass_kg": settings.mass,
+        "speed_m_s": settings.speed,
+        "froude_speed": body_of(settings).froude_speed(settings.speed),
+        "people_clamped": int(reference_gait(settings).clamped),
+        "seconds": metrics["seconds_mean"],
+        "fall": str(recording.fall_reason[0]),
+        "measured_speed_m_s": speed,
+        "speed_error_percent": None if speed is None else 100 * (speed / settings.speed - 1),
+        **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in JOINTS},
+        "grf_vertical_r": metrics["grf"]["vertical_r"],
+    }
+
+
+def pairs_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """One line for each pair; empty where there is no number."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(rows[0])
+    for row in rows:
+        writer.writerow([f"{value:.6g}" if isinstance(value, float) else value for value in row.values()])
+    return text.getvalue()
+
+
+def pairs_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst."""
+    fallen = [row for row in rows if row["fall"]]
+    lines: list[tuple[str, ...]] = [("falls", f"{len(fallen)} of {len(rows)}", "", "", "")]
+    for label, column, pattern, badness in QUANTITIES:
+        standing = [row for row in rows if not row["fall"] and row[column] is not None]
+        standing.sort(key=lambda row, column=column, badness=badness: badness(row[column]))
+        if standing:
+            size = [abs(row[column]) for row in standing]
+            most = size[int(np.ceil(0.95 * len(size))) - 1]
+            numbers = [format(value, pattern) for value in (np.median(size), most, size[-1])]
+            lines.append((label, *numbers, _who(standing[-1])))
+    text = table(("", "median", "95 % within", "worst", "worst pair"), lines)
+    told = [f"{_who(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
+    return "\n".join([text, "", *told]).rstrip("\n")
+
+
+def _who(row: Mapping[str, Any]) -> str:
+    return f"{row['height_m']:.2f} m, {row['mass_kg']:.0f} kg, {row['speed_m_s']:.2f} m/s"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bodies:
+    """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs."""
+
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
+    """Any policy of evaluate.py."""
+    pairs: int = 300
+    """Bodies and speeds drawn, from --height-range, --mass-range and --speed-range."""
+    seconds: float = 20.0
+    """Length of the one episode of each."""
+    seed: int = 0
+    """Of the draw; the episode of pair i is seeded with seed + i."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/bodies-POLICY-N)")
+    ] = None
+    """New folder for pairs.csv, a row for each pair."""
+    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
+    """What to walk in; a trained policy brings its own settings, standard conditions aside."""
+
+    def run(self) -> None:
+        """Walk every pair, write pairs.csv and print the table."""
+        for name, least in (("pairs", 1), ("seed", 0), ("threads", 1)):
+            require_count(name, getattr(self, name), least)
+        label = policy_label(self.policy)
+        out = self.out or next_free(Path("runs"), f"bodies-{label}")
+        if out.exists():
+            raise SpringfootError(f"{out} exists already; give --out a new folder")
+        conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
+        policy, settings = prepare(self.policy, conditions, self.seed)
+        who, how = draw_pairs(settings, self.pairs, self.seed), {"seed": self.seed, "threads": self.threads}
+        total = self.pairs * settings.episode_seconds
+        with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
+            rows = walk_pairs(policy, settings, who, name=label, progress=bar.update, **how)
+        out.mkdir(parents=True)
+        write_atomically(out / PAIRS, pairs_csv(rows).encode())
+        clamped = sum(row["people_clamped"] for row in rows)
+        print(
+            f"{pairs_table(rows)}\n\n`{self.policy}`, {self.pairs} pairs × {settings.episode_seconds:g} s, seed "
+            f"{self.seed}: {_ranges(settings)}, independent and even. Of the pairs that did not fall; {clamped} of all "
+            f"lie beyond people's measured speeds, and are held against the nearest.\nResults: {out / PAIRS}"
+        )
+
+
+def _ranges(settings: BipedSettings) -> str:
+    """What was drawn from, in words."""
+    units = dict(zip(DRAWN, ("m", "kg", "m/s"), strict=True))
+    spans = {name: getattr(settings, f"{name}_range") for name in DRAWN}
+    return ", ".join(f"{span[0]:g}–{span[1]:g} {units[name]}" for name, span in spans.items())

@@ -1,0 +1,249 @@
+"""Do seeds agree? The springs of several policies over the stride, and which limits of a human-like walk each misses.
+
+    python -m springfoot.studies.seed_agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --out docs/agreement.png
+
+Stiffness alone is not identified (`springfoot.studies.identifiability`), so K stands beside the equilibrium and the torque.
+K of a joint is judged where that joint carries load, by its coefficient of variation (SD / mean) over the policies.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import matplotlib
+import numpy as np
+import tyro
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from springfoot.agents.command_line import exit_code
+from springfoot.agents.files import write_atomically
+from springfoot.evaluation.criteria import HUMAN_LIKE, Limit, number_text, numbers
+from springfoot.evaluation.gait_figure import STYLE
+from springfoot.evaluation.metrics import Gait, measure
+from springfoot.evaluation.recording import prepare, record
+from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import SpringfootError, require_count
+
+from .markdown import table, write_section
+
+SECTION = "AGREEMENT"
+"""Of the results page."""
+LOADED = 0.1
+"""A joint carries load where its moment is beyond this share of its largest."""
+MOST = 0.15
+"""Coefficient of variation of K over seeds up to which they agree, wherever the joint carries load."""
+CURVES = {
+    "ankle": ("ankle_stiffness_Nm_per_rad", "ankle_equilibrium_deg", "ankle_moment_Nm_per_kg"),
+    "toe": ("toe_stiffness_Nm_per_rad", "mtp_equilibrium_deg", "mtp_moment_Nm_per_kg"),
+}
+"""Joint -> columns of gait_cycle.csv: K, theta_eq, torque."""
+COLORS = {"ankle": "#0b6e8f", "toe": "#c26a1b"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Agreement:
+    """One joint's springs over the stride, of S policies; curves (S, 101) over percent."""
+
+    joint: str
+    stiffness: NDArray
+    """K [N m/rad]."""
+    equilibrium: NDArray
+    """theta_eq [deg]."""
+    torque: NDArray
+    """Moment, plantarflexion positive [N m/kg]."""
+
+    @property
+    def loaded(self) -> NDArray:
+        """(101,) where the joint carries load: the mean moment is beyond `LOADED` of its largest."""
+        size = np.abs(self.torque.mean(axis=0))
+        return size > LOADED * size.max()
+
+    @property
+    def variation(self) -> NDArray:
+        """(101,) coefficient of variation of K over the policies, SD with n - 1."""
+        return self.stiffness.std(axis=0, ddof=1) / self.stiffness.mean(axis=0)
+
+    @property
+    def worst(self) -> tuple[float, int]:
+        """Largest coefficient of variation under load, and its percent of the stride."""
+        percent = int(np.where(self.loaded, self.variation, -1.0).argmax())
+        return float(self.variation[percent]), percent
+
+    @property
+    def agree(self) -> bool:
+        """Whether the policies do, at every percent under load."""
+        return self.worst[0] <= MOST
+
+
+def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
+    """Ankle and toe of two gaits or more; raises `SpringfootError` for fewer, and for one without strides."""
+    if len(gaits) < 2:
+        raise SpringfootError(f"agreement needs two policies or more, got {len(gaits)}")
+    if idle := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
+        raise SpringfootError(f"{idle[0]} walks no strides to compare")
+    found = []
+    for joint, names in CURVES.items():
+        stiffness, equilibrium, torque = (np.stack([gait.both.mean(name) for gait in gaits]) for name in names)
+        found.append(Agreement(joint=joint, stiffness=stiffness, equilibrium=equilibrium, torque=torque))
+    return found
+
+
+def agreement_table(found: Sequence[Agreement]) -> str:
+    """Markdown: how far the springs of each joint vary over the policies where it carries load."""
+    head = ["joint", "carries load at", "CV of K: mean", "95th percentile", "worst", f"≤ {100 * MOST:.0f} %"]
+    head += ["SD of θ_eq: mean, worst", "SD of torque / peak: mean, worst"]
+    lines = []
+    for each in found:
+        loaded, (worst, percent) = each.loaded, each.worst
+        variation = 100 * each.variation[loaded]
+        rest = each.equilibrium.std(axis=0, ddof=1)[loaded]
+        torque = 100 * each.torque.std(axis=0, ddof=1)[loaded] / np.abs(each.torque.mean(axis=0)).max()
+        lines.append(
+            [
+                each.joint,
+                f"{_stretches(loaded)} % of the stride",
+                f"{variation.mean():.1f} %",
+                f"{np.percentile(variation, 95):.1f} %",
+                f"{100 * worst:.1f} % at {percent} %",
+                "agree" if each.agree else "**do not agree**",
+                f"{rest.mean():.2f}°, {rest.max():.2f}°",
+                f"{torque.mean():.1f} %, {torque.max():.1f} %",
+            ]
+        )
+    return table(head, lines)
+
+
+def _stretches(mask: NDArray) -> str:
+    """Where a mask over percent is true, in words: "2–60, 95–100"."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
+
+
+def limits_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str:
+    """Markdown: every limit and its number in each evaluation; in bold what is missed even when loosened.
+
+    A number in brackets meets the loosened limit alone. The last row counts.
+    """
+    measured = [numbers(each) for each in metrics]
+    lines, missed = [], [0] * len(measured)
+    for limit in HUMAN_LIKE:
+        cells = []
+        for column, values in enumerate(measured):
+            state = _state(limit, values)
+            missed[column] += state == "**"
+            cells.append({"": "{}", "(": "({})", "**": "**{}**"}[state].format(number_text(limit, values)))
+        loose = limit.loosened()
+        lines.append([limit.name, limit.text, loose.text if loose != limit else "", *cells])
+    lines.append(["missed", "", "", *map(str, missed)])
+    return table(["", "limit", "loosened", *(f"`{name}`" for name in names)], lines)
+
+
+def _state(limit: Limit, values: dict[str, Any]) -> str:
+    if limit.holds(values):
+        return ""
+    return "(" if limit.loosened().holds(values) else "**"
+
+
+def csv_text(found: Sequence[Agreement]) -> str:
+    """CSV over percent of the stride: mean and SD over the policies of K, theta_eq and torque, CV of K, load."""
+    columns: dict[str, NDArray] = {"percent": PERCENT}
+    for each in found:
+        for name, curves in zip(CURVES[each.joint], (each.stiffness, each.equilibrium, each.torque), strict=True):
+            columns |= {name: curves.mean(axis=0), f"{name}_sd": curves.std(axis=0, ddof=1)}
+        columns |= {f"{each.joint}_stiffness_cv": each.variation, f"{each.joint}_loaded": each.loaded.astype(int)}
+    rows = (",".join(f"{value:.6g}" for value in row) for row in zip(*columns.values(), strict=True))
+    return "\n".join([",".join(columns), *rows]) + "\n"
+
+
+def save_figure(path: Path, found: Sequence[Agreement]) -> None:
+    """Write the picture: K, equilibrium and torque of each policy over the stride, grey where no load is carried."""
+    titles = ("stiffness K", "equilibrium θ_eq", "torque")
+    units = ("N·m/rad", "dorsiflexion, toe up (deg)", "plantarflexion (N·m/kg)")
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+        for row, each in zip(figure.subplots(len(found), 3, squeeze=False), found, strict=True):
+            for ax, curves, title, unit in zip(
+                row, (each.stiffness, each.equilibrium, each.torque), titles, units, strict=True
+            ):
+                mean, sd = curves.mean(axis=0), curves.std(axis=0, ddof=1)
+                ax.fill_between(PERCENT, mean - sd, mean + sd, color=COLORS[each.joint], alpha=0.22, lw=0)
+                ax.plot(PERCENT, curves.T, color=COLORS[each.joint], lw=0.9, alpha=0.8)
+                ax.fill_between(
+                    PERCENT, 0, 1, where=~each.loaded, transform=ax.get_xaxis_transform(), color="#f1f1f1", zorder=0
+                )
+                ax.set(title=f"{each.joint.capitalize()} {title}", ylabel=unit, xlabel="% of stride", xlim=(0, 100))
+            row[0].set_ylim(0, None)
+            worst, percent = each.worst
+            row[0].set_title(f"{each.joint.capitalize()} K, worst CV under load {100 * worst:.0f} % at {percent} %")
+        handles = {
+            "each policy": Line2D([], [], color="#777777", lw=0.9),
+            "mean ± SD over policies": Patch(color="#777777", alpha=0.22, lw=0),
+            f"moment below {100 * LOADED:.0f} % of its peak": Patch(color="#f1f1f1", lw=0),
+        }
+        figure.legend(
+            list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False, fontsize=9
+        )
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flags:
+    """Hold several policies, such as one training from several seeds, against each other and against people."""
+
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")]
+    """Two policies of evaluate.py or more: run folders, files, names."""
+    episodes: int = 20
+    """Episodes of each."""
+    seconds: float = 20.0
+    """Length of each."""
+    seed: int = 0
+    """Episode i is seeded with seed + i, for every policy."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+    out: Path = Path("agreement.png")
+    """The picture; the curves lie beside it as .csv."""
+    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Also write the tables into this page, between the markers of AGREEMENT."""
+
+
+def run(flags: Flags) -> None:
+    """Walk every policy, print the tables, and write the picture and the curves."""
+    for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
+        require_count(name, getattr(flags, name), least)
+    how: dict[str, Any] = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
+    prepared = [(name, *prepare(name, {"episode_seconds": flags.seconds}, flags.seed)) for name in flags.policies]
+    gaits = []
+    with tqdm(desc="agreement", unit="s", unit_scale=True, leave=False, disable=None) as bar:
+        for name, policy, settings in prepared:
+            gaits.append(measure(record(policy, settings, name=name, progress=bar.update, **how)))
+    found = agreements(gaits)
+    labels = [Path(name).name for name in flags.policies]
+    text = "\n\n".join(
+        [
+            agreement_table(found),
+            limits_table(labels, [gait.metrics for gait in gaits]),
+            f"{flags.episodes} episodes × {flags.seconds:g} s each. (Brackets): met by the loosened limit alone; "
+            "**bold**: missed.",
+        ]
+    )
+    print(text)
+    save_figure(flags.out, found)
+    write_atomically(flags.out.with_suffix(".csv"), csv_text(found).encode())
+    if flags.page is not None:
+        write_section(flags.page, SECTION, text)
+
+
+def main() -> int:
+    """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
+    flags = tyro.cli(Flags, prog="springfoot.studies.seed_agreement", description=__doc__)
+    return exit_code("agreement", lambda: run(flags))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

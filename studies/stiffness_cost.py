@@ -1,0 +1,297 @@
+"""What stiffness is worth: trainings of preset `walk` with different weights of its cost, and the knee of the curve.
+
+    python -m springfoot.studies.stiffness_cost --out runs/tradeoff --figure docs/tradeoff.png --page docs/results.md
+
+Without disturbance the stiffness of a gait is not identified (`springfoot.studies.identifiability`): a cost on K picks the
+softest springs that still walk like people and stand pushes. A seed that is finished is not trained again, so the
+command may be stopped and begun anew, with more weights or seeds, or with `--no-train` to measure what there is.
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import matplotlib
+import numpy as np
+import tyro
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm
+
+from springfoot.agents.command_line import exit_code
+from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.multi_seed import is_finished, train_missing
+from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
+from springfoot.envs.task.reward import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
+from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
+from springfoot.evaluation.metrics import WARM_UP, Gait, measure
+from springfoot.evaluation.recording import TICK, Recording, prepare, record
+from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.scores import mean_sd
+
+from .markdown import MISSING, table, text_of, write_section
+from .seed_agreement import agreements
+
+SECTION = "TRADE-OFF"
+"""Of the results page."""
+WEIGHTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)
+"""Of the cost."""
+PUSHES = (150.0, 200.0, 250.0)
+"""Sizes of pushes [N]."""
+JOINTS = ("thigh", "knee", "ankle")
+"""Whose RMSE to people's mean is averaged."""
+COLORS = ("#0b6e8f", "#c26a1b", "#7a5195")
+Term = Literal["stiffness", "stiffness_rate"]
+
+
+def stiffness_cost(recording: Recording) -> float | None:
+    """Mean of the reward term `stiffness` (`springfoot.envs.task.reward`) after `WARM_UP`; None for shorter episodes."""
+    unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body_of(recording.settings).stiffness_scale
+    share = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
+    squares = (recording.series["stiffness"][:, round(WARM_UP / TICK) :] / unit) ** 2 @ share
+    return float(np.nanmean(squares)) if np.isfinite(squares).any() else None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Point:
+    """One weight of the cost: what each of its seeds came to."""
+
+    weight: float
+    gaits: list[Gait]
+    """Undisturbed."""
+    cost: list[float | None]
+    """`stiffness_cost`, undisturbed."""
+    falls: dict[float, list[float]]
+    """Push [N] -> share of episodes that fell."""
+
+    @property
+    def rmse(self) -> list[float | None]:
+        """Of each seed, mean over `JOINTS` [deg]; None where it does not walk."""
+        values = [[gait.metrics["joints"][joint]["rmse_deg"] for joint in JOINTS] for gait in self.gaits]
+        return [None if None in each else float(np.mean(each)) for each in values]
+
+    @property
+    def variation(self) -> dict[str, float] | None:
+        """Joint -> mean coefficient of variation of K over seeds where it carries load; None for fewer than two."""
+        walking = [gait for gait in self.gaits if gait.both.count]
+        if len(walking) < 2:
+            return None
+        return {each.joint: float(each.variation[each.loaded].mean()) for each in agreements(walking)}
+
+
+def config_of(weight: float, seed: int, term: Term, timesteps: int | None = None) -> TrainingConfig:
+    """Preset `walk` with the cost `term` weighted by `weight` >= 0."""
+    preset = PRESETS["walk"]
+    weights = preset.environment.reward_weights | {term: -weight if weight else 0.0}
+    environment = replace(preset.environment, reward_weights=weights)
+    return replace(preset, seed=seed, environment=environment, timesteps=timesteps or preset.timesteps)
+
+
+def folder_of(out: Path, term: Term, weight: float, seed: int) -> Path:
+    """Where that training lies in `out`."""
+    return out / f"{term}-{weight:g}" / f"seed-{seed}"
+
+
+def measure_point(
+    weight: float,
+    folders: Sequence[Path],
+    pushes: Sequence[float] = PUSHES,
+    seconds: float = 20.0,
+    progress: Callable[[float], object] = lambda simulated: None,
+    **how: Any,
+) -> Point:
+    """Walk the best policy of each run folder, undisturbed and under each push; `how` as for `recording.record`."""
+    point = Point(weight=weight, gaits=[], cost=[], falls={push: [] for push in pushes})
+    for folder in folders:
+        for push in (0.0, *pushes):
+            policy, settings = prepare(str(folder), {"episode_seconds": seconds, "push_newton": push})
+            recording = record(policy, settings, name=str(folder), progress=progress, **how)
+            if push:
+                point.falls[push].append(float(np.mean(recording.fall_reason != "")))
+            else:
+                point.gaits.append(measure(recording))
+                point.cost.append(stiffness_cost(recording))
+    return point
+
+
+def knee(cost: ArrayLike, loss: ArrayLike) -> int | None:
+    """Which point of a falling, convex curve of loss over cost is its knee; None where none lies below the chord.
+
+    Kneedle (Satopää et al. 2011): both axes scaled to 0..1, the point farthest below the straight line between the
+    curve's ends. Of points given; between them nothing is known.
+    """
+    x, y = (np.asarray(values, float) for values in (cost, loss))
+    if len(x) < 3 or not np.ptp(x) or not np.ptp(y):
+        return None
+    x, y = (x - x.min()) / np.ptp(x), (y - y.min()) / np.ptp(y)
+    ends = [x.argmin(), x.argmax()]
+    below = np.interp(x, x[ends], y[ends]) - y
+    return int(below.argmax()) if below.max() > 1e-9 else None
+
+
+def knee_of(points: Sequence[Point]) -> int | None:
+    """The knee of loss over stiffness cost: RMSE and falls under pushes, each scaled to 0..1 over the points and added.
+
+    A point whose seeds do not all walk has no place on the curve.
+    """
+    known = [index for index, point in enumerate(points) if None not in (*point.rmse, *point.cost)]
+    walking = [points[index] for index in known]
+    if len(walking) < 3:
+        return None
+    rmse = np.array([np.mean([value for value in point.rmse if value is not None]) for point in walking])
+    falls = np.array([np.mean(list(point.falls.values())) for point in walking])
+    loss = sum((each - each.min()) / (np.ptp(each) or 1.0) for each in (rmse, falls))
+    found = knee([float(np.mean([value for value in point.cost if value is not None])) for point in walking], loss)
+    return None if found is None else known[found]
+
+
+def tradeoff_table(points: Sequence[Point], term: Term) -> str:
+    """Markdown: a row a weight, mean ± SD over its seeds."""
+    pushes = list(points[0].falls)
+    head = [f"weight of `{term}`", "seeds", "mean K² cost", "RMSE thigh, knee, ankle °", "falls"]
+    head += [*(f"at ±{push:g} N" for push in pushes), "CV of K: ankle, toe", ""]
+    found, lines = knee_of(points), []
+    for index, point in enumerate(points):
+        marks = ["default"] * (point.weight == -DEFAULT_WEIGHTS[term]) + ["**knee**"] * (index == found)
+        variation = point.variation
+        falls = [gait.metrics["falls"] / gait.metrics["episodes"] for gait in point.gaits]
+        lines.append(
+            [
+                f"{point.weight:g}",
+                str(len(point.gaits)),
+                _spread(point.cost, ".2f"),
+                _spread(point.rmse, ".2f"),
+                *(f"{100 * np.mean(each):.0f} %" for each in (falls, *point.falls.values())),
+                MISSING if variation is None else ", ".join(f"{100 * value:.0f} %" for value in variation.values()),
+                ", ".join(marks),
+            ]
+        )
+    return table(head, lines)
+
+
+def _spread(values: Sequence[float | None], pattern: str) -> str:
+    known = mean_sd([value for value in values if value is not None])
+    mean = text_of(known["mean"], pattern)
+    return mean if known["sd"] is None else f"{mean} ± {text_of(known['sd'], pattern)}"
+
+
+def save_figure(path: Path, points: Sequence[Point], term: Term) -> None:
+    """Write the picture: RMSE, falls and variation over seeds against the stiffness cost; the knee and the default."""
+    points = [point for point in points if None not in (*point.rmse, *point.cost)]
+    if not points:
+        raise SpringfootError("no weight's seeds all walk, so there is nothing to draw")
+    cost = np.array([np.mean(np.array(point.cost, float)) for point in points])
+    found = knee_of(points)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+        likeness, robustness, agreement = figure.subplots(1, 3)
+        _line(likeness, cost, np.array([np.mean(np.array(point.rmse, float)) for point in points]), MODEL, "")
+        for point in points:
+            likeness.plot(np.array(point.cost, float), np.array(point.rmse, float), ".", color=MODEL, alpha=0.4, ms=4)
+        likeness.set(title="Human-likeness", ylabel="RMSE of thigh, knee and ankle (deg)")
+        for push, color in zip(points[0].falls, COLORS * len(points[0].falls), strict=False):
+            falls = np.array([100 * np.mean(point.falls[push]) for point in points])
+            _line(robustness, cost, falls, color, f"±{push:g} N")
+        robustness.set(title="Robustness", ylabel="episodes that fall (%)", ylim=(-2, 102))
+        for joint, color in zip(("ankle", "toe"), COLORS, strict=False):
+            values = [100 * (point.variation or {}).get(joint, np.nan) for point in points]
+            _line(agreement, cost, np.array(values), color, joint)
+        agreement.set(title="Agreement of seeds", ylabel="CV of K under load (%)", ylim=(0, None))
+        for ax in (likeness, robustness, agreement):
+            ax.set_xlabel("stiffness cost, mean K² measure")
+            ax.grid(color="#ededed", lw=0.6)
+            for index, point in enumerate(points):
+                if point.weight == -DEFAULT_WEIGHTS[term]:
+                    ax.axvline(cost[index], color="#777777", lw=0.9, ls=(0, (2, 2)), zorder=0.5, label="default")
+                if index == found:
+                    ax.axvline(cost[index], color=PLAN, lw=0.9, zorder=0.4, label="knee")
+            if ax.get_legend_handles_labels()[0]:
+                ax.legend(frameon=False)
+        for x, y, point in zip(cost, (np.mean(np.array(point.rmse, float)) for point in points), points, strict=True):
+            likeness.annotate(f"{point.weight:g}", (x, y), (4, 4), textcoords="offset points", fontsize=7.5)
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+def _line(ax: Axes, x: NDArray, y: NDArray, color: str, label: str) -> None:
+    order = np.argsort(x)
+    ax.plot(x[order], y[order], "o-", color=color, ms=3.5, lw=1.3, label=label or None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flags:
+    """Train with different weights of the stiffness cost, walk and be pushed, and draw what each costs and gives."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/tradeoff")
+    """Folder of the trainings; what is finished in it is kept."""
+    term: Term = "stiffness"
+    """Which cost: of K, or of changing it."""
+    weights: tuple[float, ...] = WEIGHTS
+    """Its weights."""
+    seeds: int = 3
+    """Seeds of each, 0 and the next ones."""
+    timesteps: int | None = None
+    """Steps of each training, the preset's unless given."""
+    train: bool = True
+    """Train what is missing; without, measure what there is."""
+    pushes: tuple[float, ...] = PUSHES
+    """Sizes of the pushes [N]."""
+    episodes: int = 20
+    """Episodes of each policy, undisturbed and under each push."""
+    seconds: float = 20.0
+    """Length of each."""
+    threads: int = 2
+    """Threads of the physics when measuring; the results are the same with any number."""
+    figure: Path = Path("tradeoff.png")
+    """The picture."""
+    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Also write the table into this page, between the markers of TRADE-OFF."""
+
+
+def run(flags: Flags) -> int:
+    """Train what is missing, measure, print the table and write the picture."""
+    for name in ("seeds", "episodes", "threads"):
+        require_count(name, getattr(flags, name))
+    weights = sorted(set(flags.weights))
+    if not weights or not flags.pushes:
+        raise SpringfootError("give one weight and one push or more")
+    jobs = []
+    for seed in range(flags.seeds):  # every weight once before any twice
+        for weight in weights:
+            config = config_of(weight, seed, flags.term, flags.timesteps)
+            folder = folder_of(flags.out, flags.term, weight, seed)
+            jobs.append((config, folder, f"{flags.term} {weight:g}, seed {seed}"))
+    status = train_missing(jobs) if flags.train else "finished"
+    if status == "interrupted":
+        return 130
+    points = []
+    with tqdm(desc="trade-off", unit="s", unit_scale=True, leave=False, disable=None) as bar:
+        for weight in weights:
+            folders = [folder_of(flags.out, flags.term, weight, seed) for seed in range(flags.seeds)]
+            if done := [folder for folder in folders if is_finished(folder)]:
+                how: dict[str, Any] = {"episodes": flags.episodes, "threads": flags.threads, "progress": bar.update}
+                points.append(measure_point(weight, done, flags.pushes, flags.seconds, **how))
+    if not points:
+        raise SpringfootError(f"no finished training of {flags.term} in {flags.out}")
+    text = f"{tradeoff_table(points, flags.term)}\n\n" + (
+        f"{flags.episodes} episodes × {flags.seconds:g} s of each seed's best policy; mean ± SD over seeds; CV of K: "
+        "over seeds, mean where the joint carries load. Knee: of RMSE and falls under pushes, each scaled to 0..1 and "
+        "added, against the K² cost, the point farthest below the line between the curve's ends (Kneedle)."
+    )
+    print(text)
+    save_figure(flags.figure, points, flags.term)
+    if flags.page is not None:
+        write_section(flags.page, SECTION, text)
+    return 1 if status == "failed" else 0
+
+
+def main() -> int:
+    """Exit code: 0 done, 1 a training failed, 2 bad input, 130 ended by Ctrl-C."""
+    flags = tyro.cli(Flags, prog="springfoot.studies.stiffness_cost", description=__doc__)
+    return exit_code("tradeoff", lambda: run(flags))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
