@@ -23,7 +23,7 @@ from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import StiffnessSchedule, thesis_schedule
 
-Policy = Callable[[NDArray], NDArray]
+PolicyFunction = Callable[[NDArray], NDArray]
 
 CONSTANT_STIFFNESS = (300.0, 40.0)
 """Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg."""
@@ -39,7 +39,7 @@ def leg_phase(observation: NDArray) -> NDArray:
     return leg_phases(left)
 
 
-def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> Policy:
+def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
     """The same ankle and toe stiffness always: (ankle, toe) [N m/rad], for 1.70 m and 63 kg, scaled with the body."""
     body = body_of(settings)
     _require_absolute(settings)
@@ -48,18 +48,18 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
     return lambda observation: np.tile(action, (len(observation), 1))
 
 
-def untrained(settings: BipedSettings) -> Policy:
+def untrained(settings: BipedSettings) -> PolicyFunction:
     """What training starts from: mean action 0, the middle of the (log) stiffness range."""
     return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
 
 
-def uniform(settings: BipedSettings, seed: int = 0) -> Policy:
+def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
     """Every action anew from the whole range; the generator starts from `seed` and goes on from call to call."""
     generator = np.random.default_rng(seed)
     return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
 
 
-def schedule(settings: BipedSettings) -> Policy:
+def schedule(settings: BipedSettings) -> PolicyFunction:
     """A fixed stiffness over the stride: that of `settings.schedule`, or else the one of the leg tuning.
 
     The latter is that of the commanded speed, whatever it is at present; both scale with the body.
@@ -73,7 +73,7 @@ def schedule(settings: BipedSettings) -> Policy:
     return _follow(np.stack([fixed_stiffness(constants, body) for constants in tuned]), speeds, settings, body)
 
 
-def _follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> Policy:
+def _follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
     """The policy that sets (speeds, samples, (ankle, toe)) [N m/rad] over the stride at each leg's phase.
 
     It reads phase and Froude speed; between two of `speeds` [m/s] of `body` stiffness is linear.
@@ -100,7 +100,7 @@ BASELINES = ("untrained", "random", "constant", "schedule", "thesis")
 """Names of the baselines; `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad]."""
 
 
-def baseline(name: str, settings: BipedSettings, seed: int = 0) -> Policy:
+def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
     """A baseline by name, in the environment of `settings`; `seed` is that of `random`."""
     kind, colon, numbers = name.partition(":")
     if colon and kind != "constant":

@@ -24,10 +24,10 @@ from springfoot.gait.scores import mean_sd
 from .command_line import exit_code
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
+from .markdown import MISSING
 from .training import RUN, processors, train
 
 SEEDS = "seeds.json"
-MISSING = "–"
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
 """Of what `seeds.json` holds mean and standard deviation (n - 1)."""
@@ -95,7 +95,7 @@ def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]
     return {name: mean_sd([row[name] for row in finished]) for name in SPREAD}
 
 
-def seeds_table(record: dict[str, Any]) -> str:
+def training_table(record: dict[str, Any]) -> str:
     """Markdown: one row a seed, and the mean ± SD over those that finished."""
     lines = [["seed", "status", "steps", "seconds", "best return", "falls", "after steps"], ["---"] * 7]
     for row in record["seeds"]:

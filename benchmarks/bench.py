@@ -20,7 +20,7 @@ import tyro
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.config import PRESETS
 
-from ..benchmarks import environments, learning
+from . import environments, learning
 from .timing import Case, Figures, load, machine, measure
 from .walking import STEP, batch_case, record_walk, step_over_physics
 

@@ -18,7 +18,7 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from springfoot.agents.baselines import Policy
+from springfoot.agents.baselines import PolicyFunction
 from springfoot.agents.command_line import exit_code
 from springfoot.envs.physics.model import build_model
 from springfoot.envs.settings import BipedSettings, body_of
@@ -108,7 +108,7 @@ def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:
     return 1e6 * spent[:, 1:].reshape(len(models), -1) / (WINDOWS_PER_STEP * walk.actions.shape[1])
 
 
-def walked(policy: Policy, settings: BipedSettings, model: mujoco.MjModel, episodes: int, threads: int) -> Gait:
+def walked(policy: PolicyFunction, settings: BipedSettings, model: mujoco.MjModel, episodes: int, threads: int) -> Gait:
     """The gait of a policy on a model."""
     return measure(record(policy, settings, name="physics", episodes=episodes, threads=threads, model=model))
 

@@ -17,8 +17,8 @@ from .control.decisions import Decisions
 from .control.equilibrium import foot_curves
 from .control.foot_springs import FootSprings, draw_delay
 from .control.leg_constants import LegConstants, SlopeConstants, slope_constants
-from .control.leg_controller import Legs, slope_table
-from .control.reference_walk import rows, walks_of
+from .control.leg_controller import LegController, slope_table
+from .control.reference_walk import reference_walks, rows
 from .control.standing import Standing, off_phase
 from .control.subjects import Subjects
 from .physics.foot_contact import CONTACTS
@@ -71,14 +71,14 @@ class Biped:
         self.windows_per_step = round(self.dt / CONTROL_WINDOW)
         """Control windows in one step."""
         self.on_tick: Callable[[Tick], None] | None = None
-        self.walks = walks_of(settings, legs)
+        self.walks = reference_walks(settings, legs)
         own = next(walk for walk in self.walks if walk.speed == settings.speed)
         self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
         table = list(rows(self.walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
         incline = slope_table(slope or slope_constants())
-        self._legs = Legs(table, self.subjects, incline)
+        self._legs = LegController(table, self.subjects, incline)
         curves = [foot_curves(settings, c, w) for c, w in table]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)

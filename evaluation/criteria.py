@@ -1,19 +1,19 @@
-"""What an evaluation must show: limits on the numbers of metrics.json, each once, and which of them a gait misses."""
+"""What an evaluation must show: criteria on the numbers of metrics.json, each once, and which of them a gait misses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, Literal
 
-from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import settings_from
 
-LOOSER, LOOSER_R = 0.2, 0.02
-"""By how much limits are loosened for each of several seeds: errors and forces as a share of the limit; r [-]."""
+LOOSENED_BY, LOOSENED_R_BY = 0.2, 0.02
+"""By how much criteria are loosened for each of several seeds: errors and forces as a share of the criterion; r [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limit:
+class Criterion:
     """A number of `numbers(metrics)` and the range it must lie in, ends included."""
 
     name: str
@@ -38,11 +38,13 @@ class Limit:
         value = self.value(values)
         return value is not None and self.low <= value <= self.high
 
-    def loosened(self) -> "Limit":
-        """With either end farther out by `LOOSER` of itself, or by `LOOSER_R`; as it is where neither is meant."""
+    def loosened(self) -> "Criterion":
+        """With either end farther out by `LOOSENED_BY` of itself, or by `LOOSENED_R_BY`; as it is where neither is meant."""
         if self.loosen == "share":
-            return replace(self, low=self.low - LOOSER * abs(self.low), high=self.high + LOOSER * abs(self.high))
-        return replace(self, low=self.low - LOOSER_R) if self.loosen == "r" else self
+            return replace(
+                self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)
+            )
+        return replace(self, low=self.low - LOOSENED_R_BY) if self.loosen == "r" else self
 
     @property
     def text(self) -> str:
@@ -54,9 +56,9 @@ class Limit:
 
 
 def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
-    """metrics.json and what limits compare: `off`, distances from command and plan, and `double_support_percent`."""
+    """metrics.json and what criteria compare: `off`, distances from command and plan, and `double_support_percent`."""
     settings = settings_from(**metrics["environment"])
-    plan = walk_at(settings, settings.speed).plan
+    plan = reference_walk_at(settings, settings.speed).plan
     cadence, support = metrics["cadence_steps_min"], metrics["double_support_s"]
 
     def share(value: float | None, planned: float) -> float | None:
@@ -72,35 +74,35 @@ def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
     return metrics | {"off": off, "double_support_percent": percent}
 
 
-def unmet(metrics: dict[str, Any], limits: Sequence[Limit]) -> list[str]:
-    """Which limits an evaluation misses, as words with the number; none if it meets all."""
+def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
+    """Which criteria an evaluation misses, as words with the number; none if it meets all."""
     values = numbers(metrics)
-    return [f"{each.name} {number_text(each, values)}" for each in limits if not each.holds(values)]
+    return [f"{each.name} {number_text(each, values)}" for each in criteria if not each.holds(values)]
 
 
-def number_text(limit: Limit, values: dict[str, Any]) -> str:
+def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
     """The number as it stands in words, with its unit."""
-    value = limit.value(values)
-    return "?" if value is None else format(value, limit.pattern) + limit.unit
+    value = criterion.value(values)
+    return "?" if value is None else format(value, criterion.pattern) + criterion.unit
 
 
-def _force(name: str, low: float = -inf, high: float = inf) -> Limit:
-    return Limit(name=name, path=("grf", name), low=low, high=high, unit=" BW", loosen="share")
+def _force(name: str, low: float = -inf, high: float = inf) -> Criterion:
+    return Criterion(name=name, path=("grf", name), low=low, high=high, unit=" BW", loosen="share")
 
 
-def _rmse(joint: str, high: float) -> Limit:
-    return Limit(name=joint, path=("joints", joint, "rmse_deg"), high=high, unit="°", loosen="share")
+def _rmse(joint: str, high: float) -> Criterion:
+    return Criterion(name=joint, path=("joints", joint, "rmse_deg"), high=high, unit="°", loosen="share")
 
 
-def _r(name: str, path: tuple[str, ...], low: float) -> Limit:
-    return Limit(name=name, path=path, low=low, pattern=".3f", loosen="r")
+def _r(name: str, path: tuple[str, ...], low: float) -> Criterion:
+    return Criterion(name=name, path=path, low=low, pattern=".3f", loosen="r")
 
 
-NO_FALLS = Limit(name="falls", path=("falls",), high=0, pattern=".0f")
+NO_FALLS = Criterion(name="falls", path=("falls",), high=0, pattern=".0f")
 
 WALKS = (
     NO_FALLS,
-    Limit(name="speed off by", path=("off", "speed_m_s"), high=0.03, unit=" m/s", pattern=".3f"),
+    Criterion(name="speed off by", path=("off", "speed_m_s"), high=0.03, unit=" m/s", pattern=".3f"),
     _rmse("thigh", 3.5),
     _rmse("knee", 4.5),
     _rmse("ankle", 4.0),
@@ -116,15 +118,15 @@ MOVES_LIKE_PEOPLE = (
     _rmse("ankle", 2.5),
     *(_r(f"{joint} r", ("joints", joint, "r"), 0.98) for joint in ("thigh", "knee", "ankle")),
     *(
-        Limit(
+        Criterion(
             name=f"{joint} within SD", path=("joints", joint, "within_1sd_percent"), low=low, unit=" %", pattern=".0f"
         )
         for joint, low in (("thigh", 75.0), ("knee", 75.0), ("ankle", 75.0), ("toe", 80.0))
     ),
-    Limit(name="step length off by", path=("off", "step_length_percent"), high=5.0, unit=" %", pattern=".1f"),
-    Limit(name="cadence off by", path=("off", "cadence_percent"), high=5.0, unit=" %", pattern=".1f"),
-    Limit(name="toe-off", path=("toe_off_percent",), low=59.0, high=65.0, unit=" %", pattern=".1f"),
-    Limit(name="double support", path=("double_support_percent",), low=9.0, high=15.0, unit=" %", pattern=".1f"),
+    Criterion(name="step length off by", path=("off", "step_length_percent"), high=5.0, unit=" %", pattern=".1f"),
+    Criterion(name="cadence off by", path=("off", "cadence_percent"), high=5.0, unit=" %", pattern=".1f"),
+    Criterion(name="toe-off", path=("toe_off_percent",), low=59.0, high=65.0, unit=" %", pattern=".1f"),
+    Criterion(name="double support", path=("double_support_percent",), low=9.0, high=15.0, unit=" %", pattern=".1f"),
 )
 """Human-like in motion: below the distance of one healthy person from the mean of many."""
 
@@ -137,7 +139,7 @@ LOADS_LIKE_PEOPLE = (
     _force("braking_peak_bw", -0.20, -0.12),
     _force("forward_peak_bw", 0.16, 0.25),
     _r("forward_r", ("grf", "forward_r"), 0.95),
-    Limit(
+    Criterion(
         name="ankle moment peak",
         path=("moments", "ankle", "peak_Nm_kg"),
         low=1.2,
@@ -145,7 +147,7 @@ LOADS_LIKE_PEOPLE = (
         unit=" N·m/kg",
         loosen="share",
     ),
-    Limit(
+    Criterion(
         name="ankle moment peak at",
         path=("moments", "ankle", "peak_percent"),
         low=42,
@@ -155,19 +157,19 @@ LOADS_LIKE_PEOPLE = (
     ),
     _r("ankle moment r", ("moments", "ankle", "r"), 0.95),
     _r("knee moment r", ("moments", "knee", "r"), 0.7),
-    Limit(name="ankle work +", path=("ankle_work_J_kg", "positive"), low=0.25, high=0.45, unit=" J/kg"),
-    Limit(name="ankle work −", path=("ankle_work_J_kg", "negative"), low=0.08, high=0.20, unit=" J/kg"),
+    Criterion(name="ankle work +", path=("ankle_work_J_kg", "positive"), low=0.25, high=0.45, unit=" J/kg"),
+    Criterion(name="ankle work −", path=("ankle_work_J_kg", "negative"), low=0.08, high=0.20, unit=" J/kg"),
 )
 """Human-like in force: ground reaction forces, joint moments and ankle work."""
 HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE)
 
 FOLLOWS_THE_PLAN = (
-    Limit(name="CoM x off by", path=("com", "x_rmse_m"), high=0.02, unit=" m", pattern=".4f"),
-    Limit(name="CoM z off by", path=("com", "z_rmse_m"), high=0.006, unit=" m", pattern=".4f"),
+    Criterion(name="CoM x off by", path=("com", "x_rmse_m"), high=0.02, unit=" m", pattern=".4f"),
+    Criterion(name="CoM z off by", path=("com", "z_rmse_m"), high=0.006, unit=" m", pattern=".4f"),
     _r("CoM z r", ("com", "z_r"), 0.9),
     _r("forward speed r", ("com", "vx_r"), 0.9),
-    Limit(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
-    Limit(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
-    Limit(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
+    Criterion(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
+    Criterion(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
+    Criterion(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
 )
 """Its CoM against the ZMP plan, and feet that neither slide nor stub."""

@@ -17,7 +17,7 @@ from springfoot.gait.cycle import PERCENT
 
 from .metrics import JOINT_CURVES, MOMENT_CURVES, Gait
 from .recording import Recording
-from .stride_curves import Curves
+from .stride_curves import StrideCurves
 
 MODEL, PLAN, PEOPLE = "#0b6e8f", "#d1495b", "#8a8a8a"
 STYLE: dict[Any, Any] = {
@@ -59,7 +59,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
         figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
 
 
-def _angle(ax: Axes, curves: Curves, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
+def _angle(ax: Axes, curves: StrideCurves, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
     positive = {"ankle": "dorsiflexion", "toe": "up"}.get(joint, "flexion")
     ax.set(title=f"{joint.capitalize()} angle", ylabel=f"{positive} (deg)")
     phase = PERCENT / 100
@@ -68,7 +68,7 @@ def _angle(ax: Axes, curves: Curves, human: HumanGait, joint: str, column: str, 
     _note(ax, numbers["rmse_deg"], "RMSE {:.1f}°", numbers["r"])
 
 
-def _moment(ax: Axes, curves: Curves, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
+def _moment(ax: Axes, curves: StrideCurves, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
     positive = "extension" if joint in ("hip", "knee") else "plantarflexion"
     ax.set(title=f"{joint.capitalize()} moment", ylabel=f"{positive} (N·m/kg)")
     if joint != "toe":
@@ -77,7 +77,7 @@ def _moment(ax: Axes, curves: Curves, human: HumanGait, joint: str, column: str,
     _note(ax, numbers["peak_Nm_kg"], "peak {:.2f}", numbers["r"])
 
 
-def _force(ax: Axes, curves: Curves, human: HumanGait, direction: str, title: str, numbers: dict) -> None:
+def _force(ax: Axes, curves: StrideCurves, human: HumanGait, direction: str, title: str, numbers: dict) -> None:
     ax.set(title=title, ylabel=f"{'up' if direction == 'vertical' else 'forward'} (body weights)")
     name = f"grf_{direction}"
     _people(ax, human.mean(name, PERCENT / 100), human.sd(name, PERCENT / 100))
@@ -109,7 +109,7 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
     axes[1].set_ylim(middle - half, middle + half)
 
 
-def _springs(axes: NDArray, curves: Curves, human: HumanGait) -> None:
+def _springs(axes: NDArray, curves: StrideCurves, human: HumanGait) -> None:
     for ax, name in zip(axes[:2], ("ankle", "toe"), strict=True):
         ax.set(title=f"{name.capitalize()} stiffness K", ylabel="N·m/rad")
         _model(ax, curves, f"{name}_stiffness_Nm_per_rad")
@@ -129,7 +129,7 @@ def _people(ax: Axes, mean: NDArray, sd: NDArray) -> None:
     ax.plot(PERCENT, mean, color=PEOPLE, lw=1.3)
 
 
-def _model(ax: Axes, curves: Curves, name: str) -> None:
+def _model(ax: Axes, curves: StrideCurves, name: str) -> None:
     mean, sd = curves.mean(name), curves.sd(name)
     ax.fill_between(PERCENT, mean - sd, mean + sd, color=MODEL, alpha=0.22, lw=0)
     ax.plot(PERCENT, mean, color=MODEL, lw=1.8)

@@ -28,16 +28,16 @@ from springfoot.gait.cycle import (
 )
 
 from .recording import TICK, Recording
-from .stride_curves import Curves
+from .stride_curves import StrideCurves
 
 WARM_UP = 3.0
 """Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
 SHORTEST_SPEED = 1.0
 """An episode that ends earlier than this after the warm-up [s] tells nothing about speed."""
-MID_SWING = (0.25, 0.75)
+CLEARANCE_SWING = (0.25, 0.75)
 """Part of the swing in which toe clearance is taken."""
 
-CURVES = (
+GAIT_CYCLE_COLUMNS = (
     "hip_flexion_deg",
     "knee_flexion_deg",
     "ankle_dorsiflexion_deg",
@@ -84,11 +84,13 @@ class Gait:
 
     metrics: dict[str, Any] = field(default_factory=dict)
     """Plain JSON values; None where something could not be measured."""
-    feet: tuple[Curves, Curves] = field(default_factory=lambda: (Curves(names=CURVES), Curves(names=CURVES)))
+    feet: tuple[StrideCurves, StrideCurves] = field(
+        default_factory=lambda: (StrideCurves(names=GAIT_CYCLE_COLUMNS), StrideCurves(names=GAIT_CYCLE_COLUMNS))
+    )
     """Curves over the stride of the left and the right foot."""
-    both: Curves = field(default_factory=lambda: Curves(names=CURVES))
+    both: StrideCurves = field(default_factory=lambda: StrideCurves(names=GAIT_CYCLE_COLUMNS))
     """Curves over the stride of both feet."""
-    com: Curves = field(default_factory=lambda: Curves(names=("x", "z", "vx")))
+    com: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x", "z", "vx")))
     """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
 
 
@@ -165,7 +167,7 @@ def _add_episode(
         gait.both.add(curves)
         tally.strides_of_falls += fell * len(strides)
         tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
-        work = score.stride_work(curves[..., CURVES.index("ankle_power_W_per_kg")], end - heel_strike)
+        work = score.stride_work(curves[..., GAIT_CYCLE_COLUMNS.index("ankle_power_W_per_kg")], end - heel_strike)
         tally.ankle_positive += list(work[0])
         tally.ankle_negative += list(work[1])
         contact, load = series["contact"][:, side], series["force"][:, side, :, 1]
@@ -173,7 +175,7 @@ def _add_episode(
             tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
             stance = slice(start, leave + 1)
             tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
-            first, last = (round(leave + share * (stop - leave)) for share in MID_SWING)
+            first, last = (round(leave + share * (stop - leave)) for share in CLEARANCE_SWING)
             tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
     _add_steps(gait, tally, series, contacts, steady)
 
@@ -201,7 +203,7 @@ def _add_steps(
 
 
 def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T, C) curves known at a tick's end, in the order of `CURVES` without the forces."""
+    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without the forces."""
     angle = np.degrees(series["angle"][:, side])
     pitch = np.degrees(series["base"][:, 2])
     moment = -(series["torque"] + series["passive_torque"])[:, side] / body.mass
@@ -232,8 +234,8 @@ def _forces(series: dict[str, NDArray], side: int, weight: float) -> NDArray:
 
 
 _FORCES = ("grf_vertical_bw", "grf_forward_bw")
-_STATES = tuple(name for name in CURVES if name not in _FORCES)
-_ORDER = [(_STATES + _FORCES).index(name) for name in CURVES]
+_STATES = tuple(name for name in GAIT_CYCLE_COLUMNS if name not in _FORCES)
+_ORDER = [(_STATES + _FORCES).index(name) for name in GAIT_CYCLE_COLUMNS]
 
 
 def _metrics(recording: Recording, gait: Gait, tally: _Tally, body: Body) -> dict[str, Any]:

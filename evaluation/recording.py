@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from springfoot.agents.baselines import BASELINES, Policy, baseline, own_settings
+from springfoot.agents.baselines import BASELINES, PolicyFunction, baseline, own_settings
 from springfoot.agents.policy import load_policy
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.control.subjects import DRAWN
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import JOINTS, SIDES
@@ -91,7 +91,7 @@ class Recording:
         np.savez(path, header=np.array(json.dumps(header)), **(arrays | dict[str, Any](self.series)))
 
 
-def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[Policy, BipedSettings]:
+def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[PolicyFunction, BipedSettings]:
     """A policy by name and the environment it is evaluated in.
 
     Args:
@@ -129,7 +129,7 @@ def load_recording(path: Path) -> Recording:
 
 
 def record(
-    policy: Policy,
+    policy: PolicyFunction,
     settings: BipedSettings,
     *,
     name: str,
@@ -167,13 +167,13 @@ def record(
         ticks=ticks,
         returns=returns,
         fall_reason=reason,
-        plan_com=planned_com(walk_at(settings, settings.speed).plan),
+        plan_com=planned_com(reference_walk_at(settings, settings.speed).plan),
         series=series,
     )
 
 
 def record_each(
-    policy: Policy,
+    policy: PolicyFunction,
     settings: BipedSettings,
     who: Mapping[str, ArrayLike],
     *,
@@ -206,7 +206,7 @@ def record_each(
                 ticks=ticks[row],
                 returns=returns[row],
                 fall_reason=reason[row],
-                plan_com=planned_com(walk_at(alone, alone.speed).plan),
+                plan_com=planned_com(reference_walk_at(alone, alone.speed).plan),
                 series={key: values[row] for key, values in series.items()},
             )
         )
@@ -214,7 +214,7 @@ def record_each(
 
 
 def _walk(
-    policy: Policy,
+    policy: PolicyFunction,
     settings: BipedSettings,
     given: Mapping[str, NDArray],
     episodes: int,

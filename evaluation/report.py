@@ -16,6 +16,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from springfoot.agents.markdown import MISSING
 from springfoot.envs.settings import reference_gait, settings_from
 from springfoot.gait import HumanGait
 from springfoot.gait import scores as score
@@ -25,9 +26,7 @@ from .animation import save_animation
 from .gait_figure import save_gait_figure
 from .metrics import Gait
 from .recording import Recording
-from .stride_curves import Curves
-
-MISSING = "–"
+from .stride_curves import StrideCurves
 
 
 def write_report(folder: Path, recording: Recording, gait: Gait) -> None:
@@ -42,7 +41,7 @@ def write_report(folder: Path, recording: Recording, gait: Gait) -> None:
     save_animation(folder / "walk.gif", recording)
 
 
-def write_gait_cycle(path: Path, curves: Curves, metrics: dict[str, Any]) -> None:
+def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) -> None:
     """One gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
 
     The leading columns repeat the whole gait's values on each row, as in the reference data.
@@ -101,11 +100,11 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     )
 
 
-Row = tuple[str, str, str, str, str, str]
+TableRow = tuple[str, str, str, str, str, str]
 """What, unit, model, people, r, share inside people's mean ± SD."""
 
 
-def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
+def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     """The table's rows, in groups."""
     people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
     grf, their_grf, com = metrics["grf"], people["grf"], metrics["com"]
@@ -114,7 +113,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
 
     def row(
         label: str, unit: str, value: Any, pattern: str, their: Any = None, r: Any = None, inside: Any = None
-    ) -> Row:
+    ) -> TableRow:
         if isinstance(value, dict):
             spread = f" ± {_text(value['sd'], pattern)}" if value["sd"] is not None else ""
             value, text = value["mean"], _text(value["mean"], pattern) + spread
@@ -123,7 +122,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[Row]]:
         share = "" if inside is None else f"{inside:.0f} %"
         return label, unit, text, "" if their is None else _text(their, pattern), "" if r is None else f"{r:.2f}", share
 
-    def mm(label: str, value: float | None, r: float | None = None) -> Row:
+    def mm(label: str, value: float | None, r: float | None = None) -> TableRow:
         return row(label, "mm", None if value is None else 1000 * value, ".0f", None, r)
 
     return [

@@ -9,7 +9,7 @@ from springfoot.gait.cycle import PERCENT
 
 
 @dataclass(kw_only=True, eq=False)
-class Curves:
+class StrideCurves:
     """Mean and spread over strides of C curves, gathered block by block; NaN before the first stride."""
 
     names: tuple[str, ...]

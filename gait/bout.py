@@ -22,7 +22,7 @@ from .errors import SpringfootError, require_count
 from .feet import FLOOR_TOLERANCE
 from .human import ANGLES
 from .plan import Cadence, WalkPlan, plan_walk
-from .posture import GRID, full_reach
+from .posture import POSTURE_SAMPLES, full_reach
 
 Side = Literal["left", "right"]
 
@@ -166,8 +166,8 @@ def plan_bout(
         )
     )
     knots = zmp_knots(plan, step_lengths)
-    tick = 2 * plan.step_time / GRID
-    samples = tick * np.arange((BEFORE + steps + AFTER) * GRID // 2 + 1)
+    tick = 2 * plan.step_time / POSTURE_SAMPLES
+    samples = tick * np.arange((BEFORE + steps + AFTER) * POSTURE_SAMPLES // 2 + 1)
     in_ticks = knots[0] / tick
     time = np.sort(np.append(samples, knots[0][np.abs(in_ticks - np.round(in_ticks)) > BESIDE]))
     sampled = np.searchsorted(time, samples)
@@ -181,7 +181,7 @@ def plan_bout(
         if lacking.max() < CLOSE:
             break
         # A leg leans little: what it lacks in a step, the body comes down by at both ends of the step.
-        each = np.maximum(lacking[1:].reshape(-1, GRID // 2).max(axis=1), 0.0)
+        each = np.maximum(lacking[1:].reshape(-1, POSTURE_SAMPLES // 2).max(axis=1), 0.0)
         dips[1:-1] += 1.05 * np.maximum(each[1:], each[:-1])
     _refuse_short_legs(body, dips, float(lacking.max()))
     tables = np.stack([legs.thigh, legs.knee, legs.ankle, legs.toe], -1)

@@ -11,7 +11,7 @@ from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
 from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
 from .plan import Point, WalkPlan
-from .posture import STRAIGHTEST_KNEE, Legs, full_reach, legs_under, toe_angle
+from .posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_angle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,7 +125,7 @@ def foot_postures(plan: WalkPlan, feet: Collection[BoutFoot], time: NDArray) -> 
     return ankle, pitch, toe
 
 
-def bout_legs(body: Body, com: NDArray, ankle: NDArray, pitch: NDArray, toe: NDArray) -> Legs:
+def bout_legs(body: Body, com: NDArray, ankle: NDArray, pitch: NDArray, toe: NDArray) -> LegPostures:
     """The legs (2, T) under a `com` (2, T) [m] whose `foot_postures` are given; the hip is (1, T, 2)."""
     return legs_under(body, com[:, None], ankle, pitch, toe, lambda leg: leg.sum(axis=1, keepdims=True))
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .cycle import Contacts
 from .errors import SpringfootError
 from .human import FORCES
-from .motion_files import SIDES, Curves, Trial, existing, not_empty
+from .motion_files import FILE_SIDES, Series, Trial, existing, not_empty
 
 PLATE_LOAD = 20.0
 """A plate bears a foot above this force [N]."""
@@ -48,7 +48,7 @@ def c3d_trial(path: Path) -> Trial:
     rate = float(file["header"]["points"]["frame_rate"])
     labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
     found = {label: points[:3, k] for k, label in enumerate(labels)}
-    legs: dict[str, Curves] = {side: {} for side in SIDES}
+    legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
     newton_metres = parameters["POINT"].get("MOMENT_UNITS", {}).get("value", ["Nmm"])[0].strip() == "Nm"
     for side, curves in legs.items():
         letter = side[0].upper()
@@ -62,7 +62,7 @@ def c3d_trial(path: Path) -> Trial:
             for name in ("hip_moment", "knee_moment", "ankle_moment"):
                 curves[name] = -curves[name]
     frames = points.shape[2]
-    feet = {side: (found.get(f"{side[0].upper()}HEE"), found.get(f"{side[0].upper()}TOE")) for side in SIDES}
+    feet = {side: (found.get(f"{side[0].upper()}HEE"), found.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
     for side, (vertical, forward) in _plate_forces(file["data"].get("platform") or [], feet, frames).items():
         legs[side] |= {"grf_vertical": vertical, "grf_forward": forward}
     legs = not_empty(path.name, legs)
@@ -131,7 +131,7 @@ def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
         side: Contacts(
             heel_strikes=np.sort(found[side, "foot strike"]), toe_offs=np.sort(found.get((side, "foot off"), []))
         )
-        for side in SIDES
+        for side in FILE_SIDES
         if (side, "foot strike") in found
     }
 
@@ -140,7 +140,7 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
     """Side -> force up and forward (T,) [N] of each foot, from the plates and the markers of heels and toes (3, T)."""
     if any(marker is None for pair in feet.values() for marker in pair):
         return {}
-    total = {side: np.zeros((3, frames)) for side in SIDES}
+    total = {side: np.zeros((3, frames)) for side in FILE_SIDES}
     for plate in plates:
         force, cop = (_per_frame(np.asarray(plate[key]), frames) for key in ("force", "center_of_pressure"))
         if plate["unit_force"] == "kN":
@@ -180,7 +180,7 @@ def _per_frame(samples: NDArray, frames: int) -> NDArray:
     return cut.reshape(3, -1, ratio).mean(axis=2)
 
 
-def _without_gaps(name: str, legs: Mapping[str, Curves], frames: int) -> slice:
+def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
     """The frames between the gaps at the beginning and the end; a gap in between is refused."""
     broken = {
         f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()

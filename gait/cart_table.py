@@ -16,7 +16,7 @@ from scipy.interpolate import BPoly, PPoly
 
 from .body import gravity
 
-SAMPLES = 240
+STEP_SAMPLES = 240
 """Knots a step of the tabulated CoM path; quintics between them, so that its error stays that of the integration."""
 
 
@@ -180,7 +180,7 @@ def _integrated(
     times, states = [], []
     # The ZMP has corners: integrating piece by piece keeps the order of the method.
     for start, end in pairwise(zmp_times):
-        grid = np.linspace(start, end, round(SAMPLES * (end - start) / step_time) + 2)
+        grid = np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)
         piece = solve_ivp(motion, (start, end), state, "DOP853", grid, rtol=1e-12, atol=1e-13)
         times.append(grid[:-1])
         states.append(piece.y[:, :-1])

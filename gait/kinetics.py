@@ -26,7 +26,7 @@ from .leg import (
     segment_turns,
 )
 from .plan import WalkPlan
-from .posture import GRID
+from .posture import POSTURE_SAMPLES
 from .scores import correlation
 
 ZMP_TOLERANCE = 1e-6
@@ -130,7 +130,7 @@ def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, Foo
     The plan is differentiated as a Fourier series of `PLAN_HARMONICS`; forces by `foot_force`.
     """
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
-    grid = np.arange(GRID) / GRID
+    grid = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     progress = np.array([2 * plan.step_length, 0.0])
     turns = segment_turns(plan.joint_angles(grid), plan.slope)
     hip = np.stack(plan.hip_position(grid), -1) - grid[:, None] * progress

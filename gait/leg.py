@@ -20,8 +20,8 @@ from .feet import turned
 from .human import ANGLES
 
 JOINTS = ("hip", "knee", "ankle", "toe")
-"""Joints of a leg from the top; joint i holds segment i of `SEGMENTS`."""
-SEGMENTS = ("thigh", "shank", "foot", "toe")
+"""Joints of a leg from the top; joint i holds segment i of `LEG_SEGMENTS`."""
+LEG_SEGMENTS = ("thigh", "shank", "foot", "toe")
 FOOT, TOE = 2, 3
 
 _MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
@@ -30,7 +30,7 @@ _MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegMotion:
-    """How one leg moves; from `leg_motion`, or filled in exactly. Segments in the order of `SEGMENTS`."""
+    """How one leg moves; from `leg_motion`, or filled in exactly. Segments in the order of `LEG_SEGMENTS`."""
 
     turn: NDArray
     """(..., 4) segment turns [rad]."""
@@ -186,7 +186,7 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     joints = list(joint_positions(body, motion.turn, motion.hip).values())
     force, turning = np.zeros(motion.hip.shape), np.zeros(motion.hip.shape[:-1])
     moments, forces = {}, {}
-    for index in reversed(range(len(SEGMENTS))):
+    for index in reversed(range(len(LEG_SEGMENTS))):
         mass, inertia = _inertial(body)[index]
         com, acceleration = _com(body, motion, joints, index)
         below = force, turning

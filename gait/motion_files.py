@@ -22,12 +22,12 @@ from .human import COLUMNS, FORCES
 
 PELVIS = "pelvis_anterior_tilt_deg"
 """Column (forward positive) that makes a thigh of a hip where there is no thigh."""
-TIME = ("time_s", "time")
-SIDES = ("left", "right")
+TIME_COLUMNS = ("time_s", "time")
+FILE_SIDES = ("left", "right")
 WALKING_SPEED = 0.3
 """A body slower than this [m/s] in the laboratory walks on a treadmill."""
 
-Curves = dict[str, NDArray]
+Series = dict[str, NDArray]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,7 +38,7 @@ class Trial:
     """The file's name."""
     time: NDArray
     """(T,) ascending [s]."""
-    legs: Mapping[str, Curves]
+    legs: Mapping[str, Series]
     """Side (left, right, or "" where the file has one leg) -> curve of `COLUMNS` -> (T,); rad, N m/kg, body weights."""
     unscaled: tuple[str, ...] = ()
     """Curves that are in N or N m, still to be divided by body weight or mass."""
@@ -101,17 +101,17 @@ def read_csv(path: Path) -> Table:
 
 def csv_trial(table: Table) -> Trial:
     """A walk over time: a column `time_s`, curves as in `COLUMNS`, with `_left` or `_right` behind for two legs."""
-    time = next((name for name in TIME if name in table.columns), None)
+    time = next((name for name in TIME_COLUMNS if name in table.columns), None)
     if time is None:
         raise SpringfootError(
             f"{table.name}, line 1: needs a column percent (mean curves over 0..100) or time_s (a walk over time)"
         )
     speed = float(table.numbers("speed_m_s").mean()) if table.has("speed_m_s") else None
-    legs = {side: our_columns(table, f"_{side}" if side else "") for side in ("", *SIDES)}
+    legs = {side: our_columns(table, f"_{side}" if side else "") for side in ("", *FILE_SIDES)}
     return Trial(name=table.name, time=table.ascending(time), legs=not_empty(table.name, legs), speed=speed)
 
 
-def our_columns(table: Table, suffix: str = "") -> Curves:
+def our_columns(table: Table, suffix: str = "") -> Series:
     """Curves of a table in our columns with `suffix` (as `_sd`) behind, in SI; `thigh` of hip and pelvis if need be."""
     curves = {}
     for name, column in COLUMNS.items():
@@ -148,7 +148,7 @@ def opensim_trial(path: Path) -> Trial:
     if "time" not in names:
         raise SpringfootError(f"{path.name}, line {end + 2}: no column time")
 
-    legs: dict[str, Curves] = {side: {} for side in SIDES}
+    legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
     tilt = table.numbers("pelvis_tilt") if "pelvis_tilt" in names else None
     for side, curves in legs.items():
         for coordinate, curve in _OPENSIM.items():
@@ -185,7 +185,7 @@ def opensim_trial(path: Path) -> Trial:
     )
 
 
-def not_empty(name: str, legs: Mapping[str, Curves]) -> dict[str, Curves]:
+def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:
     """The legs of which anything was measured; `SpringfootError` if there is none."""
     legs = {side: curves for side, curves in legs.items() if curves}
     if not legs:

@@ -17,8 +17,8 @@ from .c3d_file import c3d_trial
 from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
 from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series
-from .motion_files import Curves, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
-from .strides import Walk, cut_strides, together
+from .motion_files import Series, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
+from .strides import MeasuredWalk, cut_strides, together
 
 ACCEPTED = {
     "speed": (0.1, 4.0, "m/s"),
@@ -179,7 +179,7 @@ def _one_condition(table: Table, condition: str | None) -> Table:
     return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
 
 
-def _from_walk(walk: Walk, side: str, mass: float | None) -> OwnGait:
+def _from_walk(walk: MeasuredWalk, side: str, mass: float | None) -> OwnGait:
     """Strides averaged."""
     strides, curves = cut_strides(walk, side, mass)
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
@@ -203,10 +203,10 @@ def _from_walk(walk: Walk, side: str, mass: float | None) -> OwnGait:
     return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()})
 
 
-def _fitted(own: OwnGait, mean: Curves, sd: Curves) -> OwnGait:
+def _fitted(own: OwnGait, mean: Series, sd: Series) -> OwnGait:
     """`own` with series fitted to curves (101,)."""
 
-    def fit(curves: Curves) -> dict[str, list]:
+    def fit(curves: Series) -> dict[str, list]:
         rows = {}
         for name, curve in curves.items():
             rows[name] = stance_series(curve, own.toe_off or 1.0) if name in FORCES else fourier_series(curve)

@@ -20,7 +20,7 @@ from .cart_table import ComMotion, periodic_com
 from .errors import SpringfootError, require_within
 from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
 from .human import ANGLES, HumanGait, human_gait
-from .posture import GRID, Legs, highest_legs, legs_under_com, refuse_impossible_legs
+from .posture import POSTURE_SAMPLES, LegPostures, highest_legs, legs_under_com, refuse_impossible_legs
 
 Cadence = Literal["people", "thesis"]
 Point = tuple[NDArray, NDArray]
@@ -196,7 +196,7 @@ def plan_walk(
     zmp_points = np.array([zmp_to - step_length, zmp_from, zmp_to])
     feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, clearance)
 
-    def legs_at(height: float) -> tuple[ComMotion, Legs]:
+    def legs_at(height: float) -> tuple[ComMotion, LegPostures]:
         motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, double_support / 2, slope)
         return motion, legs_under_com(body, motion, feet, human)
 
@@ -257,10 +257,10 @@ def _refuse_zmp_outside(plan: WalkPlan) -> None:
 
 
 def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolator:
-    """Table (GRID, n) over phase 0..1 as a shape-keeping cubic: what is constant stays constant, nothing overshoots."""
+    """Table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic: what is constant stays constant, nothing overshoots."""
     edge = 4
     padded = np.concatenate([values[-edge:] - shift, values, values[: edge + 1] + shift])
-    return PchipInterpolator(np.arange(-edge, GRID + edge + 1) / GRID, padded, axis=0)
+    return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)
 
 
 def _named(columns: NDArray) -> dict[str, NDArray]:

@@ -13,7 +13,7 @@ from .errors import SpringfootError
 from .feet import FootPath, turned
 from .human import HumanGait
 
-GRID = 600
+POSTURE_SAMPLES = 600
 """Samples a stride."""
 STRAIGHTEST_KNEE = 0.06
 """Least knee flexion of the stride [rad], which sets the height of the CoM; people's is 0.085 at 1.2 m/s."""
@@ -40,7 +40,7 @@ def leg_angles(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Legs:
+class LegPostures:
     """One leg over its stride on the grid of phases: hip (x, z) and hip to ankle [m], joint angles [rad]."""
 
     hip: NDArray
@@ -51,18 +51,18 @@ class Legs:
     reach: NDArray
 
 
-def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGait) -> Legs:
+def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGait) -> LegPostures:
     """The posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one.
 
     Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
     """
-    phase = np.arange(GRID) / GRID
+    phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)
     com = np.stack([x + feet.step_length * (phase >= 0.5), z])
     ankle = np.stack(feet.ankle(phase))
     pitch = feet.pitch(phase)
     toe = toe_angle(feet, human, phase)
-    half = GRID // 2
+    half = POSTURE_SAMPLES // 2
     return legs_under(body, com, ankle, pitch, toe, lambda leg: leg + np.roll(leg, half, axis=-1), motion.slope)
 
 
@@ -74,7 +74,7 @@ def legs_under(
     toe: NDArray,
     both: Callable[[NDArray], NDArray],
     slope: float = 0.0,
-) -> Legs:
+) -> LegPostures:
     """The posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip.
 
     `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
@@ -103,7 +103,7 @@ def legs_under(
         hip = com - com_from_hip
         if moved < 1e-12:
             break
-    return Legs(
+    return LegPostures(
         hip=np.moveaxis(hip, 0, -1),
         thigh=np.asarray(thigh + slope),
         knee=knee,
@@ -144,7 +144,9 @@ def full_reach(body: Body, knee: float) -> float:
     return sqrt(a**2 + b**2 + 2 * a * b * cos(knee))
 
 
-def highest_legs(body: Body, legs_at: Callable[[float], tuple[ComMotion, Legs]]) -> tuple[ComMotion, Legs]:
+def highest_legs(
+    body: Body, legs_at: Callable[[float], tuple[ComMotion, LegPostures]]
+) -> tuple[ComMotion, LegPostures]:
     """The highest CoM, and its legs, at which no knee is straighter than `STRAIGHTEST_KNEE`."""
     reach = full_reach(body, STRAIGHTEST_KNEE)
     height = 1.08 * body.leg_length
@@ -163,11 +165,11 @@ def highest_legs(body: Body, legs_at: Callable[[float], tuple[ComMotion, Legs]])
     )
 
 
-def refuse_impossible_legs(body: Body, legs: Legs) -> None:
+def refuse_impossible_legs(body: Body, legs: LegPostures) -> None:
     """Raises `SpringfootError` for legs that would have to be longer, or to bend further, than they can."""
     too_far = float(legs.reach.max()) - full_reach(body, 0.0)
     if too_far > 0:
-        phase = int(legs.reach.argmax()) / GRID
+        phase = int(legs.reach.argmax()) / POSTURE_SAMPLES
         raise SpringfootError(f"legs too short by {too_far:.3f} m at {phase:.0%} of the stride: lower com_height")
     below = body.leg_length - float(legs.hip[:, 1].mean())
     if below > LOWEST_HIP * body.leg_length:
@@ -178,6 +180,6 @@ def refuse_impossible_legs(body: Body, legs: Legs) -> None:
     bent = degrees(float(legs.knee.max()))
     if bent > DEEPEST_KNEE_DEG:
         raise SpringfootError(
-            f"knee bent by {bent:.0f} deg at {int(legs.knee.argmax()) / GRID:.0%} of the stride, "
+            f"knee bent by {bent:.0f} deg at {int(legs.knee.argmax()) / POSTURE_SAMPLES:.0%} of the stride, "
             f"{bent - DEEPEST_KNEE_DEG:.1f} deg more than it can: less clearance helps"
         )

@@ -12,7 +12,7 @@ from .errors import SpringfootError
 from .feet import turned
 from .human import COLUMNS, FORCES
 from .leg import FOOT, joint_positions, segment_turns
-from .motion_files import Curves, Trial, refuse_absurd
+from .motion_files import Series, Trial, refuse_absurd
 
 FEWEST_STRIDES = 2
 """Strides, of both feet together, that a mean and its spread need."""
@@ -34,7 +34,7 @@ WEIGHT_BEARING = (15, 45)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Walk:
+class MeasuredWalk:
     """Trials of one walk on common, even samples."""
 
     name: str
@@ -43,7 +43,7 @@ class Walk:
     """Time of the first sample [s]."""
     tick: float
     """Between samples [s]."""
-    legs: dict[str, Curves]
+    legs: dict[str, Series]
     """Side -> curve -> (T,)."""
     unscaled: set[tuple[str, str]]
     """(side, curve) in N, N m or W."""
@@ -58,7 +58,7 @@ class Walk:
         return self.first + self.tick * (min(len(c) for leg in self.legs.values() for c in leg.values()) - 1)
 
 
-def together(trials: Sequence[Trial]) -> Walk:
+def together(trials: Sequence[Trial]) -> MeasuredWalk:
     """Trials of the same walk, each curve from the first that has it, and joint powers where they can be computed.
 
     Raises `SpringfootError` for sampling too coarse, a gap, or no time in common.
@@ -77,7 +77,7 @@ def together(trials: Sequence[Trial]) -> Walk:
     if last - first < tick:
         raise SpringfootError(f"{name}: the files have no time in common")
     time = first + tick * np.arange(int((last - first) / tick * (1 + 1e-12)) + 1)
-    legs: dict[str, Curves] = {}
+    legs: dict[str, Series] = {}
     unscaled, as_read = set(), {}
     for trial in trials:
         for side, curves in trial.legs.items():
@@ -99,10 +99,10 @@ def together(trials: Sequence[Trial]) -> Walk:
                     unscaled.add((side, power))
     contacts = {side: events for trial in reversed(trials) for side, events in trial.contacts.items()}
     speed = next((trial.speed for trial in trials if trial.speed is not None), None)
-    return Walk(name=name, first=first, tick=tick, legs=legs, unscaled=unscaled, contacts=contacts, speed=speed)
+    return MeasuredWalk(name=name, first=first, tick=tick, legs=legs, unscaled=unscaled, contacts=contacts, speed=speed)
 
 
-def cut_strides(walk: Walk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Curves]:
+def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Series]:
     """Times (S, 3) of heel strike, toe-off, next heel strike [s] and curve -> (strides with it, 101), scaled.
 
     `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises `SpringfootError` for too few strides.
@@ -130,7 +130,7 @@ def cut_strides(walk: Walk, side: str = "both", mass: float | None = None) -> tu
     return found, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
 
 
-def _strides(walk: Walk, side: str) -> NDArray:
+def _strides(walk: MeasuredWalk, side: str) -> NDArray:
     """(S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first means that finds enough of them."""
     leg, found = walk.legs[side], []
     if "grf_vertical" in leg:

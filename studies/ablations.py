@@ -23,11 +23,12 @@ import tyro
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.files import write_atomically
+from springfoot.agents.markdown import MISSING, table, text_of, write_section
 from springfoot.agents.multi_seed import is_finished, train_missing
 from springfoot.envs.control.equilibrium import PLATEAUS, foot_curves
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.phase_table import GRID
-from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings, reference_gait, settings_from, settings_to_json
 from springfoot.envs.timing import ACTION_STEP
 from springfoot.evaluation.metrics import measure
@@ -36,8 +37,6 @@ from springfoot.evaluation.report import people_metrics
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.scores import mean_sd
 from springfoot.gait.stiffness import SPRINGS, Segment, StiffnessSchedule
-
-from .markdown import MISSING, table, text_of, write_section
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
@@ -71,12 +70,12 @@ MEANING = {
     "ankle-only": "toe with the fixed schedule",
     "toe-only": "ankle with the fixed schedule",
 }
-KNOTS = ("hip_knots_deg", "knee_knots_deg", "ankle_knots_deg")
+KNOT_FIELDS = ("hip_knots_deg", "knee_knots_deg", "ankle_knots_deg")
 INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
     "all inputs": lambda c: c,
     "no moments of hip and knee fed forward": lambda c: replace(c, feedforward=(0.0, 0.0, c.feedforward[2])),
     "no ankle moment fed forward": lambda c: replace(c, feedforward=(*c.feedforward[:2], 0.0)),
-    "no knots": lambda c: replace(c, **{name: (0.0,) * len(getattr(c, name)) for name in KNOTS}),
+    "no knots": lambda c: replace(c, **{name: (0.0,) * len(getattr(c, name)) for name in KNOT_FIELDS}),
     "no speed feedback to the stance hip": lambda c: replace(c, speed_torque=0.0),
     "no foot placement by speed": lambda c: replace(c, swing_speed_gain=0.0),
 }
@@ -106,7 +105,7 @@ def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
     Each has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer, as between gait events,
     the fixed schedule falls.
     """
-    walk = walk_at(settings, settings.speed)
+    walk = reference_walk_at(settings, settings.speed)
     planned = replace(settings, equilibrium="planned", schedule=None)
     rest, stiffness = foot_curves(planned, walk.constants[0], walk)
     place = np.searchsorted(PLATEAUS, GRID, side="right") - 1
@@ -145,7 +144,7 @@ def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measurement:
+class Protocol:
     """How every row is measured."""
 
     episodes: int = 20
@@ -178,7 +177,7 @@ class Measurement:
         )
 
 
-def measured(path: Path, how: Measurement, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+def measured(path: Path, how: Protocol, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """What `make` found, kept in the file `path` as long as neither `how` nor `key` changes."""
     asked = json.loads(json.dumps({"how": {**vars(how), "threads": None}, "of": key}))
     if path.is_file():
@@ -191,7 +190,7 @@ def measured(path: Path, how: Measurement, key: Any, make: Callable[[], dict[str
     return metrics
 
 
-def trained(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
+def trained(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
     """Row -> the metrics of each of its finished seeds, in order; rows without any are left out."""
     rows = {}
     for name in ABLATIONS:
@@ -202,9 +201,9 @@ def trained(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
     return rows
 
 
-def inputs(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
+def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
     """Each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
-    own = walk_at(BipedSettings(), BipedSettings().speed).constants[0]
+    own = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
     rows: dict[str, list[dict[str, Any]]] = {}
     for number, (name, change) in enumerate(INPUTS.items()):
         legs = change(own)
@@ -214,7 +213,7 @@ def inputs(out: Path, how: Measurement) -> dict[str, list[dict[str, Any]]]:
     return rows | {"θ_eq: people's ankle angle alone": [measured(out / "input-angle.json", how, vars(own), make)]}
 
 
-def fixed(out: Path, how: Measurement, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
+def fixed(out: Path, how: Protocol, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
     """The thesis's straight lines, and before them the best `constant` (ankle, toe) [N m/rad] where it is known."""
     names = {"thesis lines": "thesis"}
     if constant is not None:
@@ -274,7 +273,7 @@ class Flags:
     """Also write the ablations into this page, between the markers of ABLATIONS and INPUTS."""
     readme: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Also write the table of springs into this page, between the markers of SPRINGS."""
-    how: tyro.conf.OmitArgPrefixes[Measurement] = Measurement()
+    how: tyro.conf.OmitArgPrefixes[Protocol] = Protocol()
     """How to measure."""
 
 

@@ -18,19 +18,18 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from springfoot.agents.baselines import Policy
+from springfoot.agents.baselines import PolicyFunction
 from springfoot.agents.command_line import policy_label
 from springfoot.agents.config import PRESETS
 from springfoot.agents.files import next_free, write_atomically
 from springfoot.agents.flags import SettingsFlags, given
+from springfoot.agents.markdown import table
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.subjects import DRAWN, Subjects
 from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import BATCH, Recording, prepare, record_each
 from springfoot.gait.errors import SpringfootError, require_count
-
-from .markdown import table
 
 RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
 """What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
@@ -58,7 +57,7 @@ def draw_pairs(settings: BipedSettings, pairs: int, seed: int = 0) -> dict[str, 
 
 
 def walk_pairs(
-    policy: Policy,
+    policy: PolicyFunction,
     settings: BipedSettings,
     who: Mapping[str, NDArray],
     *,

@@ -22,9 +22,10 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from springfoot.agents.baselines import BASELINES, Policy, constant, own_settings
+from springfoot.agents.baselines import BASELINES, PolicyFunction, constant, own_settings
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.flags import SettingsFlags, given, optional_flags
+from springfoot.agents.markdown import table, text_of
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
@@ -32,7 +33,6 @@ from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 
 from .body_sweep import JOINTS, Bodies
-from .markdown import table, text_of
 
 PUSHED = BipedSettings(push_newton=150.0)
 """Pushes [N] of `best-constant` and `compare` unless flagged otherwise."""
@@ -75,7 +75,7 @@ def mean_interval(values: NDArray, level: float = 0.95) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def run_row(name: str, policy: Policy, settings: BipedSettings, **how: Any) -> Row:
+def run_row(name: str, policy: PolicyFunction, settings: BipedSettings, **how: Any) -> Row:
     """Record (`episodes`, `seed`, `threads`, `progress` as for `recording.record`) and measure a policy."""
     recording = record(policy, settings, name=name, **how)
     return Row(name=name, metrics=measure(recording).metrics, returns=recording.returns)

@@ -25,6 +25,7 @@ from tqdm import tqdm
 from springfoot.agents.baselines import schedule
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.files import write_atomically
+from springfoot.agents.markdown import table, text_of, write_section
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, plateau_curve
 from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
 from springfoot.envs.control.phase_table import GRID
@@ -37,14 +38,12 @@ from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.stiffness import SPRINGS, TOE_STIFFNESS, Segment, StiffnessSchedule
 
-from .markdown import table, text_of, write_section
-
 SECTION = "ANY-K"
 """Of the results page."""
-SEGMENTS = 200
+PHASE_SEGMENTS = 200
 """Of a rebuilt schedule: half a percent of a stride each, less than the control window in which theta_eq is held."""
-STARTS = np.arange(SEGMENTS) / SEGMENTS
-"""Their first phases, (SEGMENTS,)."""
+STARTS = np.arange(PHASE_SEGMENTS) / PHASE_SEGMENTS
+"""Their first phases, (PHASE_SEGMENTS,)."""
 STIFFNESSES = ("recorded", "flat:150", "flat:250", "flat:400", "times:0.6", "times:1.6", "reversed", "people")
 """The K walked with by default: the gait's own; the same at every phase [N m/rad of the ankle]; a multiple of its own;
 its own backwards in time; people's quasi-stiffness."""
@@ -52,7 +51,7 @@ its own backwards in time; people's quasi-stiffness."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeanSprings:
-    """Ankle and toe of both legs over the phase of the leg controller, means of a recording, (SEGMENTS, 2) each."""
+    """Ankle and toe of both legs over the phase of the leg controller, means of a recording, (PHASE_SEGMENTS, 2) each."""
 
     body: Body
     angle: NDArray
@@ -70,15 +69,15 @@ def mean_springs(recording: Recording) -> MeanSprings:
     begin = round(WARM_UP / TICK)
     phase = recording.series["phase"][:, begin:].ravel()
     walked = np.isfinite(phase)
-    segment = np.minimum((phase[walked] * SEGMENTS).astype(int), SEGMENTS - 1)
-    count = np.bincount(segment, minlength=SEGMENTS)
-    if not walked.any() or (count > 0).sum() < SEGMENTS / 2:
+    segment = np.minimum((phase[walked] * PHASE_SEGMENTS).astype(int), PHASE_SEGMENTS - 1)
+    count = np.bincount(segment, minlength=PHASE_SEGMENTS)
+    if not walked.any() or (count > 0).sum() < PHASE_SEGMENTS / 2:
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be rebuilt")
 
     def mean(name: str) -> NDArray:
         values = recording.series[name][:, begin:]
         values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[walked].astype(float)
-        totals = [np.bincount(segment, values[:, joint], SEGMENTS)[count > 0] for joint in range(2)]
+        totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[count > 0] for joint in range(2)]
         at = STARTS[count > 0]  # a leg that lands early skips the last phases
         return np.stack([np.interp(STARTS, at, total / count[count > 0], period=1.0) for total in totals], -1)
 
@@ -89,7 +88,7 @@ def mean_springs(recording: Recording) -> MeanSprings:
 
 
 def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
-    """K (SEGMENTS, 2) > 0 [N m/rad] with the equilibrium at which it gives the gait's torque on the gait's course."""
+    """K (PHASE_SEGMENTS, 2) > 0 [N m/rad] with the equilibrium at which it gives the gait's torque on the gait's course."""
     beta = np.array(damping_times(springs.body))[FEET]
     rest = springs.angle + beta * springs.velocity + springs.torque / stiffness
     columns = zip(SPRINGS, stiffness.T, rest.T, strict=True)
@@ -97,7 +96,7 @@ def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
 
 
 def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
-    """(SEGMENTS, 2) K of ankle and toe [N m/rad]: one of `STIFFNESSES`, or those with other numbers."""
+    """(PHASE_SEGMENTS, 2) K of ankle and toe [N m/rad]: one of `STIFFNESSES`, or those with other numbers."""
     kind, _, text = name.partition(":")
     try:
         number = float(text) if text else nan
@@ -108,14 +107,14 @@ def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
         if kind == "times":
             return number * springs.stiffness
         flat = number * np.array([1.0, TOE_STIFFNESS_UNIT / ANKLE_STIFFNESS_UNIT]) * scale
-        return np.tile(flat, (SEGMENTS, 1))
+        return np.tile(flat, (PHASE_SEGMENTS, 1))
     if name == "recorded":
         return springs.stiffness
     if name == "reversed":
         return springs.stiffness[::-1]
     if name == "people":
         ankle = np.interp(STARTS, GRID, plateau_curve(REFERENCE_STIFFNESS))
-        return np.stack([ankle, np.full(SEGMENTS, TOE_STIFFNESS)], -1) * scale
+        return np.stack([ankle, np.full(PHASE_SEGMENTS, TOE_STIFFNESS)], -1) * scale
     raise SpringfootError(f"stiffness must be one of {', '.join(STIFFNESSES)} (or other numbers > 0), got {name!r}")
 
 

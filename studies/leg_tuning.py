@@ -25,7 +25,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name
-from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_material
 from springfoot.envs.settings import BipedSettings, Feedforward
 from springfoot.envs.step_result import Tick
@@ -195,7 +195,7 @@ def _walk(settings, candidates, walks, seed, threads, ease=0.0) -> tuple[NDArray
 
 def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
     """(C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
-    walk = walk_at(settings, settings.speed, candidates)
+    walk = reference_walk_at(settings, settings.speed, candidates)
     curves = [
         [foot_curves(kind, c, walk)[0] for c in candidates]
         for kind in (settings, replace(settings, equilibrium="planned"))

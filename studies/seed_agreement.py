@@ -23,14 +23,13 @@ from tqdm import tqdm
 
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.files import write_atomically
-from springfoot.evaluation.criteria import HUMAN_LIKE, Limit, number_text, numbers
+from springfoot.agents.markdown import table, write_section
+from springfoot.evaluation.criteria import HUMAN_LIKE, Criterion, number_text, numbers
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError, require_count
-
-from .markdown import table, write_section
 
 SECTION = "AGREEMENT"
 """Of the results page."""
@@ -38,7 +37,7 @@ LOADED = 0.1
 """A joint carries load where its moment is beyond this share of its largest."""
 MOST = 0.15
 """Coefficient of variation of K over seeds up to which they agree, wherever the joint carries load."""
-CURVES = {
+SPRING_COLUMNS = {
     "ankle": ("ankle_stiffness_Nm_per_rad", "ankle_equilibrium_deg", "ankle_moment_Nm_per_kg"),
     "toe": ("toe_stiffness_Nm_per_rad", "mtp_equilibrium_deg", "mtp_moment_Nm_per_kg"),
 }
@@ -88,7 +87,7 @@ def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
     if idle := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
         raise SpringfootError(f"{idle[0]} walks no strides to compare")
     found = []
-    for joint, names in CURVES.items():
+    for joint, names in SPRING_COLUMNS.items():
         stiffness, equilibrium, torque = (np.stack([gait.both.mean(name) for gait in gaits]) for name in names)
         found.append(Agreement(joint=joint, stiffness=stiffness, equilibrium=equilibrium, torque=torque))
     return found
@@ -144,7 +143,7 @@ def limits_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str
     return table(["", "limit", "loosened", *(f"`{name}`" for name in names)], lines)
 
 
-def _state(limit: Limit, values: dict[str, Any]) -> str:
+def _state(limit: Criterion, values: dict[str, Any]) -> str:
     if limit.holds(values):
         return ""
     return "(" if limit.loosened().holds(values) else "**"
@@ -154,7 +153,9 @@ def csv_text(found: Sequence[Agreement]) -> str:
     """CSV over percent of the stride: mean and SD over the policies of K, theta_eq and torque, CV of K, load."""
     columns: dict[str, NDArray] = {"percent": PERCENT}
     for each in found:
-        for name, curves in zip(CURVES[each.joint], (each.stiffness, each.equilibrium, each.torque), strict=True):
+        for name, curves in zip(
+            SPRING_COLUMNS[each.joint], (each.stiffness, each.equilibrium, each.torque), strict=True
+        ):
             columns |= {name: curves.mean(axis=0), f"{name}_sd": curves.std(axis=0, ddof=1)}
         columns |= {f"{each.joint}_stiffness_cv": each.variation, f"{each.joint}_loaded": each.loaded.astype(int)}
     rows = (",".join(f"{value:.6g}" for value in row) for row in zip(*columns.values(), strict=True))

@@ -64,7 +64,7 @@ class SlopeFlags:
     """File of constants to begin with and to write."""
 
 
-def constants_at(vector: NDArray) -> SlopeConstants:
+def constants_of(vector: NDArray) -> SlopeConstants:
     """The constants of a vector (10,): hip, knee, ankle, trunk."""
     hip, knee, ankle = np.round(vector[:9], 3).reshape(3, 3).tolist()
     return slope_constants_from({"hip": hip, "knee": knee, "ankle": ankle, "trunk": round(float(vector[9]), 3)})
@@ -143,13 +143,13 @@ def search(flags: SlopeFlags) -> None:
     for generation in range(flags.generations):
         vectors, seed = strategy.ask(), flags.seed + 1000 * generation
         level = walk(None, (0.0,), flags.walks, flags.seconds, seed, flags.threads)["reward"].mean()
-        found = [walk(constants_at(v), SLOPES_DEG, flags.walks, flags.seconds, seed, flags.threads) for v in vectors]
+        found = [walk(constants_of(v), SLOPES_DEG, flags.walks, flags.seconds, seed, flags.threads) for v in vectors]
         paid = [cost(walked, level) for walked in found]
         strategy.tell(vectors, paid)
         print(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}", flush=True)
     judged = {"began with": (began, _judge(began, flags))}
     if flags.generations:
-        mean = constants_at(strategy.mean)
+        mean = constants_of(strategy.mean)
         judged["found"] = mean, _judge(mean, flags)
     best = min(judged, key=lambda name: judged[name][1])
     if best == "found":

@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.markdown import MISSING, table, text_of, write_section
 from springfoot.agents.multi_seed import is_finished, train_missing
 from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
 from springfoot.envs.task.reward import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
@@ -32,7 +33,6 @@ from springfoot.evaluation.recording import TICK, Recording, prepare, record
 from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 
-from .markdown import MISSING, table, text_of, write_section
 from .seed_agreement import agreements
 
 SECTION = "TRADE-OFF"
@@ -56,7 +56,7 @@ def stiffness_cost(recording: Recording) -> float | None:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Point:
+class WeightResult:
     """One weight of the cost: what each of its seeds came to."""
 
     weight: float
@@ -102,9 +102,9 @@ def measure_point(
     seconds: float = 20.0,
     progress: Callable[[float], object] = lambda simulated: None,
     **how: Any,
-) -> Point:
+) -> WeightResult:
     """Walk the best policy of each run folder, undisturbed and under each push; `how` as for `recording.record`."""
-    point = Point(weight=weight, gaits=[], cost=[], falls={push: [] for push in pushes})
+    point = WeightResult(weight=weight, gaits=[], cost=[], falls={push: [] for push in pushes})
     for folder in folders:
         for push in (0.0, *pushes):
             policy, settings = prepare(str(folder), {"episode_seconds": seconds, "push_newton": push})
@@ -132,7 +132,7 @@ def knee(cost: ArrayLike, loss: ArrayLike) -> int | None:
     return int(below.argmax()) if below.max() > 1e-9 else None
 
 
-def knee_of(points: Sequence[Point]) -> int | None:
+def knee_of(points: Sequence[WeightResult]) -> int | None:
     """The knee of loss over stiffness cost: RMSE and falls under pushes, each scaled to 0..1 over the points and added.
 
     A point whose seeds do not all walk has no place on the curve.
@@ -148,7 +148,7 @@ def knee_of(points: Sequence[Point]) -> int | None:
     return None if found is None else known[found]
 
 
-def tradeoff_table(points: Sequence[Point], term: Term) -> str:
+def tradeoff_table(points: Sequence[WeightResult], term: Term) -> str:
     """Markdown: a row a weight, mean ± SD over its seeds."""
     pushes = list(points[0].falls)
     head = [f"weight of `{term}`", "seeds", "mean K² cost", "RMSE thigh, knee, ankle °", "falls"]
@@ -178,7 +178,7 @@ def _spread(values: Sequence[float | None], pattern: str) -> str:
     return mean if known["sd"] is None else f"{mean} ± {text_of(known['sd'], pattern)}"
 
 
-def save_figure(path: Path, points: Sequence[Point], term: Term) -> None:
+def save_figure(path: Path, points: Sequence[WeightResult], term: Term) -> None:
     """Write the picture: RMSE, falls and variation over seeds against the stiffness cost; the knee and the default."""
     points = [point for point in points if None not in (*point.rmse, *point.cost)]
     if not points:

@@ -26,7 +26,7 @@ PHASE = 0.5 + np.arange(751) / 1000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Walk:
+class DrawnWalk:
     """A walk over `PHASE`, x from this foot's last standing place [m]; arrays (2, n) are (x, z)."""
 
     title: str
@@ -60,7 +60,7 @@ class Walk:
         return np.stack([ahead - ahead[step].mean(), self.com[1] - self.com[1][step].mean()])
 
 
-def as_printed(walk: ThesisWalk) -> Walk:
+def as_printed(walk: ThesisWalk) -> DrawnWalk:
     """The thesis's walk."""
     stride_time = 2 * walk.step_time
     origin = walk.k * walk.step_length
@@ -72,7 +72,7 @@ def as_printed(walk: ThesisWalk) -> Walk:
     def moved(xz: tuple[NDArray, NDArray]) -> NDArray:
         return np.stack([xz[0] - origin, xz[1]])
 
-    return Walk(
+    return DrawnWalk(
         title="as printed",
         color=PRINTED,
         step_length=walk.step_length,
@@ -89,7 +89,7 @@ def as_printed(walk: ThesisWalk) -> Walk:
     )
 
 
-def as_planned(plan: WalkPlan) -> Walk:
+def as_planned(plan: WalkPlan) -> DrawnWalk:
     """A plan of ours."""
     step_phase = np.mod(2 * PHASE, 1.0)
     stance_foot = plan.step_length * np.floor(2 * PHASE + 1e-9)
@@ -101,7 +101,7 @@ def as_planned(plan: WalkPlan) -> Walk:
         return np.stack([xz[0] + by, xz[1]])
 
     foot, other = (foot_force(plan, phase)[0].T / weight for phase in (PHASE, PHASE + 0.5))
-    return Walk(
+    return DrawnWalk(
         title="corrected plan",
         color=PLAN,
         step_length=plan.step_length,
@@ -117,7 +117,7 @@ def as_planned(plan: WalkPlan) -> Walk:
     )
 
 
-def of_people(speed: float, body: Body) -> Walk:
+def of_people(speed: float, body: Body) -> DrawnWalk:
     """People's mean walk: CoM from their forces integrated twice, feet from their angles under a hip that moves so."""
     human = human_gait(speed, body.height)
     n = 1000
@@ -138,7 +138,7 @@ def of_people(speed: float, body: Body) -> Walk:
     def moved(path: NDArray) -> NDArray:
         return (path - off)[:, index] + np.stack([later, 0 * later])
 
-    return Walk(
+    return DrawnWalk(
         title=f"people, {human.speed:.1f} m/s",
         color=PEOPLE,
         step_length=stride / 2,
@@ -175,10 +175,10 @@ def _integrated_twice(acceleration: NDArray, period: float) -> NDArray:
 
 # The pictures ------------------------------------------------------------------------------------------------
 
-Draw = Callable[[Axes, Walk], None]
+Draw = Callable[[Axes, DrawnWalk], None]
 
 
-def save_figures(folder: Path, walks: Sequence[Walk]) -> None:
+def save_figures(folder: Path, walks: Sequence[DrawnWalk]) -> None:
     """Write figure-6.png ... figure-10.png into `folder`: a column a walk, a row a quantity, one scale a row."""
     figures: dict[int, list[tuple[str, Draw]]] = {
         6: [
@@ -222,7 +222,7 @@ def _save(figure: Figure, path: Path) -> None:
     Image.open(buffer).convert("RGB").quantize(64).save(path, optimize=True)
 
 
-def _contact(ax: Axes, walk: Walk) -> None:
+def _contact(ax: Axes, walk: DrawnWalk) -> None:
     """Double support grey; 100 % is this foot's heel strike."""
     for start in (50, 100):
         ax.axvspan(start, start + 50 * walk.double_support, color="#eeeeee", lw=0)
@@ -230,24 +230,24 @@ def _contact(ax: Axes, walk: Walk) -> None:
     ax.axhline(0, color="#bbbbbb", lw=0.7, zorder=0.5)
 
 
-def _line(ax: Axes, walk: Walk, values: NDArray) -> None:
+def _line(ax: Axes, walk: DrawnWalk, values: NDArray) -> None:
     ax.plot(100 * PHASE, values, color=walk.color, lw=1.8)
 
 
-def _path(ax: Axes, walk: Walk, name: str, row: int) -> None:
+def _path(ax: Axes, walk: DrawnWalk, name: str, row: int) -> None:
     _line(ax, walk, getattr(walk, name)[row])
     if name in walk.knots:
         phase, knots = walk.knots[name]
         ax.plot(100 * phase, knots[row], "o", color=walk.color, ms=4)
 
 
-def _forces(ax: Axes, walk: Walk, row: int) -> None:
+def _forces(ax: Axes, walk: DrawnWalk, row: int) -> None:
     _line(ax, walk, walk.force[row])
     if walk.foot is not None:
         ax.plot(100 * PHASE, walk.foot[row], color=walk.color, lw=1.2, ls=(0, (3, 1.5)))
 
 
-def _zmp(ax: Axes, walk: Walk) -> None:
+def _zmp(ax: Axes, walk: DrawnWalk) -> None:
     if walk.support is not None:
         ax.fill_between(100 * PHASE, *walk.support, color="#f1d9a7", alpha=0.6, lw=0)
     _line(ax, walk, walk.zmp)

@@ -12,21 +12,21 @@ from pathlib import Path
 import numpy as np
 
 from springfoot.agents.command_line import exit_code
+from springfoot.agents.markdown import table
 from springfoot.gait import thesis_schedule
 from springfoot.gait.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
 
-from .markdown import table
-from .thesis_figures import PHASE, Walk, as_planned, as_printed, of_people, save_figures
-from .thesis_tables import BODY, SPEED, STRIDE, cart_table, claims, corrected, moments, people_work, springs
+from .thesis_figures import PHASE, DrawnWalk, as_planned, as_printed, of_people, save_figures
+from .thesis_tables import BODY, STRIDE, THESIS_SPEED, cart_table, claims, corrected, moments, people_work, springs
 
-WIDTH = 130
-TIME = np.linspace(0.5, 1.25, 7501)
+LINE_WIDTH = 130
+PRINTED_TIMES = np.linspace(0.5, 1.25, 7501)
 """Times of the thesis's figures [s]."""
 
 
-def walks() -> tuple[Walk, Walk, Walk]:
+def walks() -> tuple[DrawnWalk, DrawnWalk, DrawnWalk]:
     """The three columns of every figure."""
-    return as_printed(ThesisWalk()), as_planned(corrected()), of_people(SPEED, BODY)
+    return as_printed(ThesisWalk()), as_planned(corrected()), of_people(THESIS_SPEED, BODY)
 
 
 def page() -> str:
@@ -39,7 +39,7 @@ def page() -> str:
 
 def _filled(paragraph: str) -> str:
     words = " ".join(paragraph.split())
-    return textwrap.fill(words, WIDTH, break_long_words=False, break_on_hyphens=False)
+    return textwrap.fill(words, LINE_WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def _head() -> str:
@@ -48,16 +48,16 @@ def _head() -> str:
 
 D. W. Nam, *Numerical analysis of ZMP based biped walking model with different stiffness of ankle and toe joint*, DGIST
 2016. **As printed** is `springfoot.gait.thesis`: its via-points and formulas, faults included; names that its program
-never defines are read as `READINGS` there says. **Corrected** is `plan_walk(Body(), {SPEED}, "thesis")`: the same body,
+never defines are read as `READINGS` there says. **Corrected** is `plan_walk(Body(), {THESIS_SPEED}, "thesis")`: the same body,
 step ({plan.step_length:.1f} m in {plan.step_time:.1f} s) and double support ({plan.double_support:.2f} s), and a CoM
-that obeys equation (1) over a ZMP under the feet. **People** are the mean curves of `human_gait({SPEED})`. `python -m
+that obeys equation (1) over a ZMP under the feet. **People** are the mean curves of `human_gait({THESIS_SPEED})`. `python -m
 springfoot.studies.thesis_page` writes this page.
 
 All figures show the thesis's 0.75 s on one axis: from the other foot's heel strike (50 % of this foot's stride) over
 its own (100 %) into stance. Double support is grey, dots are via-points."""
 
 
-def _figures(printed: Walk, plan: Walk, people: Walk) -> list[str]:
+def _figures(printed: DrawnWalk, plan: DrawnWalk, people: DrawnWalk) -> list[str]:
     three = (printed, plan, people)
     walk = ThesisWalk()
     sway, rise = np.transpose([100 * np.ptp(each.com_wave, axis=1) for each in three])
@@ -73,10 +73,10 @@ def _figures(printed: Walk, plan: Walk, people: Walk) -> list[str]:
     vertical = [f"{100 * each.force[1].min():.1f} to {100 * each.force[1].max():.1f} %" for each in (printed, plan)]
     fore_aft = []
     for name in INTERPOLATIONS:
-        share = 100 * ThesisWalk(interpolation=name).com_acceleration(TIME)[0] / GRAVITY
+        share = 100 * ThesisWalk(interpolation=name).com_acceleration(PRINTED_TIMES)[0] / GRAVITY
         fore_aft.append(f"{name} {share.min():+.0f} … {share.max():+.0f} %")
 
-    outside = walk.zmp_outside(TIME)
+    outside = walk.zmp_outside(PRINTED_TIMES)
     step = np.arange(10_000) / 10_000
     (rear, front), zmp = corrected().support(step), corrected().zmp(step)
     margin = 1000 * np.minimum(zmp - rear, front - zmp).min()
@@ -131,8 +131,8 @@ def _figures(printed: Walk, plan: Walk, people: Walk) -> list[str]:
             "ZMP",
             f"""Yellow: feet on the ground; dotted: CoM. By equation (1) the printed ZMP is off the feet
             {100 * np.mean(outside != 0):.0f} % of the time, by up to {100 * outside.max():.0f} cm ahead of the toes
-            ({TIME[outside.argmax()]:.2f} s, heel strike) and {-100 * outside.min():.0f} cm behind the heel
-            ({TIME[outside.argmin()]:.2f} s), each foot counted whole from heel strike to toe-off. The thesis saw it
+            ({PRINTED_TIMES[outside.argmax()]:.2f} s, heel strike) and {-100 * outside.min():.0f} cm behind the heel
+            ({PRINTED_TIMES[outside.argmin()]:.2f} s), each foot counted whole from heel strike to toe-off. The thesis saw it
             follow the CoM "under the plantar": its program divides two rows by `/`, in MATLAB one least-squares
             quotient and not a division at each time, and so gets the CoM moved by a constant ({behind:.0f} mm for the
             least-squares cubic). The plan's is inside at 10 000 samples of a step, by {margin:.1f} mm at least.

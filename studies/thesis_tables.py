@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from springfoot.agents.markdown import table
 from springfoot.gait import GRAVITY, Body, WalkPlan, human_gait, plan_walk
 from springfoot.gait.kinetics import (
     foot_force,
@@ -18,10 +19,9 @@ from springfoot.gait.scores import correlation, force_features, positive_work
 from springfoot.gait.stiffness import ankle_quasi_stiffness, schedule_from_curves
 from springfoot.gait.thesis import ThesisWalk
 
-from .markdown import table
 from .thesis_figures import of_people
 
-BODY, SPEED = Body(), 1.2
+BODY, THESIS_SPEED = Body(), 1.2
 DOUBLE_SUPPORTS = (0.03, 0.06, 0.09, 0.12, 0.15)
 """T_d of the cart-table's table [s]."""
 TRAVELS = ((0.0, 0.11), (-0.02, 0.14), (-0.08, 0.165))
@@ -30,18 +30,18 @@ middle."""
 ANGLE_NOISE = np.radians(0.5)
 """Of a good gait laboratory [rad]."""
 STRIDE = np.arange(1000) / 1000
-PERCENT = np.arange(101) / 100
+PHASES = np.arange(101) / 100
 
 
 @cache
 def corrected() -> WalkPlan:
     """The plan with the thesis's step: 0.6 m, 0.5 s, T_d = 0.06 s."""
-    return plan_walk(BODY, SPEED, "thesis")
+    return plan_walk(BODY, THESIS_SPEED, "thesis")
 
 
 def claims() -> str:
     """Each claim of the thesis beside ours and people's."""
-    plan, human = corrected(), human_gait(SPEED)
+    plan, human = corrected(), human_gait(THESIS_SPEED)
     ours, people = (_features(plan), _people_features())
     toe, ankle = (np.degrees(plan.joint_angles(STRIDE)[joint]) for joint in ("toe", "ankle"))
     people_toe, people_ankle = (np.degrees(human.mean(joint, STRIDE)) for joint in ("toe", "ankle"))
@@ -51,7 +51,7 @@ def claims() -> str:
     torque = ThesisWalk().joint_torque("ankle", np.linspace(0.5, 1.25, 751)) / BODY.mass
     rms = [_rms_deg(plan, joint) for joint in ("thigh", "knee", "ankle")]
     up = 100 * plan.com_acceleration(STRIDE)[1] / GRAVITY
-    people_up = 100 * (of_people(SPEED, BODY).force[1] - 1)
+    people_up = 100 * (of_people(THESIS_SPEED, BODY).force[1] - 1)
     stance = 50 + 50 * ThesisWalk().double_support / ThesisWalk().step_time
     needed = (0.62 - 0.5) * plan.stride_time
     rows = [
@@ -127,11 +127,11 @@ def claims() -> str:
 
 def cart_table() -> str:
     """What forces a cart-table plan can have."""
-    human = human_gait(SPEED)
+    human = human_gait(THESIS_SPEED)
     step_time = human.stride_time / 2
     rows, push_off = [], []
     for double_support in DOUBLE_SUPPORTS:
-        plans = [plan_walk(BODY, SPEED, double_support=double_support, zmp_travel=travel) for travel in TRAVELS]
+        plans = [plan_walk(BODY, THESIS_SPEED, double_support=double_support, zmp_travel=travel) for travel in TRAVELS]
         push_off.append(_features(plans[1])[1])
         cells = [_five(_features(plan)) for plan in plans]
         rows.append((f"{double_support:.2f}", *cells, f"{_rms_deg(plans[1], 'knee'):.0f}°"))
@@ -139,8 +139,8 @@ def cart_table() -> str:
     rows.append((f"people, {_people_double_support():.3f}", _five(people), "", "", "–"))
     # Valley of a cosine: 1 - a (2 pi / T)^2 / g.
     amplitude = (1 - people[3]) * GRAVITY * (step_time / (2 * np.pi)) ** 2
-    shallow = _features(plan_walk(BODY, SPEED, double_support=DOUBLE_SUPPORTS[-1], com_amplitude=amplitude))
-    rise = 1000 * np.ptp(of_people(SPEED, BODY).com_wave[1])
+    shallow = _features(plan_walk(BODY, THESIS_SPEED, double_support=DOUBLE_SUPPORTS[-1], com_amplitude=amplitude))
+    rise = 1000 * np.ptp(of_people(THESIS_SPEED, BODY).com_wave[1])
     enough = float(np.interp(-people[1], -np.array(push_off), DOUBLE_SUPPORTS))
     travels = [f"ZMP {100 * start:.3g} → {100 * end:.3g} cm" for start, end in TRAVELS]
     head = ("T_d (s)", *travels, "knee")
@@ -166,7 +166,7 @@ single support: no single cosine does that."""
 
 def moments() -> str:
     """GRF projection against inverse dynamics, per joint, stance and swing."""
-    human = human_gait(SPEED)
+    human = human_gait(THESIS_SPEED)
     people, planned = people_leg(human, BODY, STRIDE), planned_leg(corrected(), STRIDE)
     rows = [
         (a.joint, a.part, *(f"{e.rms:.3f}, {e.peak:.3f}" + (f", {e.r:.3f}" if e.r is not None else "") for e in (a, b)))
@@ -193,7 +193,7 @@ people's mean curves (this body, one subject's centre of pressure) against their
 
 def springs() -> str:
     """Lines between events, and identified springs beside published quasi-stiffness."""
-    plan, human = corrected(), human_gait(SPEED)
+    plan, human = corrected(), human_gait(THESIS_SPEED)
     phase = np.linspace(0.0, human.toe_off, 1001)
     torque = -human.mean("ankle_moment", phase)
     people = schedule_from_curves(phase, human.toe_off, (human.mean("ankle", phase), torque)).ankle
@@ -246,7 +246,7 @@ correlated from sample to sample, so that these intervals are too narrow."""
 
 def people_work() -> dict[str, float]:
     """Positive joint work of one leg of people a stride [J/kg]."""
-    human = human_gait(SPEED)
+    human = human_gait(THESIS_SPEED)
     tick = human.stride_time / len(STRIDE)
     return {
         joint: float(positive_work(human.mean(f"{joint}_power", STRIDE), tick)) for joint in ("hip", "knee", "ankle")
@@ -254,23 +254,23 @@ def people_work() -> dict[str, float]:
 
 
 def _rms_deg(plan: WalkPlan, joint: str) -> float:
-    error = plan.joint_angles(STRIDE)[joint] - human_gait(SPEED).mean(joint, STRIDE)
+    error = plan.joint_angles(STRIDE)[joint] - human_gait(THESIS_SPEED).mean(joint, STRIDE)
     return float(np.degrees(np.sqrt(np.mean(error**2))))
 
 
 def _people_double_support() -> float:
-    human = human_gait(SPEED)
+    human = human_gait(THESIS_SPEED)
     return (human.toe_off - 0.5) * human.stride_time
 
 
 def _features(plan: WalkPlan) -> tuple[float, ...]:
     """Braking and push-off peak, first hump, valley, second hump of one foot [body weights]."""
-    return _peaks(foot_force(plan, PERCENT)[0].T / (plan.body.mass * GRAVITY))
+    return _peaks(foot_force(plan, PHASES)[0].T / (plan.body.mass * GRAVITY))
 
 
 def _people_features() -> tuple[float, ...]:
-    human = human_gait(SPEED)
-    return _peaks(np.stack([human.mean(f"grf_{name}", PERCENT) for name in ("forward", "vertical")]))
+    human = human_gait(THESIS_SPEED)
+    return _peaks(np.stack([human.mean(f"grf_{name}", PHASES) for name in ("forward", "vertical")]))
 
 
 def _peaks(force: NDArray) -> tuple[float, ...]:

@@ -8,14 +8,14 @@ import pytest
 
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
 from springfoot.gait.human import FORCES
-from springfoot.gait.motion_files import SIDES
+from springfoot.gait.motion_files import FILE_SIDES
 from springfoot.gait.own_data import read_gait
 
 HUMAN = human_gait(1.3)
 MASS, SECONDS, BEGIN = 71.0, 12.0, 0.5
 PHASE = np.arange(101) / 100
 ANGLES, MOMENTS = ("thigh", "hip", "knee", "ankle", "toe"), ("hip_moment", "knee_moment", "ankle_moment")
-OFFSETS = dict(zip(SIDES, (0.2, 0.7), strict=True))
+OFFSETS = dict(zip(FILE_SIDES, (0.2, 0.7), strict=True))
 """Stride phase of each leg at time 0."""
 
 
@@ -28,7 +28,7 @@ def laboratory(path, plates=None, events=False, moment_sign=1.0, gap=None, force
     time = BEGIN + np.arange(round(SECONDS * 100)) / 100
     flat = np.zeros_like(time)
     points = {}
-    for side in SIDES:
+    for side in FILE_SIDES:
         letter, strides = side[0].upper(), strides_at(time, side)
         x = {name: np.degrees(HUMAN.mean(name, strides)) for name in ANGLES}
         x["pelvis"] = x["hip"] - x["thigh"]
@@ -48,7 +48,7 @@ def laboratory(path, plates=None, events=False, moment_sign=1.0, gap=None, force
     file["parameters"]["POINT"]["LABELS"]["value"] = [f"Subject:{label}" for label in points]
     file["data"]["points"] = np.concatenate([data, np.ones((1, *data.shape[1:]))])
     if plates:
-        add_plates(file, {side: force_sign * plates(side) for side in SIDES})
+        add_plates(file, {side: force_sign * plates(side) for side in FILE_SIDES})
     if events:
         add_events(file)
     file.write(str(path))
@@ -82,7 +82,7 @@ def add_plates(file, forces):
 
 def add_events(file):
     marks = []
-    for side in SIDES:
+    for side in FILE_SIDES:
         for label, phase in (("Foot Strike", 0.0), ("Foot Off", HUMAN.toe_off)):
             times = (np.arange(13) + phase - OFFSETS[side]) * HUMAN.stride_time - BEGIN
             marks += [(side.capitalize(), label, time) for time in times if 0 < time < SECONDS]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import tyro
 
-import evaluate
-import train
+from springfoot.agents.train_command import TrainFlags
+from springfoot.evaluation.evaluate_command import EvaluateFlags
 from springfoot.gait import human_gait
 from springfoot.studies import comparison as studies
 
@@ -20,7 +20,9 @@ PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 COMMANDS = re.findall(
-    r"(?:^|`)python (train\.py|evaluate\.py|-m springfoot\.agents\.studies) ([^`#\n…]*)(?=[`#\n])", README, re.MULTILINE
+    r"(?:^|`)python (train\.py|evaluate\.py|-m springfoot\.studies\.comparison) ([^`#\n…]*)(?=[`#\n])",
+    README,
+    re.MULTILINE,
 )
 
 
@@ -55,8 +57,8 @@ def test_readme_examples_run_in_their_order(folder):
 
 def test_readme_commands_are_understood(folder):
     programs = {
-        "train.py": train.Flags,
-        "evaluate.py": evaluate.Flags,
+        "train.py": TrainFlags,
+        "evaluate.py": EvaluateFlags,
         "-m springfoot.studies.comparison": studies.BestConstant | studies.Compare | studies.Seeds | studies.Bodies,
     }
     assert {program for program, _ in COMMANDS} == set(programs)

@@ -11,7 +11,7 @@ import pytest
 
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
 from springfoot.gait.human import COLUMNS, FORCES
-from springfoot.gait.motion_files import SIDES
+from springfoot.gait.motion_files import FILE_SIDES
 from springfoot.gait.own_data import OwnGait, read_gait
 
 HUMAN = human_gait(1.3)
@@ -28,7 +28,7 @@ def walk(seconds=12.0, rate=100.0, names=(*ANGLES, *MOMENTS, *FORCES), noise=Tru
     random = np.random.default_rng(3)
     time = 0.5 + np.arange(round(seconds * rate)) / rate
     legs = {}
-    for side, offset in zip(SIDES, (0.2, 0.7), strict=True):
+    for side, offset in zip(FILE_SIDES, (0.2, 0.7), strict=True):
         phase = time / HUMAN.stride_time + offset
         legs[side] = {n: HUMAN.mean(n, phase) + noise * NOISE[n] * random.standard_normal(len(time)) for n in names}
     return time, legs
@@ -41,7 +41,7 @@ def write_table(path, columns, head=(), separator=","):
     return path
 
 
-def our_csv(path, legs=SIDES, **options):
+def our_csv(path, legs=FILE_SIDES, **options):
     time, curves = walk(**options)
     columns = {"time_s": time}
     for side in legs:

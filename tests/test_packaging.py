@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("gait", "envs", "agents")
+ROOMS = ("gait", "envs", "agents", "evaluation", "studies")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 

@@ -14,11 +14,11 @@ import pytest
 from PIL import Image, ImageSequence
 from rich.console import Console
 
-import evaluate
 from springfoot.agents.policy import Policy, fingerprint, save_policy
 from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.settings import reference_gait, settings_from
-from springfoot.evaluation.metrics import CURVES, measure
+from springfoot.evaluation.evaluate_command import evaluate_main
+from springfoot.evaluation.metrics import GAIT_CYCLE_COLUMNS, measure
 from springfoot.evaluation.recording import load_recording, prepare, record
 from springfoot.evaluation.report import people_metrics, print_table, write_report
 from springfoot.gait import SpringfootError, human_gait
@@ -67,7 +67,7 @@ def test_gait_cycles_have_a_row_for_each_percent_and_a_spread_for_each_curve(fol
     for name in ("gait_cycle", "gait_cycle_left", "gait_cycle_right"):
         rows = rows_of(folder / f"{name}.csv")
         assert [int(row["percent"]) for row in rows] == list(range(101))
-        assert set(CURVES) | {f"{curve}_sd" for curve in CURVES} < set(rows[0])
+        assert set(GAIT_CYCLE_COLUMNS) | {f"{curve}_sd" for curve in GAIT_CYCLE_COLUMNS} < set(rows[0])
     counts = [int(rows_of(folder / f"gait_cycle{foot}.csv")[0]["n"]) for foot in ("_left", "_right", "")]
     assert counts[0] + counts[1] == counts[2] > 2
 
@@ -168,7 +168,7 @@ def command(monkeypatch, capsys, tmp_path):
     def run(*words):
         monkeypatch.setattr(sys, "argv", ["evaluate.py", *words])
         try:
-            code = evaluate.main()
+            code = evaluate_main()
         except SystemExit as exit:  # what tyro does with a flag it does not know
             code = exit.code
         captured = capsys.readouterr()
@@ -264,7 +264,9 @@ def test_every_number_is_documented_and_nothing_else(folder):
 
 def test_every_column_and_array_is_documented_and_nothing_else(folder):
     columns = rows_of(folder / "gait_cycle.csv")[0]
-    assert sorted(documented("### `gait_cycle.csv`")) == sorted(set(columns) - {f"{curve}_sd" for curve in CURVES})
+    assert sorted(documented("### `gait_cycle.csv`")) == sorted(
+        set(columns) - {f"{curve}_sd" for curve in GAIT_CYCLE_COLUMNS}
+    )
     with np.load(folder / "strides.npz") as file:
         assert sorted(documented("### `strides.npz`")) == sorted(file)
 

@@ -12,7 +12,7 @@ from ..settings import BipedSettings
 from .leg_constants import LegConstants
 from .leg_controller import knot_curve
 from .phase_table import GRID
-from .reference_walk import Walk
+from .reference_walk import ReferenceWalk
 
 PLATEAUS = (0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95)
 """Start and end of loading, early stance, late stance, push-off, swing; stiffness is linear between these plateaus."""
@@ -30,7 +30,7 @@ def plateau_curve(values: tuple[float, ...]) -> NDArray:
     return np.interp(GRID, PLATEAUS, np.repeat(values, 2), period=1.0)
 
 
-def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Walk) -> tuple[NDArray, NDArray]:
+def foot_curves(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> tuple[NDArray, NDArray]:
     """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
     if settings.schedule is None:
         stiffness, rest = fixed_stiffness(constants, walk.body), neutral(constants)
@@ -52,7 +52,7 @@ def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
     return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.stiffness_scale
 
 
-def planned(constants: LegConstants, walk: Walk) -> NDArray:
+def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds a moment forward through K_ref.
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots: on the plan, K = K_ref gives a times the walk's moment M

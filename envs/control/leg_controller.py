@@ -22,7 +22,7 @@ from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..timing import CONTROL_WINDOW
 from .leg_constants import LegConstants, SlopeConstants
 from .phase_table import GRID, PhaseTable, leg_phases
-from .reference_walk import Walk
+from .reference_walk import ReferenceWalk
 from .subjects import Subjects
 
 KNOTS = np.arange(10) / 10
@@ -49,7 +49,7 @@ def slope_table(constants: SlopeConstants) -> PhaseTable:
     return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
 
 
-class Legs:
+class LegController:
     """Phase and hip-knee controller of N bodies.
 
     Args:
@@ -58,7 +58,7 @@ class Legs:
         incline: what a slope adds (`slope_table`).
     """
 
-    def __init__(self, rows: Sequence[tuple[LegConstants, Walk]], subjects: Subjects, incline: PhaseTable):
+    def __init__(self, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects, incline: PhaseTable):
         self._subjects, self._incline = subjects, incline
         self._rows = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
         self._table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
@@ -190,7 +190,7 @@ def _command(gains, speed, scale, curves, base, base_velocity, com_velocity, con
             control[i, side, KNEE, 0], control[i, side, KNEE, 1] = knee, torque * curves[i, side, 4]
 
 
-def leg_curves(constants: LegConstants, walk: Walk) -> NDArray:
+def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     """(SAMPLES, 5) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m]."""
     body, human = walk.body, walk.human
     fall_from, fall_to = STANCE_FALL

@@ -30,12 +30,12 @@ the one planned for that speed, most of it where people's measured speeds meet."
 
 FED = ("hip", "knee", "ankle")
 """Joints to which a moment is fed forward."""
-PLAN_HARMONICS = 8
+FED_HARMONICS = 8
 """Fourier terms of the plan's moments that are fed forward: its stiff contacts make them jump, people's do not."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Walk:
+class ReferenceWalk:
     """One speed of the settings' body."""
 
     body: Body
@@ -52,16 +52,18 @@ class Walk:
     """(SAMPLES, 3) moments of hip, knee and ankle to feed forward [N m], extension and plantarflexion positive."""
 
 
-def walks_of(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[Walk, ...]:
+def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[ReferenceWalk, ...]:
     """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first.
 
     `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
     """
-    return tuple(walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
+    return tuple(reference_walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
 
 
-def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None) -> Walk:
+def reference_walk_at(
+    settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None
+) -> ReferenceWalk:
     """The walk of the settings' body at `speed` [m/s]."""
     body = body_of(settings)
     settings = replace(settings, speed=speed)
@@ -72,7 +74,7 @@ def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] 
         plan = plan_walk(body, speed, settings.cadence, human=human)
     equal_speed = speed / sqrt(body.length_scale)
     legs = legs or [leg_constants(settings.equilibrium, settings.cadence, equal_speed, settings.feedforward)]
-    return Walk(
+    return ReferenceWalk(
         body=body,
         speed=speed,
         human=human,
@@ -83,20 +85,20 @@ def walk_at(settings: BipedSettings, speed: float, legs: Sequence[LegConstants] 
 
 
 def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
-    """(SAMPLES, 3) of `Walk.moments`, as measured."""
+    """(SAMPLES, 3) of `ReferenceWalk.moments`, as measured."""
     moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
 
 def _plans_moments(plan: WalkPlan) -> NDArray:
-    """(SAMPLES, 3) of `Walk.moments`, by the plan's inverse dynamics; its steps where feet land and leave smoothed."""
+    """(SAMPLES, 3) of `ReferenceWalk.moments`, by the plan's inverse dynamics; its steps where feet land and leave smoothed."""
     by_joint = planned_moments(plan, GRID)
     waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
-    waves[PLAN_HARMONICS + 1 :] = 0.0
+    waves[FED_HARMONICS + 1 :] = 0.0
     return np.fft.irfft(waves, len(GRID), axis=0)
 
 
-def rows(walks: Sequence[Walk]) -> Iterator[tuple[LegConstants, Walk]]:
+def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, ReferenceWalk]]:
     """The rows of a table over variants and speeds, in order: speeds within variants."""
     for variant, walk in product(range(len(walks[0].constants)), walks):
         yield walk.constants[variant], walk

@@ -50,7 +50,7 @@ class Measurement:
     """(N,) number of the first MuJoCo warning raised since the episode began (`mjtWarning`), -1 where all is well."""
 
 
-def measure(
+def measurement_of(
     time: NDArray,
     segments: NDArray,
     ground: NDArray,

@@ -18,7 +18,7 @@ from springfoot.gait.errors import SpringfootError
 
 from ..timing import CONTROL_WINDOW
 from .foot_contact import CONTACTS, FRICTION
-from .measurement import Measurement, measure, segments_of
+from .measurement import Measurement, measurement_of, segments_of
 from .model import JOINTS, SIDES, build_model
 
 
@@ -123,4 +123,4 @@ class Simulation:
 
     def _measure(self, control: NDArray) -> Measurement:
         state = self._ground, self._qpos, self._qvel, control, self._sensors, self._warnings
-        return measure(self._time, self._segments, *state)
+        return measurement_of(self._time, self._segments, *state)

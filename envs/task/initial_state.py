@@ -9,7 +9,7 @@ from springfoot.gait.human import ANGLES
 
 from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable, leg_phases
-from ..control.reference_walk import Walk
+from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
 from ..physics.model import HIP
 from ..physics.simulation import Simulation
@@ -20,7 +20,7 @@ START_DEPTH = 0.001
 """The lowest contact point starts this far in the floor [m at 1.70 m]: about its rest under body weight."""
 
 
-def start_table(rows: Iterable[tuple[LegConstants, Walk]]) -> PhaseTable:
+def start_table(rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> PhaseTable:
     """People's posture over the stride for each row of the subjects' tables (`envs.control.reference_walk.rows`)."""
     return PhaseTable(np.stack([_start_curves(walk) for _, walk in rows]))
 
@@ -62,7 +62,7 @@ def place(
     simulation.reset(ids, base, rate, angle, velocity)
 
 
-def _start_curves(walk: Walk) -> NDArray:
+def _start_curves(walk: ReferenceWalk) -> NDArray:
     """(SAMPLES, 9) people's joint angles, hip as thigh to the vertical [rad], their rates [rad/s], trunk pitch [rad].
 
     Variants of the leg constants start alike, as the first.

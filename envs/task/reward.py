@@ -18,7 +18,7 @@ from springfoot.gait.plan import WalkPlan
 
 from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable
-from ..control.reference_walk import Walk
+from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
 from ..physics.kernel import kernel
 from ..physics.model import ANKLE, HIP, JOINTS, KNEE, LEFT, RIGHT, TOE
@@ -55,7 +55,7 @@ FORCE_TOLERANCE = 0.15
 """Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
 
 
-CURVES = np.dtype(
+REFERENCE = np.dtype(
     [
         ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
         ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
@@ -91,7 +91,9 @@ class Task:
         subjects: bodies and speeds.
     """
 
-    def __init__(self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, Walk]], subjects: Subjects) -> None:
+    def __init__(
+        self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects
+    ) -> None:
         self.names = tuple(entry.name for entry in OBSERVATION)
         self._subjects = subjects
         self._observer = Observer(subjects)
@@ -193,8 +195,8 @@ class Task:
         return error
 
     def at(self, leg_phase: NDArray) -> NDArray:
-        """(N, side) of `CURVES`."""
-        return self._curves.at(leg_phase, self._subjects.place).view(CURVES)[..., 0]
+        """(N, side) of `REFERENCE`."""
+        return self._curves.at(leg_phase, self._subjects.place).view(REFERENCE)[..., 0]
 
 
 @lru_cache(maxsize=256)
@@ -212,8 +214,8 @@ def _scales(body: Body) -> NDArray:
 
 
 def _curves(plan: WalkPlan, human: HumanGait, step_seconds: float) -> NDArray:
-    """(SAMPLES,) of `CURVES`, for steps of `step_seconds`."""
-    curves = np.zeros(len(GRID), CURVES)
+    """(SAMPLES,) of `REFERENCE`, for steps of `step_seconds`."""
+    curves = np.zeros(len(GRID), REFERENCE)
     curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
     middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
     for axis, name in enumerate(("grf_forward", "grf_vertical")):

@@ -15,7 +15,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.studies import slope_tuning as slopes
 
 COMMITTED = slope_constants()
-LARGE = slopes.constants_at(np.arange(10.0))
+LARGE = slopes.constants_of(np.arange(10.0))
 
 
 @pytest.fixture
@@ -50,11 +50,11 @@ def test_the_numbers_add_nothing_where_the_ground_is_level_even_beside_a_slope()
 
 
 def test_a_vector_gives_the_constants_it_was_made_of():
-    assert slopes.constants_at(slopes.vector_of(COMMITTED)) == COMMITTED
+    assert slopes.constants_of(slopes.vector_of(COMMITTED)) == COMMITTED
 
 
 def test_the_committed_numbers_pay_less_than_none():
-    none = slopes.constants_at(np.zeros(10))
+    none = slopes.constants_of(np.zeros(10))
     level = slopes.walk(None, (0.0,), 1, 5.0, seed=0, threads=1)["reward"].mean()
     walked = [slopes.walk(each, (5.0,), 2, 5.0, seed=0, threads=1) for each in (COMMITTED, none)]
     assert not walked[0]["missing"].any() and walked[1]["missing"].all()

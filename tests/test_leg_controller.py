@@ -12,7 +12,7 @@ from springfoot.envs.control.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, n
 from springfoot.envs.control.leg_constants import constants_at, constants_from, constants_name, leg_constants
 from springfoot.envs.control.leg_controller import knot_curve
 from springfoot.envs.control.phase_table import GRID
-from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import SpringfootError
 
@@ -70,7 +70,7 @@ def test_knots_are_met_and_periodic():
 
 
 def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
-    walk = walk_at(BipedSettings(), 1.2)
+    walk = reference_walk_at(BipedSettings(), 1.2)
     human = walk.human
     plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
     constants = constants_from({**vars(leg_constants("planned", "people")), **plain})

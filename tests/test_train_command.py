@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import train
+from springfoot.agents import train_command
 from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.agents.policy import load_policy
@@ -25,7 +26,7 @@ SHORT = [
 
 def main(monkeypatch, *words):
     monkeypatch.setattr(sys, "argv", ["train.py", *map(str, words)])
-    return train.main()
+    return train_command.train_main()
 
 
 def test_every_setting_is_a_flag_with_the_settings_own_help(monkeypatch, capsys):
@@ -47,7 +48,7 @@ def test_flags_that_were_not_given_are_not_given():
 
 def test_flags_take_the_place_of_the_preset():
     preset = PRESETS["walk"]
-    config = train.configured(preset, {"timesteps": 5}, {"height": 1.8, "ankle_stiffness_range": (30, 300)})
+    config = train_command.configured(preset, {"timesteps": 5}, {"height": 1.8, "ankle_stiffness_range": (30, 300)})
     assert config.timesteps == 5 and config.learning_rate == preset.learning_rate
     assert config.environment.height == 1.8
     assert config.environment.ankle_stiffness_range == (30.0, 300.0)
@@ -59,7 +60,7 @@ def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
     own = given(SettingsFlags(human=f"{tmp_path / 'mean.csv'}:fast"))["human"]
     assert own["name"] == "mean.csv:fast" and list(own["mean"]) == ["knee"]
-    assert train.configured(PRESETS["walk"], {}, {"human": own}).environment.human == own
+    assert train_command.configured(PRESETS["walk"], {}, {"human": own}).environment.human == own
     time = [k / 100 for k in range(500)]
     thigh = [f"{t},{20 * math.cos(2 * math.pi * t)}" for t in time]
     knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t + 0.3))}" for t in time]
@@ -115,7 +116,7 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
     out, progress = capsys.readouterr()
     assert "0 of 1,024 steps · return " in progress and "1,024 of 1,024 steps · return " in progress
     assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
-    assert f"python evaluate.py {tmp_path / 'run'}" in out
+    assert f"springfoot evaluate {tmp_path / 'run'}" in out
     assert load_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
 
 
@@ -136,7 +137,7 @@ def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number)
             process.kill()
     assert process.returncode == 130, error
     assert "Traceback" not in error
-    assert f"train.py --resume {folder}" in out
+    assert f"springfoot train --resume {folder}" in out
     record = json.loads((folder / RUN).read_text())
     assert record["status"] == "interrupted"
     policy = load_policy(folder)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.envs.control.reference_walk import rows, walks_of
+from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.physics.measurement import Measurement
 from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
@@ -31,7 +31,7 @@ class Setup:
         self.body = Body(self.settings.height, self.settings.mass)
         self.human = human_gait(self.settings.speed, self.settings.height)
         self.plan = plan_walk(self.body, self.settings.speed)
-        self.walks = walks_of(self.settings)
+        self.walks = reference_walks(self.settings)
 
     def task(self, num) -> Task:
         """For so many environments."""

@@ -4,13 +4,13 @@ import copy
 
 import pytest
 
-from springfoot.envs.control.reference_walk import walk_at
+from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings, settings_to_json
-from springfoot.evaluation.criteria import HUMAN_LIKE, WALKS, Limit, numbers, unmet
+from springfoot.evaluation.criteria import HUMAN_LIKE, WALKS, Criterion, numbers, unmet
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 
-PLAN = walk_at(BipedSettings(), 1.2).plan
+PLAN = reference_walk_at(BipedSettings(), 1.2).plan
 METRICS = {
     "falls": 0,
     "speed_m_s": {"mean": 1.229},
@@ -49,11 +49,11 @@ def test_each_limit_alone_is_missed(path, value, said):
 
 
 def test_a_loosened_limit_is_wider_at_each_of_its_ends():
-    braking = Limit(name="", path=("x",), low=-0.2, high=-0.12, loosen="share").loosened()
+    braking = Criterion(name="", path=("x",), low=-0.2, high=-0.12, loosen="share").loosened()
     assert (braking.low, braking.high) == pytest.approx((-0.24, -0.096))
-    r = Limit(name="", path=("x",), low=0.98, loosen="r").loosened()
+    r = Criterion(name="", path=("x",), low=0.98, loosen="r").loosened()
     assert r.holds({"x": 0.96}) and not r.holds({"x": 0.959}) and r.holds({"x": 1.0})
-    kept = Limit(name="", path=("x",), low=59, high=65)
+    kept = Criterion(name="", path=("x",), low=59, high=65)
     assert kept.loosened() == kept
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from springfoot.agents.markdown import table, text_of, write_section
 from springfoot.gait import SpringfootError
-from springfoot.studies.markdown import table, text_of, write_section
 
 
 def test_sections_are_made_replaced_and_kept_apart(tmp_path):

@@ -12,7 +12,14 @@ from springfoot.envs.physics.model import damping_times
 from springfoot.evaluation.recording import prepare, record
 from springfoot.gait import SpringfootError
 from springfoot.studies import identifiability as identified
-from springfoot.studies.identifiability import SEGMENTS, STARTS, mean_springs, rebuilt, spring_work, stiffness_named
+from springfoot.studies.identifiability import (
+    PHASE_SEGMENTS,
+    STARTS,
+    mean_springs,
+    rebuilt,
+    spring_work,
+    stiffness_named,
+)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +35,7 @@ def test_the_gaits_own_stiffness_has_the_equilibrium_it_walked_with(walked):
     for column in range(2):
         order = np.argsort(phase.ravel())
         known = np.interp(
-            STARTS + 0.5 / SEGMENTS,
+            STARTS + 0.5 / PHASE_SEGMENTS,
             phase.ravel()[order],
             walked.series["equilibrium"][:, 300:, :, column].ravel()[order],
         )
@@ -93,7 +100,7 @@ def test_the_command_writes_table_and_schedules(monkeypatch, capsys, tmp_path):
         "schedule",
         {"equilibrium": "phase", "schedule": json.loads((tmp_path / "springs/times-0.9.json").read_text())},
     )
-    assert settings.schedule is not None and len(settings.schedule["ankle"]) == SEGMENTS
+    assert settings.schedule is not None and len(settings.schedule["ankle"]) == PHASE_SEGMENTS
 
 
 @pytest.mark.parametrize("name", ["flat", "flat:0", "times:-1", "flat:inf", "times:x", "forwards"])

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from springfoot.agents.files import write_atomically
 from springfoot.gait.errors import SpringfootError
+
+from .files import write_atomically
 
 MISSING = "–"
 

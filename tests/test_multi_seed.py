@@ -11,6 +11,7 @@ import pytest
 
 import train
 from springfoot.agents import multi_seed as seeds
+from springfoot.agents import train_command
 from springfoot.agents.policy import BEST, load_policy
 
 SCRIPT, RUN = Path(train.__file__), "run.json"
@@ -22,7 +23,7 @@ SHORT = [
 
 def main(monkeypatch, *words):
     monkeypatch.setattr(sys, "argv", ["train.py", *map(str, words)])
-    return train.main()
+    return train_command.train_main()
 
 
 def test_each_seed_is_the_training_it_would_be_alone_and_the_report_has_their_spread(monkeypatch, capfd, tmp_path):
@@ -46,7 +47,7 @@ def test_each_seed_is_the_training_it_would_be_alone_and_the_report_has_their_sp
     assert record["spread"]["return_mean"]["mean"] == pytest.approx(sum(returns) / 2)
     assert record["spread"]["return_mean"]["sd"] == pytest.approx(abs(returns[0] - returns[1]) / 2**0.5)
     assert f"| 4 | finished | 1,024 | {record['seeds'][1]['seconds']:.0f} | {returns[1]:.1f} |" in out
-    assert f"studies seeds {tmp_path / 'several'}/seed-*" in out
+    assert f"springfoot study seeds {tmp_path / 'several'}/seed-*" in out
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
         finally:
             process.kill()
     assert process.returncode == 130, error
-    assert "Traceback" not in error and f"train.py --resume {folder}/seed-N" in out
+    assert "Traceback" not in error and f"springfoot train --resume {folder}/seed-N" in out
     record = json.loads((folder / seeds.SEEDS).read_text())
     assert record["status"] == "interrupted"
     assert record["seeds"][0]["status"] == "interrupted" and record["seeds"][0]["timesteps"] >= 1024
@@ -116,8 +117,8 @@ def test_a_seed_without_a_result_is_in_the_table_and_not_in_the_spread():
     rows = [{**row, "seed": seed} for seed, row in enumerate((done, failed, other))]
     found = seeds.spread(rows)
     assert found["return_mean"] == {"mean": 12.0, "sd": pytest.approx(8**0.5)}
-    *_, middle, last, summary = seeds.seeds_table({"seeds": rows, "spread": found}).splitlines()
+    *_, middle, last, summary = seeds.training_table({"seeds": rows, "spread": found}).splitlines()
     assert middle == "| 1 | failed | – | – | – | – | – |"
     assert last == "| 2 | finished | 2,048 | 30 | 14.0 | 3 of 16 | 1,024 |"
     assert "| 12.0 ± 2.8 | 2.0 ± 1.4 |" in summary
-    assert "– ± –" in seeds.seeds_table({"seeds": rows[1:2], "spread": seeds.spread(rows[1:2])})
+    assert "– ± –" in seeds.training_table({"seeds": rows[1:2], "spread": seeds.spread(rows[1:2])})

@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.envs.physics.foot_contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.metrics import CURVES, measure
+from springfoot.evaluation.metrics import GAIT_CYCLE_COLUMNS, measure
 from springfoot.evaluation.recording import SERIES, Recording, load_recording, prepare, record, record_each
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT
@@ -159,7 +159,7 @@ def test_cost_of_transport_is_the_positive_work_of_all_joints(gait):
 def test_feet_and_both_are_consistent(gait):
     left, right = gait.feet
     assert left.count + right.count == gait.both.count == gait.metrics["strides"]["count"]
-    for name in CURVES:
+    for name in GAIT_CYCLE_COLUMNS:
         pooled = (left.mean(name) * left.count + right.mean(name) * right.count) / gait.both.count
         assert gait.both.mean(name) == pytest.approx(pooled, abs=1e-9)
     assert gait.both.sd("knee_flexion_deg").max() < 0.5

@@ -1,0 +1,112 @@
+"""The command that trains a policy or goes on with a run: `train.py`, `springfoot train`."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.gait.errors import SpringfootError, require_count
+
+from .command_line import exit_code
+from .config import PRESETS, TrainingConfig
+from .flags import given, optional_flags
+
+PRESET = PRESETS["walk"]
+TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
+FOLDER = tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")
+EnvironmentFlags = optional_flags("EnvironmentFlags", BipedSettings, PRESET.environment)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainFlags:
+    """Train a policy that sets the stiffness of ankles and toes, by PPO.
+
+    The first Ctrl-C ends it in good order with a usable policy (exit code 130). Defaults shown are those of
+    the preset walk.
+    """
+
+    out: Annotated[Path | None, FOLDER] = None
+    """New folder for the run."""
+    resume: Annotated[Path | None, FOLDER] = None
+    """Folder of a run to go on with, with its saved settings; --timesteps is then how many more."""
+    seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
+    """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
+    report with the spread; each in a folder seed-N of --out."""
+    preset: Literal["walk", "any-body"] = "walk"
+    """Training that is known to work, from which the other flags differ: one body at one speed, or people of
+    1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it."""
+    training: tyro.conf.OmitArgPrefixes[TrainingFlags]  # type: ignore[valid-type]
+    """How to train."""
+    environment: tyro.conf.OmitArgPrefixes[EnvironmentFlags]  # type: ignore[valid-type]
+    """What to train on."""
+
+
+def train_main(arguments: Sequence[str] | None = None, program: str = "train.py") -> int:
+    """Run the command line; returns its exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 Ctrl-C.
+
+    `arguments` are those of the process unless given; `program` is what messages call it.
+    """
+    flags = tyro.cli(TrainFlags, args=arguments, prog=program)
+    return exit_code(program, lambda: run_training(flags))
+
+
+def run_training(flags: TrainFlags) -> int:
+    """Trains, or goes on, and says where the results lie."""
+    settings = given(flags.training) | given(flags.environment)
+    if (flags.out is None) == (flags.resume is None):
+        raise SpringfootError("give either --out NEW_FOLDER or --resume FOLDER")
+    if flags.seeds is not None:
+        if flags.resume:
+            raise SpringfootError("--seeds begins anew; go on with each seed's own folder by --resume FOLDER/seed-N")
+        if "threads" in settings:
+            raise SpringfootError("--seeds gives each seed one thread; drop --threads")
+        require_count("seeds", flags.seeds)
+    if flags.resume and (fixed := sorted(set(settings) - {"timesteps"})):
+        raise SpringfootError(f"--resume goes on with the saved settings; drop --{fixed[0].replace('_', '-')}")
+    if flags.resume:
+        from . import training  # torch takes seconds; bad flags are told without waiting for it
+
+        folder, record = flags.resume, training.resume(flags.resume, settings.get("timesteps"))
+    else:
+        assert flags.out is not None
+        config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
+        if flags.seeds is not None:
+            return run_seeds(config, flags.out, flags.seeds)
+        from . import training
+
+        folder, record = flags.out, training.train(config, flags.out)
+    interrupted, best = record["status"] == "interrupted", record["best"]
+    print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
+    if best:
+        falls = f"{best['falls']} of {best['episodes']} episodes fell"
+        print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
+    print(f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard)")
+    print(f"Next:    springfoot evaluate {folder}")
+    if interrupted:
+        print(f"Or:      springfoot train --resume {folder}")
+    return 130 if interrupted else 0
+
+
+def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
+    """Trains from several seeds and says how far they agree and where the results lie."""
+    from . import multi_seed
+
+    record = multi_seed.train_seeds(config, out, count)
+    print(f"\n{multi_seed.training_table(record)}\n")
+    print(
+        f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: best.safetensors, last.safetensors, run.json, TensorBoard)"
+    )
+    print(f"Next:    springfoot study seeds {out}/seed-*")
+    if record["status"] == "interrupted":
+        print(f"Or:      springfoot train --resume {out}/seed-N, for each N that was interrupted")
+    return {"finished": 0, "interrupted": 130}.get(record["status"], 1)
+
+
+def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
+    """The preset with what was given on the command line in its place."""
+    settings = settings_from(**settings_to_json(preset.environment) | environment)
+    return dataclasses.replace(preset, **training, environment=settings)

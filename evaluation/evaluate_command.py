@@ -1,0 +1,88 @@
+"""The command that evaluates a policy: `evaluate.py`, `springfoot evaluate`."""
+
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from springfoot.agents.command_line import exit_code, policy_label
+from springfoot.agents.files import next_free
+from springfoot.agents.flags import SettingsFlags, given
+from springfoot.gait.errors import SpringfootError, require_count
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateFlags:
+    """How human is the walk? Runs a policy, prints its gait beside people's, writes numbers and pictures.
+
+    A fall is a result: the exit code is 0 with falls, 2 for bad input.
+    """
+
+    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
+    """A .safetensors file, a run folder (its best policy), or one of: pretrained, untrained, random,
+    constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule), thesis."""
+    episodes: int = 20
+    """How many episodes."""
+    seconds: float = 20.0
+    """Length of each; --episode-seconds means the same."""
+    seed: int = 0
+    """Episode i is seeded with seed + i."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/eval-POLICY-N)")] = (
+        None
+    )
+    """New folder for the results."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
+    """What to walk in. A trained policy brings its own settings, height, mass, speed, pushes and start noise aside."""
+
+
+def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evaluate.py") -> int:
+    """Run the command line; returns its exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C.
+
+    `arguments` are those of the process unless given; `program` is what messages call it.
+    """
+    flags = tyro.cli(EvaluateFlags, args=arguments, prog=program)
+    return exit_code(program, lambda: run_evaluation(flags))
+
+
+def run_evaluation(flags: EvaluateFlags) -> None:
+    """Evaluates, prints the table and says where the results lie."""
+    for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
+        require_count(name, getattr(flags, name), least)
+    label = policy_label(flags.policy)
+    out = flags.out or next_free(Path("runs"), f"eval-{label}")
+    if out.exists():
+        raise SpringfootError(f"{out} exists already; give --out a new folder")
+    from . import metrics, recording, report  # bad flags are told without waiting for imports
+
+    settings = {"episode_seconds": flags.seconds} | given(flags.environment)
+    policy, environment = recording.prepare(flags.policy, settings, flags.seed)
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        total = flags.episodes * environment.episode_seconds
+        with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
+            episodes = recording.record(
+                policy,
+                environment,
+                name=label,
+                episodes=flags.episodes,
+                seed=flags.seed,
+                threads=flags.threads,
+                progress=bar.update,
+            )
+        gait = metrics.measure(episodes)
+        report.write_report(part, episodes, gait)
+        part.chmod(0o755)  # mkdtemp makes it private
+        part.rename(out)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    report.print_table(gait.metrics)
+    print(f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif)")
