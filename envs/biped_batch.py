@@ -1,8 +1,9 @@
 """The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
 
-One step is 20 ms, or what `decisions` says: the action sets the stiffness, which holds for its control windows of 10
-ms; in each, the springs' equilibrium and the hips and knees follow the phase. Row i of everything depends on
-environment i alone, by the same operations for any N, so a batch of N gives the same bits as N batches of one.
+One step lasts 20 ms, or what the setting `decisions` says. The action sets the stiffness, which is held for all
+control windows of 10 ms in the step; in each window the springs' equilibrium, the hips and the knees follow the phase.
+Row i of every array depends on environment i alone, by the same operations for any N, so a batch of N gives the same
+bits as N batches of one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,13 +41,13 @@ class Biped:
     """N bodies in one task.
 
     Args:
-        settings: the task.
-        num_envs: N.
-        num_threads: of the physics; any number gives the same bits.
-        legs: leg constants in place of the committed ones, one set or several told apart by `variant`.
-        variant: (N,) which of `legs` each body has.
-        rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], for each of `legs`.
-        model: as for `Simulation`.
+        settings: the task, the same for all N.
+        num_envs: number N of bodies.
+        num_threads: threads of the physics; any number gives the same bits.
+        legs: V sets of leg constants in place of the committed one.
+        variant: (N,) index into `legs` of the set that each body has.
+        rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], one for each of `legs`.
+        model: a custom model, as for `Simulation`.
         slope: constants for slopes in place of the committed ones.
     """
 
@@ -118,7 +119,7 @@ class Biped:
 
     @property
     def measurement(self) -> Measurement:
-        """What is known of the bodies at present."""
+        """The measurement at the end of the last control window, or right after a reset."""
         return self._now
 
     def data(self, index: int) -> mujoco.MjData:
@@ -130,7 +131,7 @@ class Biped:
         return self._springs.scheduled(self._legs.phase)
 
     def command(self, ids: NDArray, speed: NDArray) -> None:
-        """Have environments `ids` (K,) go to `speed` (K,) [m/s], at the settings' `speed_rate`."""
+        """Change the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s], at the rate `speed_rate`."""
         self.subjects.command(ids, speed)
 
     def reset(
@@ -140,13 +141,15 @@ class Biped:
         start: float | str | None = None,
         given: Mapping[str, NDArray] | None = None,
     ) -> None:
-        """Start environments `ids` anew, at people's posture in single support or standing.
+        """Begin a new episode in environments `ids`, walking in single support as people do, or standing.
 
         Args:
             ids: (K,) which.
-            seeds: K seeds, or generators to draw from; None goes on with the environment's own.
+            seeds: K seeds, or generators to draw from; for None the environment goes on with its own generator.
             start: stride phase of the left leg [0, 1), "random" or "standing", in place of the setting.
             given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of what is set or drawn.
+
+        Raises `SpringfootError` for an impossible body, or a standing start where the settings have none.
         """
         if len(ids) == 0:
             return
@@ -183,7 +186,7 @@ class Biped:
         self._now = self._simulation.measure()
 
     def _fit(self, ids: list[int]) -> None:
-        """Give environments `ids` the subjects' bodies, and all of them their speeds."""
+        """Give environments `ids` the bodies of their subjects, and every leg its commanded speed."""
         if ids:
             bodies = [self.subjects.bodies[index] for index in ids]
             self._simulation.fit(ids, bodies)
@@ -192,11 +195,15 @@ class Biped:
         self._legs.follow()
 
     def observe(self) -> NDArray:
-        """(N, D) float32 observation of the present."""
+        """(N, D) float32 observation at this moment."""
         return self._noise.on(self._task.observe(self._now, self._legs.phase, self._last_action, self._force))
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
-        """Apply actions (N, 4) for a step; environments not in the mask `active` (N,) stand still, reward 0."""
+        """Apply actions (N, 4) for one step.
+
+        Environments where the mask `active` (N,) is False stay as they are; their reward is 0.
+        Raises `SpringfootError` for actions of another shape, and for NaN or infinity.
+        """
         running, ids = self._everyone, None
         if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
@@ -210,7 +217,9 @@ class Biped:
         springs.set_stiffness(action, phase, self._now.angle, walking, scheduled)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        rests = phase.copy() if self.settings.equilibrium == "phase" else phase  # a segment's rest goes with its K
+        rests = (
+            phase.copy() if self.settings.equilibrium == "phase" else phase
+        )  # the equilibrium of a phase goes with its K
         for window in range(self.windows_per_step):
             self._window(running, walking, ids, rests)
             self._window_forces[window] = self._now.force
@@ -234,9 +243,9 @@ class Biped:
         )
 
     def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Count the step and average its forces; which episodes it terminates, truncates, and why the former.
+        """Count the step and average its contact forces; an environment that is not `running` gets no reward.
 
-        Who did not take it gets no reward.
+        Returns: (N,) the episodes that are terminated, those that are truncated, and why the former are terminated.
         """
         terminated, truncated = np.empty(self.num_envs, bool), np.empty(self.num_envs, bool)
         limit = self.settings.episode_seconds / self.dt - 0.5  # times are sums of steps
@@ -245,7 +254,7 @@ class Biped:
         return terminated, truncated, self._reasons(terminated) if falls else self._no_reason
 
     def _reasons(self, terminated: NDArray) -> NDArray:
-        """Why those `terminated` (N,) are, "" for the others."""
+        """(N,) why an episode is `terminated`, "" where it is not."""
         reasons = np.where(terminated, self._task.fallen(self._now), "").astype(object)
         for index in np.flatnonzero(terminated & (self._now.diverged >= 0)):
             warning = mujoco.mjtWarning(int(self._now.diverged[index]))
@@ -253,7 +262,7 @@ class Biped:
         return reasons
 
     def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
-        """The actions that take effect, in [-1, 1]; who is not `running` keeps the last one."""
+        """The actions that take effect, in [-1, 1]; an environment that is not `running` keeps its last one."""
         action = np.array(actions, float, order="C")
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
@@ -262,7 +271,7 @@ class Biped:
         return action
 
     def _window(self, running: NDArray, walking: NDArray, ids: NDArray | None, rests: NDArray) -> None:
-        """One control window, the foot's springs of those `walking` (N,) resting as at the phases `rests` (N, side)."""
+        """Run one control window; foot springs of those `walking` (N,) rest where phases `rests` (N, side) say."""
         legs, m, control = self._legs, self._now, self._simulation.control
         phase = None if self.on_tick is None else legs.phase.copy()
         self._springs.move_equilibrium(rests, m.angle, control, walking)
@@ -291,7 +300,7 @@ class Biped:
 
 
 @kernel
-def _end(limit, running, terms, windows, steps, force, reward, terminated, truncated):
+def _end(limit, running, terms, window_forces, steps, force, reward, terminated, truncated):
     falls = 0
     for i in range(len(running)):
         terminated[i] = running[i] and terms[i, ALIVE] == 0.0
@@ -299,18 +308,18 @@ def _end(limit, running, terms, windows, steps, force, reward, terminated, trunc
         truncated[i] = running[i] and not terminated[i] and steps[i] + 1 >= limit
         if running[i]:
             steps[i] += 1
-            _average(windows[:, i], force[i])
+            _average(window_forces[:, i], force[i])
         else:
             reward[i] = 0.0
     return falls
 
 
 @kernel
-def _average(windows, force):
+def _average(window_forces, force):
     for side in range(2):
         for contact in range(3):
             for axis in range(2):
                 total = 0.0
-                for window in range(len(windows)):
-                    total += windows[window, side, contact, axis]
-                force[side, contact, axis] = total / len(windows)
+                for window in range(len(window_forces)):
+                    total += window_forces[window, side, contact, axis]
+                force[side, contact, axis] = total / len(window_forces)

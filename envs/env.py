@@ -1,4 +1,4 @@
-"""The Gymnasium `Env`: the core with one body. `springfoot.envs.vector_env` is the core with N, and gives the same bits."""
+"""The Gymnasium `Env`: one body. `springfoot.envs.vector_env` has N bodies, and gives the same bits."""
 
 from typing import Any
 

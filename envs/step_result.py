@@ -1,4 +1,4 @@
-"""What one step of the batch returns, and what each of its control windows was."""
+"""What one step of the batch returns, and what an evaluation records of each of its control windows."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ REPORT = np.dtype(
         ("speed", float),
     ]
 )
-"""What is reported of one body's step besides observation and reward."""
+"""The numbers reported of one body's step besides observation and reward, as `INFO` names and explains them."""
 INFO = (
     *(
         f"{name}/{action}"
@@ -36,9 +36,12 @@ INFO = (
     "time",
     "speed",
 )
-"""The names of its numbers, in order: of each action `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad]
-at the step's end, `work/stiffness/` and `work/equilibrium/` [J] of the step; of each term `reward/`, unweighted; of
-each leg `phase/` [0, 1); `time` [s], `speed` [m/s]."""
+"""The names of the numbers of `REPORT`, in order.
+
+Of each action: `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/`
+and `work/equilibrium/` [J] of the step. Of each reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1).
+`time` [s], `speed` [m/s].
+"""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -56,7 +59,7 @@ class StepResult:
     values: NDArray
     """(N, len(INFO)) in the order of `INFO`."""
     termination: NDArray
-    """(N,) why an episode was terminated, "" where it was not; read only."""
+    """(N,) why the episode was terminated, "" where it was not; do not write to it."""
 
     @property
     def info(self) -> dict[str, NDArray]:
@@ -80,14 +83,22 @@ class Tick:
     com_reference: NDArray
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray
-    """(N,) which environments ran."""
+    """(N,) True for the environments that ran in this window."""
 
 
 def report(
     springs: FootSprings, m: Measurement, terms: NDArray, leg_phase: NDArray, steps: NDArray, seconds: float
 ) -> NDArray:
-    """`StepResult.values` of a step of `seconds`, with its `terms` (N, len(TERMS)), `leg_phase` (N, side) and `steps` (N,)
-    so far."""
+    """`StepResult.values` of one step.
+
+    Args:
+        springs: the foot springs after the step.
+        m: the measurement at the step's end.
+        terms: (N, len(TERMS)) reward terms, unweighted [-].
+        leg_phase: (N, side) stride phase of each leg [0, 1).
+        steps: (N,) steps since the episode began, this one included.
+        seconds: time of one step [s].
+    """
     values = np.empty((len(terms), len(INFO)))
     works = springs.work_stiffness, springs.work_equilibrium
     state = springs.stiffness, m.torque, springs.equilibrium, *works, terms, leg_phase

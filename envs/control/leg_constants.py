@@ -1,4 +1,4 @@
-"""Tuned constants of the leg controller (`envs.control.leg_controller`): the committed sets, and what lies between them in speed."""
+"""Tuned constants of the leg controller (`envs.control.leg_controller`): committed sets, interpolated over speed."""
 
 import json
 from collections.abc import Mapping

@@ -1,7 +1,8 @@
 """What a body is asked to do at each speed: people, plan and leg constants, at a few speeds of one body.
 
-The body is the settings' own. Between two tabulated speeds everything is linear in speed, and since mechanics scale
-exactly (`envs.physics.model`), another body at a Froude-equal speed does the same in its own units (`envs.control.subjects`).
+The body is that of the settings. Between two tabulated speeds everything is linear in speed. Since mechanics scale
+exactly (`envs.physics.model`), another body at a Froude-equal speed does the same in its own units
+(`envs.control.subjects`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -91,7 +92,7 @@ def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
 
 
 def _plans_moments(plan: WalkPlan) -> NDArray:
-    """(SAMPLES, 3) of `ReferenceWalk.moments`, by the plan's inverse dynamics; its steps where feet land and leave smoothed."""
+    """(SAMPLES, 3) `ReferenceWalk.moments` from inverse dynamics of the plan, smoothed where feet land and leave."""
     by_joint = planned_moments(plan, GRID)
     waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
     waves[FED_HARMONICS + 1 :] = 0.0

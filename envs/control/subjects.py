@@ -1,7 +1,8 @@
 """Who walks and how fast: the body and the commanded speed of each environment of a batch.
 
-Mechanics scale exactly (`envs.physics.model`). So curves are tabulated for one body, the settings' own, at a few speeds
-(`envs.control.reference_walk`), and each environment carries its ratios to that body and its place between two Froude-equal speeds.
+Mechanics scale exactly (`envs.physics.model`). So curves are tabulated for one body, that of the settings, at a few
+speeds (`envs.control.reference_walk`). Each environment has the ratios of its body to that one, and a place in the
+tables between the two speeds that are nearest to being Froude-equal to its own.
 """
 
 from collections.abc import Mapping, Sequence

@@ -17,9 +17,9 @@ from .model import ANKLE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
 class Measurement:
     """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
 
-    Every height z is above the ground: below the point, and for a foot's contacts the ground of that foot; the others'
-    is the mean ground, a plane through the origin. So is every velocity up. Angles are to the true vertical, and
-    forces horizontal and vertical.
+    Every height z, and every upward velocity, is relative to the ground straight below the point: for a foot's contacts
+    the ground of that foot, for all else the mean ground, a plane through the origin. Angles are relative to the true
+    vertical; forces are horizontal and vertical.
 
     Axes called side, joint and contact follow `SIDES`, `JOINTS` and `CONTACTS` of `envs.physics.model`.
     """
@@ -29,7 +29,7 @@ class Measurement:
     base: NDArray
     """(N, 3) hip x [m], hip z [m], trunk pitch [rad]."""
     base_velocity: NDArray
-    """(N, 3) its rate [m/s, m/s, rad/s]."""
+    """(N, 3) velocity of the hip (x, z) [m/s, m/s], rate of the pitch [rad/s]."""
     angle: NDArray
     """(N, side, joint) joint angles [rad]."""
     velocity: NDArray
@@ -47,7 +47,7 @@ class Measurement:
     force: NDArray
     """(N, side, contact, 2) ground reaction force (forward, up) on each, mean over the window [N]."""
     diverged: NDArray
-    """(N,) number of the first MuJoCo warning raised since the episode began (`mjtWarning`), -1 where all is well."""
+    """(N,) `mjtWarning` with the lowest number among those MuJoCo has raised since the episode began, -1 for none."""
 
 
 def measurement_of(
@@ -60,12 +60,12 @@ def measurement_of(
     sensors: NDArray,
     warnings: NDArray,
 ) -> Measurement:
-    """The measurement of N bodies.
+    """Compute the measurement of N bodies.
 
     Args:
         time: (N,) since the episode began [s].
-        segments: (N,) of `SEGMENTS`.
-        ground: (N, 3) tangent of the slope, height below each foot [m].
+        segments: (N,) of dtype `SEGMENTS`, one row a body.
+        ground: (N, 3) tangent of the slope [-], then the height of the ground below each foot [m].
         position, rate: (N, 11) MuJoCo's qpos and qvel.
         control: (N, side, joint, 2) as in `envs.physics.simulation.Simulation.control`.
         sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
@@ -157,19 +157,20 @@ SEGMENTS = np.dtype(
         ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see segments_of
         ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
         ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
-        ("radius", float, len(CONTACTS)),
-        ("beta", float, len(JOINTS)),  # [s]
-        ("limit", float, len(JOINTS)),  # [N m]
+        ("radius", float, len(CONTACTS)),  # of the contact spheres [m]
+        ("beta", float, len(JOINTS)),  # damping time of each joint's spring [s]
+        ("limit", float, len(JOINTS)),  # largest torque of each joint's actuator [N m]
     ]
 )
-"""A body as its kinematics and springs need it."""
+"""What kinematics and springs need to know of one body."""
 
 
 def segments_of(body: Body) -> NDArray:
-    """(1,) of `SEGMENTS`.
+    """Constants of one body, (1,) of dtype `SEGMENTS`.
 
-    The CoM is the hip plus one offset for each segment, turned with it: its own share of the mass times its CoM, plus
-    the share of all that hangs from its far end times that end.
+    The CoM is the hip plus one offset for each segment, which turns with the segment. The offset is the sum of two
+    products: the segment's share of the mass times its own CoM, and the share of all that hangs from its far end times
+    the position of that end.
     """
     foot, toe = body.foot_mass, body.toe_mass
     beyond_knee = body.shank_mass + foot + toe
@@ -200,8 +201,8 @@ def segments_of(body: Body) -> NDArray:
 def _locate(segments, position, rate, com, com_velocity, ankle, contact):
     """Planar forward kinematics.
 
-    A segment turned up-forward by s (a thigh's flexion, a foot's toes-up pitch) carries the offset (u, w) in its frame
-    to (u cos s - w sin s, u sin s + w cos s), and spinning at ds/dt moves it at ds/dt (-z, x).
+    A segment is turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its
+    frame is then (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world, and moves at ds/dt (-z, x).
     """
     hip_x, hip_z, pitch = position[0], position[1], position[2]
     x, z = _turned(segments.trunk, cos(-pitch), sin(-pitch))
@@ -230,7 +231,7 @@ def _locate(segments, position, rate, com, com_velocity, ankle, contact):
 
 @kernel
 def _above(ground, base, base_velocity, com, com_velocity, ankle, contact):
-    """From the world's heights to those above the ground."""
+    """Turn heights and upward velocities in the world into those relative to the ground, in place."""
     slope = ground[0]
     for position, velocity in ((base, base_velocity), (com, com_velocity)):
         position[1] -= slope * position[0]

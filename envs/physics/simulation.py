@@ -23,14 +23,15 @@ from .model import JOINTS, SIDES, build_model
 
 
 class Simulation:
-    """N simulations, of one body at first.
+    """N simulations; all simulate the same body until `fit` gives some of them another.
 
     Args:
-        body: whose model is simulated.
+        body: the body that is simulated.
         num: N.
         threads: of the physics; any number gives the same bits.
-        model: the body's model with other options, such as a timestep that divides `CONTROL_WINDOW`, in place of the default.
-        friction: between feet and ground, of the default models [-].
+        model: a custom model of that body in place of the default, for instance one whose timestep is another part of
+            `CONTROL_WINDOW`.
+        friction: coefficient of friction between feet and ground in the default models [-].
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class Simulation:
         self.num = num
         self.model = model or build_model(body, friction)
         self.models = [self.model] * num
-        """Of each simulation."""
+        """The compiled model of each simulation."""
         self._own_options = model is not None
         self._friction = friction
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
@@ -65,17 +66,31 @@ class Simulation:
         self._no_control = np.zeros_like(self.control)
 
     def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
-        """Simulate `bodies` (K,) in `ids` (K,) from their next reset on; compiling a model takes about 1.5 ms."""
+        """Simulate `bodies` (K,) in simulations `ids` (K,) from their next reset on.
+
+        Compiling a model takes about 1.5 ms. Raises `SpringfootError` for a simulation built from a custom model.
+        """
         if self._own_options:
-            raise SpringfootError("a simulation with a model of one's own keeps its body")
+            raise SpringfootError(
+                "cannot change bodies in a simulation built from a custom model; omit `model`, "
+                "or drop height_range and mass_range"
+            )
         for index, body in zip(ids, bodies, strict=True):
             self.models[index] = self.model if body == self.body else build_model(body, self._friction)
             self._segments[index] = segments_of(body)[0]
         self._batch.set_models(self.models)
 
     def reset(self, ids: NDArray, base: NDArray, base_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
-        """Put simulations `ids` (K,) into the states given: (K, 3), (K, 3), (K, side, joint), (K, side, joint)."""
-        position, turn = self._position[ids], self._turn[ids]  # the ground stays
+        """Put simulations `ids` (K,) into the states given, and clear their warnings and time.
+
+        Args:
+            ids: (K,) which.
+            base: (K, 3) hip x [m], height of the hip above the mean ground [m], trunk pitch [rad].
+            base_velocity: (K, 3) its rate [m/s, m/s, rad/s].
+            angle: (K, side, joint) joint angles [rad].
+            velocity: (K, side, joint) joint velocities [rad/s].
+        """
+        position, turn = self._position[ids], self._turn[ids]  # MuJoCo's reset would put the ground back to level
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         self._position[ids], self._turn[ids] = position, turn
         self._qpos[ids, :3], self._qpos[ids, 3:] = base, angle.reshape(len(ids), -1)
@@ -84,21 +99,26 @@ class Simulation:
             state[ids, 1] += self._ground[ids, 0] * given[:, 0]
 
     def lay(self, ids: NDArray, slope: NDArray, height: NDArray) -> None:
-        """Give simulations `ids` (K,) ground of a slope (K,) [rad], uphill positive, whose plane below each foot lies
-        `height` (K, side) [m] above the mean one, which goes through the origin."""
+        """Give simulations `ids` (K,) sloping ground.
+
+        Args:
+            ids: (K,) which.
+            slope: (K,) slope of the mean ground, a plane through the origin, uphill positive [rad].
+            height: (K, side) how far the ground of each foot lies above the mean ground [m].
+        """
         for index, angle, heights in zip(ids.tolist(), slope.tolist(), height, strict=True):
             self._ground[index] = tan(angle), *heights
             self._position[index, :, 2] = heights  # mocap bodies are the grounds, in the order of SIDES
             self._turn[index] = cos(angle / 2), 0.0, -sin(angle / 2), 0.0
 
     def push(self, force: NDArray) -> None:
-        """Hold a horizontal force [N], (N,), on the trunk's CoM until told otherwise."""
+        """Let a horizontal force (N,), forward positive [N], act on the CoM of the trunk until the next call."""
         self._push[:, 0] = force
 
     def advance(self, ids: NDArray | None = None) -> Measurement:
-        """Run one control window with `control` held; the measurement of all N at its end.
+        """Run one control window with `control` held, and return the measurement of all N at its end.
 
-        Only simulations `ids` run, all by default; the others stay as they are, and their forces read 0.
+        Only simulations `ids` run (all if None); the others stay as they are, and their contact forces read 0.
         """
         if ids is None:
             self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)
@@ -111,12 +131,12 @@ class Simulation:
         return self._measure(self.control)
 
     def measure(self) -> Measurement:
-        """The state as it stands, with no torque and no force: what is known right after a reset."""
+        """The measurement right after a reset: the state as it stands, with torques and contact forces of zero."""
         self._sensors[:] = 0.0
         return self._measure(self._no_control)
 
     def data(self, index: int) -> mujoco.MjData:
-        """A copy of one simulation's state after `mj_forward`, to render or to inspect."""
+        """A copy of the state of simulation `index` after `mj_forward`, to render or to inspect."""
         data = self._batch.get_data(index)
         mujoco.mj_forward(self.models[index], data)
         return data

@@ -111,7 +111,7 @@ class SensorNoise:
         )
 
     def draw(self, ids: NDArray, randoms: Sequence[np.random.Generator | None]) -> None:
-        """Draw the noise of a new observation for environments `ids` (K,), each from its generator in `randoms` (K,)."""
+        """Draw noise for a new observation of environments `ids` (K,), each from its generator in `randoms` (K,)."""
         if self._on:
             for index, random in zip(ids.tolist(), randoms, strict=True):
                 if random is not None:
