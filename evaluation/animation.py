@@ -13,8 +13,8 @@ from springfoot.envs.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 
-from .metrics import WARM_UP
 from .recording import TICK, Recording
+from .stride_tally import WARM_UP
 
 SIZE = (460, 420)
 """Width and height of a frame [px]."""

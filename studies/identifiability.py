@@ -32,8 +32,9 @@ from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.reward import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
-from springfoot.evaluation.metrics import WARM_UP, measure
+from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import TICK, Recording, prepare, record
+from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.stiffness import SPRINGS, TOE_STIFFNESS, Segment, StiffnessSchedule

@@ -28,8 +28,9 @@ from springfoot.agents.multi_seed import is_finished, train_missing
 from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
 from springfoot.envs.task.reward import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
 from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
-from springfoot.evaluation.metrics import WARM_UP, Gait, measure
+from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.recording import TICK, Recording, prepare, record
+from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 

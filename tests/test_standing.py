@@ -23,8 +23,9 @@ from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.metrics import WARM_UP, measure
+from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait import scores as score
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError

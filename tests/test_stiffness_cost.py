@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from springfoot.envs.biped_batch import Biped
-from springfoot.evaluation.metrics import WARM_UP
 from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.studies import stiffness_cost as tradeoff
 from springfoot.studies.stiffness_cost import config_of, folder_of, knee, stiffness_cost
 

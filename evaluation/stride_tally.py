@@ -1,0 +1,217 @@
+"""From the 100 Hz series of a recording to curves over the stride and one value for each stride, step and episode.
+
+Human-facing edge: angles in degrees, forces in body weights (BW), moments in N m/kg, work in J/kg.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.physics.foot_contact import CONTACTS
+from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_material
+from springfoot.envs.settings import body_of
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait import scores as score
+from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, next_after, on_percent
+
+from .recording import TICK, Recording
+from .stride_curves import StrideCurves
+
+WARM_UP = 3.0
+"""Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
+SHORTEST_SPEED = 1.0
+"""An episode that ends earlier than this after the warm-up [s] tells nothing about speed."""
+CLEARANCE_SWING = (0.25, 0.75)
+"""Part of the swing in which toe clearance is taken."""
+
+GAIT_CYCLE_COLUMNS = (
+    "hip_flexion_deg",
+    "knee_flexion_deg",
+    "ankle_dorsiflexion_deg",
+    "pelvis_anterior_tilt_deg",
+    "thigh_flexion_deg",
+    "shank_pitch_deg",
+    "foot_pitch_deg",
+    "hip_moment_Nm_per_kg",
+    "knee_moment_Nm_per_kg",
+    "ankle_moment_Nm_per_kg",
+    "hip_power_W_per_kg",
+    "knee_power_W_per_kg",
+    "ankle_power_W_per_kg",
+    "grf_vertical_bw",
+    "grf_forward_bw",
+    "mtp_dorsiflexion_deg",
+    "mtp_moment_Nm_per_kg",
+    "ankle_stiffness_Nm_per_rad",
+    "toe_stiffness_Nm_per_rad",
+    "ankle_equilibrium_deg",
+    "mtp_equilibrium_deg",
+)
+"""Columns of gait_cycle.csv. Hip: thigh to trunk; shank pitch: foot ahead; foot pitch: toes up. Moments are internal
+(actuator and joint damping), hip and knee extension, ankle and toe (mtp) plantarflexion positive; power: generation."""
+
+
+@dataclass(kw_only=True, eq=False)
+class StrideTally:
+    """What is collected stride by stride, step by step and episode by episode."""
+
+    feet: tuple[StrideCurves, StrideCurves] = field(
+        default_factory=lambda: (StrideCurves(names=GAIT_CYCLE_COLUMNS), StrideCurves(names=GAIT_CYCLE_COLUMNS))
+    )
+    """Curves over the stride of the left and the right foot."""
+    both: StrideCurves = field(default_factory=lambda: StrideCurves(names=GAIT_CYCLE_COLUMNS))
+    """Curves over the stride of both feet."""
+    com: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x", "z", "vx")))
+    """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
+    strides_of_falls: int = 0
+    """Strides of episodes that ended in a fall."""
+    at_rest: int = 0
+    """Episodes that ended standing still."""
+    speed: list[float] = field(default_factory=list)
+    """Of each episode [m/s]."""
+    distance: float = 0.0
+    """Walked in all episodes together [m]."""
+    work: float = 0.0
+    """Positive work of all joints in all episodes together [J]."""
+    step_length: list[float] = field(default_factory=list)
+    """Of each step [m]."""
+    step_time: list[float] = field(default_factory=list)
+    """Of each step [s]."""
+    double_support: list[float] = field(default_factory=list)
+    """Of each step [s]."""
+    toe_off: list[float] = field(default_factory=list)
+    """Of each stride [%]."""
+    vertical_max: list[float] = field(default_factory=list)
+    """Largest vertical force of each stride [BW]."""
+    ankle_positive: list[float] = field(default_factory=list)
+    """Positive work of the ankle in each stride [J/kg]."""
+    ankle_negative: list[float] = field(default_factory=list)
+    """Negative work of the ankle in each stride, as a positive number [J/kg]."""
+    travel: list[float] = field(default_factory=list)
+    """Distance the loaded sole slides in each stance [m]."""
+    clearance: list[float] = field(default_factory=list)
+    """Least height of ball and toe in the middle of each swing [m]."""
+
+
+def tally_strides(recording: Recording) -> StrideTally:
+    """Every stride, step and episode of a recording, its steady walk only, without the warm-up."""
+    tally, body = StrideTally(), body_of(recording.settings)
+    fell = recording.fall_reason != ""
+    begin, end = steady_walk(recording.settings)
+    for episode, ticks in enumerate(recording.ticks):
+        series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
+        if ticks:
+            _add_episode(tally, series, body, (begin + WARM_UP, end), bool(fell[episode]))
+            tally.at_rest += not fell[episode] and score.at_rest(
+                series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
+            )
+    return tally
+
+
+def _add_episode(
+    tally: StrideTally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool
+) -> None:
+    """`steady` is the time [s] the numbers are taken from."""
+    weight = body.mass * GRAVITY
+    com, power = series["com"], (series["torque"] + series["passive_torque"]) * series["velocity"]
+    begin, end = (round(min(time / TICK, len(com))) for time in steady)
+    if end > begin:
+        distance, seconds = com[end - 1, 0] - com[begin - 1, 0], (end - begin) * TICK
+        tally.distance += distance
+        tally.work += float(score.positive_work(power[begin:end], TICK).sum())
+        if seconds >= SHORTEST_SPEED:
+            tally.speed.append(distance / seconds)
+
+    # Forces are means over a tick, so they belong to its middle; states to its end.
+    vertical = series["force"][..., 1].sum(axis=2)
+    contacts = [
+        find_contacts(vertical[:, side], TICK, CONTACT_THRESHOLD_BW * weight, first=TICK / 2)
+        for side in range(len(SIDES))
+    ]
+    material = contact_material(body, series["contact"], series["base"], series["angle"])
+    for side, foot in enumerate(contacts):
+        strides = foot.strides(after=steady[0])
+        strides = strides[strides[:, 2] <= steady[1]]
+        heel_strike, toe_off, end = strides.T
+        curves = np.concatenate(
+            [
+                on_percent(_states(series, side, body), heel_strike, end, TICK, first=TICK),
+                on_percent(_forces(series, side, weight), heel_strike, end, TICK, first=TICK / 2),
+            ],
+            axis=-1,
+        )[..., _ORDER]
+        tally.feet[side].add(curves)
+        tally.both.add(curves)
+        tally.strides_of_falls += fell * len(strides)
+        tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
+        work = score.stride_work(curves[..., GAIT_CYCLE_COLUMNS.index("ankle_power_W_per_kg")], end - heel_strike)
+        tally.ankle_positive += list(work[0])
+        tally.ankle_negative += list(work[1])
+        contact, load = series["contact"][:, side], series["force"][:, side, :, 1]
+        for start, leave, stop in np.floor(strides / TICK).astype(int):
+            tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
+            stance = slice(start, leave + 1)
+            tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
+            first, last = (round(leave + share * (stop - leave)) for share in CLEARANCE_SWING)
+            tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
+    _add_steps(tally, series, contacts, steady)
+
+
+def _add_steps(
+    tally: StrideTally, series: dict[str, NDArray], contacts: list[Contacts], steady: tuple[float, float]
+) -> None:
+    steps, sides = find_steps(contacts[0], contacts[1], after=steady[0])
+    in_time = steps[:, 1] <= steady[1]
+    steps, sides = steps[in_time], sides[in_time]
+    for side in range(len(SIDES)):
+        begin, end = steps[sides == side].T
+        relative = np.column_stack(
+            [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
+        )
+        tally.com.add(on_percent(relative, begin, end, TICK, first=TICK))
+        # The foot that lands at the step's end, against where this one landed.
+        at = np.floor(np.stack([begin, end]) / TICK).astype(int)
+        ankle = series["ankle"][..., 0]
+        tally.step_length += list(ankle[at[1], 1 - side] - ankle[at[0], side])
+        tally.step_time += list(end - begin)
+        # The trailing foot leaves the ground within this step; without such a toe-off the body flew.
+        support = next_after(contacts[1 - side].toe_offs, begin) - begin
+        tally.double_support += list(np.where(support < end - begin, support, 0.0))
+
+
+def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without the forces."""
+    angle = np.degrees(series["angle"][:, side])
+    pitch = np.degrees(series["base"][:, 2])
+    moment = -(series["torque"] + series["passive_torque"])[:, side] / body.mass
+    power = -moment * series["velocity"][:, side]
+    thigh = angle[:, HIP] - pitch
+    shank = thigh - angle[:, KNEE]
+    equilibrium = np.degrees(series["equilibrium"][:, side])
+    return np.column_stack(
+        [
+            *(angle[:, joint] for joint in (HIP, KNEE, ANKLE)),
+            pitch,
+            thigh,
+            shank,
+            shank + angle[:, ANKLE],
+            *(moment[:, joint] for joint in (HIP, KNEE, ANKLE)),
+            *(power[:, joint] for joint in (HIP, KNEE, ANKLE)),
+            angle[:, TOE],
+            moment[:, TOE],
+            series["stiffness"][:, side],
+            equilibrium,
+        ]
+    )
+
+
+def _forces(series: dict[str, NDArray], side: int, weight: float) -> NDArray:
+    """(T, 2) vertical and forward force of one foot [BW]."""
+    return series["force"][:, side].sum(axis=1)[:, ::-1] / weight
+
+
+_FORCES = ("grf_vertical_bw", "grf_forward_bw")
+_STATES = tuple(name for name in GAIT_CYCLE_COLUMNS if name not in _FORCES)
+_ORDER = [(_STATES + _FORCES).index(name) for name in GAIT_CYCLE_COLUMNS]
