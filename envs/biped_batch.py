@@ -22,6 +22,7 @@ from .control.leg_controller import LegController, slope_table
 from .control.reference_walk import reference_walks, rows
 from .control.standing import Standing, off_phase
 from .control.subjects import Subjects
+from .physics.energy import WindowWork
 from .physics.foot_contact import CONTACTS
 from .physics.kernel import kernel
 from .physics.measurement import Measurement
@@ -280,13 +281,17 @@ class Biped:
             standing = running & ~walking
             self._standing.command(m, standing, control)
             self._springs.hold(control, m.angle, standing)
-        self._now = self._simulation.advance(ids)
+        work = None
+        if phase is None:
+            self._now = self._simulation.advance(ids)
+        else:
+            self._now, work = self._simulation.advance_watched(ids)
         legs.advance(self._now, walking)
         self._ground.advance(self._now, legs.phase, self._random)
-        if self.on_tick is not None and phase is not None:
-            self.on_tick(self._tick(phase, running))
+        if self.on_tick is not None and phase is not None and work is not None:
+            self.on_tick(self._tick(phase, work, running))
 
-    def _tick(self, phase: NDArray, running: NDArray) -> Tick:
+    def _tick(self, phase: NDArray, work: WindowWork, running: NDArray) -> Tick:
         m, (stiffness, drive) = self._now, np.moveaxis(self._simulation.control, -1, 0)
         return Tick(
             measurement=m,
@@ -294,6 +299,7 @@ class Biped:
             stiffness=stiffness.copy(),
             equilibrium=drive / stiffness,
             passive_torque=-self._passive_damping * m.velocity,
+            work=work,
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),
         )

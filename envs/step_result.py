@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control.foot_springs import FootSprings
+from .physics.energy import WindowWork
 from .physics.kernel import kernel
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, ANKLE, SIDES
@@ -80,6 +81,8 @@ class Tick:
     """(N, side, joint) rest angle theta_eq held in the window, feed-forward torque included as torque / K [rad]."""
     passive_torque: NDArray
     """(N, side, joint) torque of the joint damping at the window's end [N m]."""
+    work: WindowWork
+    """Torque, work and energy over the window's physics steps."""
     com_reference: NDArray
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray

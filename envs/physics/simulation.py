@@ -17,6 +17,7 @@ from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 
 from ..timing import CONTROL_WINDOW
+from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot_contact import CONTACTS, FRICTION
 from .measurement import Measurement, measurement_of, segments_of
 from .model import JOINTS, SIDES, build_model
@@ -62,7 +63,8 @@ class Simulation:
         self._warnings = self._batch.warning[:, :, 1]
         self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
         self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
-        self._segments = np.repeat(segments_of(body), num)
+        self._segments, self._parts = np.repeat(segments_of(body), num), np.repeat(parts_of(body), num)
+        self._held = np.full(self.control.shape, np.nan)  # in the last window that was watched
         self._no_control = np.zeros_like(self.control)
 
     def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
@@ -77,7 +79,7 @@ class Simulation:
             )
         for index, body in zip(ids, bodies, strict=True):
             self.models[index] = self.model if body == self.body else build_model(body, self._friction)
-            self._segments[index] = segments_of(body)[0]
+            self._segments[index], self._parts[index] = segments_of(body)[0], parts_of(body)[0]
         self._batch.set_models(self.models)
 
     def reset(self, ids: NDArray, base: NDArray, base_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
@@ -92,7 +94,7 @@ class Simulation:
         """
         position, turn = self._position[ids], self._turn[ids]  # MuJoCo's reset would put the ground back to level
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
-        self._position[ids], self._turn[ids] = position, turn
+        self._position[ids], self._turn[ids], self._held[ids] = position, turn, np.nan
         self._qpos[ids, :3], self._qpos[ids, 3:] = base, angle.reshape(len(ids), -1)
         self._qvel[ids, :3], self._qvel[ids, 3:] = base_velocity, velocity.reshape(len(ids), -1)
         for state, given in ((self._qpos, base), (self._qvel, base_velocity)):
@@ -120,15 +122,31 @@ class Simulation:
 
         Only simulations `ids` run (all if None); the others stay as they are, and their contact forces read 0.
         """
-        if ids is None:
-            self._batch.rollout(self._substeps, record=["sensordata"], out=self._record)
-        else:
-            self._sensors[:] = 0.0
-            if len(ids):
-                self._record["sensordata"][ids] = self._batch.rollout(self._substeps, record=["sensordata"], ids=ids)[
-                    "sensordata"
-                ]
+        self._roll(ids, self._record)
         return self._measure(self.control)
+
+    def advance_watched(self, ids: NDArray | None = None) -> tuple[Measurement, WindowWork]:
+        """As `advance`, the same bits, and what each physics step of the window did; those not in `ids` did nothing."""
+        shape = self.num, self._substeps, self.model.nv
+        steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), *(np.zeros(shape) for _ in RECORDED))
+        angle = self._qpos[:, 3:].reshape(self.control.shape[:3]).copy()
+        self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))
+        state, push = (self._qpos, self._qvel), self._push[:, 0].copy()
+        timestep = self.model.opt.timestep
+        work = window_work(self._parts, steps, self.control, self._held, angle, push, state, timestep)
+        self._held[:] = self.control
+        return self._measure(self.control), work
+
+    def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
+        """Run the physics steps of a window and record what `out` names, 0 for those that do not run."""
+        if ids is None:
+            self._batch.rollout(self._substeps, record=list(out), out=out)
+            return
+        for values in out.values():
+            values[:] = 0.0
+        if len(ids):
+            for name, values in self._batch.rollout(self._substeps, record=list(out), ids=ids).items():
+                out[name][ids] = values
 
     def measure(self) -> Measurement:
         """The measurement right after a reset: the state as it stands, with torques and contact forces of zero."""
