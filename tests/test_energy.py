@@ -95,7 +95,7 @@ def test_torque_and_work_equal_a_replay_step_by_step(name):
         ("constant", {}),
         ("schedule", {"height": 1.9, "mass": 100.0, "carried_ratio": 0.2}),
         ("pretrained", {"slope_deg": 5.0}),
-        ("schedule", {"push_newton": 150.0, "unevenness_m": 0.005}),
+        ("pretrained", {"push_newton": 150.0, "unevenness_m": 0.01}),
     ],
 )
 def test_energy_closes_over_ten_strides(name, given):

@@ -133,7 +133,10 @@ class Simulation:
         self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))
         state, push = (self._qpos, self._qvel), self._push[:, 0].copy()
         timestep = self.model.opt.timestep
-        work = window_work(self._parts, steps, self.control, self._held, angle, push, state, timestep)
+        held = self._held.copy()
+        if ids is not None:
+            held[np.setdiff1d(np.arange(self.num), ids)] = np.nan
+        work = window_work(self._parts, steps, self.control, held, angle, push, state, timestep)
         self._held[:] = self.control
         return self._measure(self.control), work
 
