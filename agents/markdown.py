@@ -1,6 +1,6 @@
 """Markdown that a command writes: tables, and sections of a page that others write too."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from springfoot.gait.errors import SpringfootError
@@ -18,6 +18,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def text_of(value: float | None, pattern: str) -> str:
     """A number in a table, `MISSING` for None."""
     return MISSING if value is None else format(value, pattern)
+
+
+def plus_minus(spread: Mapping[str, float | None], pattern: str, *, alone: bool = True) -> str:
+    """A spread of `mean_sd` as "mean ± SD"; where there is no SD the mean `alone`, or else with `MISSING` for it."""
+    mean, sd = (text_of(spread[name], pattern) for name in ("mean", "sd"))
+    return mean if alone and spread["sd"] is None else f"{mean} ± {sd}"
 
 
 def write_section(page: Path, name: str, text: str) -> None:

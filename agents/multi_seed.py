@@ -24,7 +24,7 @@ from springfoot.gait.scores import mean_sd
 from .command_line import exit_code
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
-from .markdown import MISSING
+from .markdown import MISSING, plus_minus, table, text_of
 from .training import RUN, processors, train
 
 SEEDS = "seeds.json"
@@ -97,27 +97,15 @@ def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]
 
 def training_table(record: dict[str, Any]) -> str:
     """Markdown: one row a seed, and the mean ± SD over those that finished."""
-    lines = [["seed", "status", "steps", "seconds", "best return", "falls", "after steps"], ["---"] * 7]
+    head, lines = ["seed", "status", "steps", "seconds", "best return", "falls", "after steps"], []
     for row in record["seeds"]:
         falls = MISSING if row["falls"] is None else f"{row['falls']} of {row['episodes']}"
-        steps, seconds, best, after = (
-            MISSING if row[name] is None else format(row[name], pattern)
-            for name, pattern in (
-                ("timesteps", ",d"),
-                ("seconds", ".0f"),
-                ("return_mean", ".1f"),
-                ("best_timesteps", ",d"),
-            )
-        )
+        patterns = {"timesteps": ",d", "seconds": ".0f", "return_mean": ".1f", "best_timesteps": ",d"}
+        steps, seconds, best, after = (text_of(row[name], pattern) for name, pattern in patterns.items())
         lines.append([str(row["seed"]), row["status"], steps, seconds, best, falls, after])
-    seconds, best, falls, after = (_plus_minus(record["spread"][name]) for name in SPREAD)
+    seconds, best, falls, after = (plus_minus(record["spread"][name], ",.1f", alone=False) for name in SPREAD)
     lines.append(["mean ± SD", "", "", seconds, best, falls, after])
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-
-
-def _plus_minus(value: dict[str, float | None]) -> str:
-    mean, sd = (MISSING if number is None else f"{number:,.1f}" for number in (value["mean"], value["sd"]))
-    return f"{mean} ± {sd}"
+    return table(head, lines)
 
 
 class _Trainings:

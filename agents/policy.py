@@ -37,6 +37,8 @@ VARIANCE_FLOOR = 1e-8
 
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: highest mean return in periodic evaluation, and the newest."""
+RUN = "run.json"
+"""Name of a run folder's record: configuration, evaluations, status."""
 
 
 _MODEL_NUMBERS = (

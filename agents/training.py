@@ -29,12 +29,12 @@ from springfoot.gait.errors import SpringfootError
 
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
-from .policy import BEST, LAST, fingerprint, load_policy, read_tensors, save_policy
+from .policy import BEST, LAST, RUN, fingerprint, load_policy, read_tensors, save_policy
 from .ppo import Learner
 from .progress import Progress
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 
-RUN, STATE = "run.json", "state.safetensors"
+STATE = "state.safetensors"
 EVALUATION_SEED = 2**30
 """Seed of the first episode of every periodic evaluation, the next ones following."""
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")

@@ -25,6 +25,8 @@ class Criterion:
     pattern: str = ".2f"
     loosen: Literal["share", "r", ""] = ""
     """How `loosened` widens it."""
+    label: str = ""
+    """What a table of one walk calls it; its name where there is none."""
 
     def value(self, values: dict[str, Any]) -> float | None:
         """The number; None where it could not be measured."""
@@ -86,16 +88,32 @@ def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
     return "?" if value is None else format(value, criterion.pattern) + criterion.unit
 
 
+_FORCES = {
+    "vertical_peak1_bw": "vertical force, peak 1",
+    "vertical_valley_bw": "vertical force, valley",
+    "vertical_peak2_bw": "vertical force, peak 2",
+    "vertical_max_bw": "vertical force, largest 10 ms of any stride",
+    "vertical_r": "vertical force r",
+    "braking_peak_bw": "fore-aft force, braking",
+    "forward_peak_bw": "fore-aft force, forward",
+    "forward_r": "fore-aft force r",
+}
+"""Name in `grf` of metrics.json -> label."""
+
+
 def _force(name: str, low: float = -inf, high: float = inf) -> Criterion:
-    return Criterion(name=name, path=("grf", name), low=low, high=high, unit=" BW", loosen="share")
+    label = _FORCES[name]
+    return Criterion(name=name, path=("grf", name), low=low, high=high, unit=" BW", loosen="share", label=label)
 
 
 def _rmse(joint: str, high: float) -> Criterion:
-    return Criterion(name=joint, path=("joints", joint, "rmse_deg"), high=high, unit="°", loosen="share")
+    return Criterion(
+        name=joint, path=("joints", joint, "rmse_deg"), high=high, unit="°", loosen="share", label=f"RMSE {joint}"
+    )
 
 
 def _r(name: str, path: tuple[str, ...], low: float) -> Criterion:
-    return Criterion(name=name, path=path, low=low, pattern=".3f", loosen="r")
+    return Criterion(name=name, path=path, low=low, pattern=".3f", loosen="r", label=_FORCES.get(name, ""))
 
 
 NO_FALLS = Criterion(name="falls", path=("falls",), high=0, pattern=".0f")

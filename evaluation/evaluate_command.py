@@ -1,7 +1,5 @@
 """The command that evaluates a policy: `evaluate.py`, `springfoot evaluate`."""
 
-import shutil
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +9,7 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.agents.command_line import exit_code, policy_label
-from springfoot.agents.files import next_free
+from springfoot.agents.files import next_free, whole_folder
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.gait.errors import SpringfootError, require_count
 
@@ -64,9 +62,7 @@ def run_evaluation(flags: EvaluateFlags) -> None:
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     policy, environment = recording.prepare(flags.policy, settings, flags.seed)
 
-    out.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    try:
+    with whole_folder(out) as folder:
         total = flags.episodes * environment.episode_seconds
         with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
             episodes = recording.record(
@@ -79,10 +75,6 @@ def run_evaluation(flags: EvaluateFlags) -> None:
                 progress=bar.update,
             )
         gait = metrics.measure(episodes)
-        report.write_report(part, episodes, gait)
-        part.chmod(0o755)  # mkdtemp makes it private
-        part.rename(out)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        report.write_report(folder, episodes, gait)
     report.print_table(gait.metrics)
     print(f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif)")

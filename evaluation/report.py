@@ -6,7 +6,6 @@ strides.npz                     the 100 Hz series all of it is computed from
 gait.png, walk.gif              pictures
 """
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from springfoot.agents.markdown import MISSING
+from springfoot.agents.files import csv_text
+from springfoot.agents.markdown import plus_minus, text_of
 from springfoot.envs.settings import reference_gait, settings_from
 from springfoot.gait import HumanGait
 from springfoot.gait import scores as score
@@ -59,12 +59,8 @@ def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) 
     columns = {}
     for name in curves.names:
         columns[name], columns[f"{name}_sd"] = curves.mean(name), curves.sd(name)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["percent", *leading, *columns])
-        for percent in PERCENT:
-            values = [*leading.values(), *(column[percent] for column in columns.values())]
-            writer.writerow([percent, *map(_cell, values)])
+    rows = ([percent, *leading.values(), *(column[percent] for column in columns.values())] for percent in PERCENT)
+    path.write_text(csv_text(["percent", *leading, *columns], rows), encoding="utf-8", newline="")
 
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
@@ -114,13 +110,16 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     def row(
         label: str, unit: str, value: Any, pattern: str, their: Any = None, r: Any = None, inside: Any = None
     ) -> TableRow:
-        if isinstance(value, dict):
-            spread = f" ± {_text(value['sd'], pattern)}" if value["sd"] is not None else ""
-            value, text = value["mean"], _text(value["mean"], pattern) + spread
-        else:
-            text = _text(value, pattern)
+        text = plus_minus(value, pattern) if isinstance(value, dict) else text_of(value, pattern)
         share = "" if inside is None else f"{inside:.0f} %"
-        return label, unit, text, "" if their is None else _text(their, pattern), "" if r is None else f"{r:.2f}", share
+        return (
+            label,
+            unit,
+            text,
+            "" if their is None else text_of(their, pattern),
+            "" if r is None else f"{r:.2f}",
+            share,
+        )
 
     def mm(label: str, value: float | None, r: float | None = None) -> TableRow:
         return row(label, "mm", None if value is None else 1000 * value, ".0f", None, r)
@@ -173,7 +172,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             mm("contact travel a stance", metrics["contact_travel_m"]),
         ],
         [
-            (f"{name} stiffness", "N·m/rad", "/".join(_text(v, ".0f") for v in values.values()), "", "", "")
+            (f"{name} stiffness", "N·m/rad", "/".join(text_of(v, ".0f") for v in values.values()), "", "", "")
             for name, values in metrics["stiffness_Nm_rad"].items()
         ],
     ]
@@ -200,13 +199,3 @@ def people_metrics(human: HumanGait) -> dict[str, Any]:
         "moments": {name: score.largest(human.mean(f"{name}_moment", phase))[0] for name in ("hip", "knee", "ankle")},
         "ankle_work_J_kg": {"positive": float(positive[0]), "negative": float(negative[0])},
     }
-
-
-def _text(value: float | None, pattern: str) -> str:
-    return MISSING if value is None else format(value, pattern)
-
-
-def _cell(value: Any) -> Any:
-    if value is None or (isinstance(value, float) and not np.isfinite(value)):
-        return ""
-    return f"{value:.6g}" if isinstance(value, float) else value

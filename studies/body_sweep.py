@@ -1,27 +1,23 @@
 """Many bodies at many speeds: one episode of a policy for each pair drawn, held against people at its Froude speed.
 
-    python -m springfoot.studies.comparison bodies pretrained --pairs 300
+    springfoot study bodies pretrained --pairs 300
 
 Heights, masses and speeds are drawn independently and evenly over the ranges of `train.py --preset any-body`; a
 height and a mass that make no body (`springfoot.gait.body.BMI_RANGE`) are drawn again.
 """
 
-import csv
-import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from springfoot.agents.baselines import PolicyFunction
 from springfoot.agents.command_line import policy_label
 from springfoot.agents.config import PRESETS
-from springfoot.agents.files import next_free, write_atomically
+from springfoot.agents.files import csv_text
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.agents.markdown import table
 from springfoot.envs.control.reference_walk import tabulated_speeds
@@ -29,12 +25,13 @@ from springfoot.envs.control.subjects import DRAWN, Subjects
 from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import BATCH, Recording, prepare, record_each
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.errors import require_count
+
+from .quantities import JOINTS
+from .study import Answer, Progress, Study
 
 RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
 """What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
-JOINTS = ("thigh", "knee", "ankle")
-"""Whose angles are compared; people's toe is that of other people."""
 PAIRS = "pairs.csv"
 """Name of the file with a row for each pair."""
 WORST_FALLS = 10
@@ -65,7 +62,7 @@ def walk_pairs(
     seed: int = 0,
     threads: int = 2,
     block: int = BATCH,
-    progress: Callable[[float], object] = lambda seconds: None,
+    progress: Progress = lambda seconds: None,
 ) -> list[dict[str, Any]]:
     """One episode of each pair, and its numbers as in pairs.csv (docs/metrics.md); None where there is none.
 
@@ -99,16 +96,6 @@ def _row(recording: Recording) -> dict[str, Any]:
     }
 
 
-def pairs_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """One line for each pair; empty where there is no number."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(rows[0])
-    for row in rows:
-        writer.writerow([f"{value:.6g}" if isinstance(value, float) else value for value in row.values()])
-    return text.getvalue()
-
-
 def pairs_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst."""
     fallen = [row for row in rows if row["fall"]]
@@ -131,7 +118,7 @@ def _who(row: Mapping[str, Any]) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bodies:
+class Bodies(Study):
     """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs."""
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
@@ -144,35 +131,35 @@ class Bodies:
     """Of the draw; the episode of pair i is seeded with seed + i."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
-    out: Annotated[
-        Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/bodies-POLICY-N)")
-    ] = None
-    """New folder for pairs.csv, a row for each pair."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
     """What to walk in; a trained policy brings its own settings, standard conditions aside."""
 
-    def run(self) -> None:
-        """Walk every pair, write pairs.csv and print the table."""
+    QUICK: ClassVar[dict[str, Any]] = {"pairs": 2, "seconds": 5.0}
+
+    def check(self) -> None:
+        """Refuse counts that cannot be."""
         for name, least in (("pairs", 1), ("seed", 0), ("threads", 1)):
             require_count(name, getattr(self, name), least)
-        label = policy_label(self.policy)
-        out = self.out or next_free(Path("runs"), f"bodies-{label}")
-        if out.exists():
-            raise SpringfootError(f"{out} exists already; give --out a new folder")
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls."""
+        return self.pairs * self.seconds
+
+    def ask(self, progress: Progress) -> Answer:
+        """Walk every pair."""
         conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
         policy, settings = prepare(self.policy, conditions, self.seed)
         who, how = draw_pairs(settings, self.pairs, self.seed), {"seed": self.seed, "threads": self.threads}
-        total = self.pairs * settings.episode_seconds
-        with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
-            rows = walk_pairs(policy, settings, who, name=label, progress=bar.update, **how)
-        out.mkdir(parents=True)
-        write_atomically(out / PAIRS, pairs_csv(rows).encode())
+        rows = walk_pairs(policy, settings, who, name=policy_label(self.policy), progress=progress, **how)
         clamped = sum(row["people_clamped"] for row in rows)
-        print(
+        text = (
             f"{pairs_table(rows)}\n\n`{self.policy}`, {self.pairs} pairs × {settings.episode_seconds:g} s, seed "
             f"{self.seed}: {_ranges(settings)}, independent and even. Of the pairs that did not fall; {clamped} of all "
-            f"lie beyond people's measured speeds, and are held against the nearest.\nResults: {out / PAIRS}"
+            f"lie beyond people's measured speeds, and are held against the nearest."
         )
+        numbers = csv_text(list(rows[0]), (list(row.values()) for row in rows))
+        return Answer(text=text, files={PAIRS: numbers}, sections={"BODIES": text})
 
 
 def _ranges(settings: BipedSettings) -> str:

@@ -1,7 +1,6 @@
 """The study of many bodies at many speeds: what is drawn, that a pair is measured as if alone, and what is told."""
 
 import csv
-import sys
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.errors import SpringfootError
 from springfoot.studies import body_sweep as bodies
-from springfoot.studies import comparison as studies
+from springfoot.studies.command import study_main
+from springfoot.studies.quantities import JOINTS
 
 SOME: dict[str, Any] = {"height_range": (1.6, 1.75), "mass_range": (40.0, 120.0), "speed_range": (1.15, 1.25)}
 
@@ -44,7 +44,7 @@ def test_a_pair_is_measured_as_if_alone_in_blocks_of_any_size():
 
 def row(speed_error: float | None = 1.0, fall: str = "", **values: Any) -> dict[str, Any]:
     plain = {"height_m": 1.7, "mass_kg": 63.0, "speed_m_s": 1.2, "froude_speed": 0.4, "people_clamped": 0}
-    measured = {f"{joint}_rmse_deg": 2.0 for joint in bodies.JOINTS} | {"grf_vertical_r": 0.99}
+    measured = {f"{joint}_rmse_deg": 2.0 for joint in JOINTS} | {"grf_vertical_r": 0.99}
     fell = {"seconds": 20.0, "fall": fall, "measured_speed_m_s": 1.2, "speed_error_percent": speed_error}
     return plain | fell | measured | values
 
@@ -61,18 +61,18 @@ def test_the_table_has_falls_apart_and_the_worst_of_those_that_walked():
     assert "1 of 1" in fallen and "RMSE" not in fallen
 
 
-def test_the_command_prints_a_table_and_writes_a_row_for_each_pair(monkeypatch, capsys, tmp_path):
+def test_the_command_prints_a_table_and_writes_a_row_for_each_pair(capsys, tmp_path):
     ranges = [f"--{name.replace('_', '-')} {low:g} {high:g}" for name, (low, high) in SOME.items()]
     words = ["bodies", "schedule", "--pairs", "2", "--seconds", "4.5", "--out", str(tmp_path / "new"), *ranges]
-    monkeypatch.setattr(sys, "argv", ["studies", *" ".join(words).split()])
-    assert studies.main() == 0
+    words = " ".join(words).split()
+    assert study_main(words) == 0
     out = capsys.readouterr().out
     assert "| falls | 0 of 2 |" in out and "2 pairs × 4.5 s, seed 0: 1.6–1.75 m, 40–120 kg, 1.15–1.25 m/s" in out
     with (tmp_path / "new" / bodies.PAIRS).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 and list(rows[0]) == list(row())
     assert all(1.6 <= float(each["height_m"]) <= 1.75 and float(each["knee_rmse_deg"]) < 6 for each in rows)
-    assert studies.main() == 2
+    assert study_main(words) == 2
     assert "exists already" in capsys.readouterr().err
 
 

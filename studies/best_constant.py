@@ -1,0 +1,101 @@
+"""The constant ankle and toe stiffness that earns most, in the environment and by the reward of a policy.
+
+springfoot study best-constant
+"""
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, ClassVar
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from springfoot.agents.baselines import constant
+from springfoot.agents.files import csv_text
+from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.recording import prepare, record
+
+from .comparison import INTERVALS, PushedFlags, mean_interval, pushed
+from .study import Answer, Progress, WalkingStudy
+
+COARSE = (8, 5)
+"""First grid of the search for a constant, ankle by toe stiffness: evenly on a log scale over their ranges."""
+REFINEMENTS = 3
+"""Times the search then halves its spacing around the best so far."""
+SEARCH_SEED = 100_000
+"""Of the search's first episode: far from a comparison's, so that the best constant is not fitted to its starts."""
+
+
+def best_constant(
+    settings: BipedSettings,
+    *,
+    grid: tuple[int, int] = COARSE,
+    refinements: int = REFINEMENTS,
+    episodes: int = 16,
+    seed: int = SEARCH_SEED,
+    threads: int = 2,
+    progress: Progress = lambda candidates: None,
+) -> tuple[tuple[float, float], dict[tuple[float, float], NDArray]]:
+    """The constant ankle and toe stiffness of the highest mean return in `settings`; of each pair its returns (episodes,).
+
+    A log `grid` over the settings' ranges, then `refinements` around the best; all candidates walk the same episodes.
+    Stiffness [N m/rad] is for 1.70 m and 63 kg. The return of the best of many is optimistic: judge it on other seeds.
+    """
+    low, high = np.log([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
+    spacing = (high - low) / (np.array(grid) - 1)
+    settings = replace(settings, action_mode="absolute")
+    how: dict[str, Any] = {"episodes": episodes, "seed": seed, "threads": threads}
+    tried: dict[tuple[float, float], NDArray] = {}
+
+    def best() -> tuple[float, float]:
+        return max(tried, key=lambda pair: tried[pair].mean())
+
+    for refinement in range(refinements + 1):
+        points = low + np.array(list(product(*map(range, grid)))) * spacing
+        if refinement:
+            points = np.log(best()) + np.array(list(product((-1, 0, 1), repeat=2))) * spacing / 2**refinement
+        for point in np.exp(np.clip(points, low, high)):
+            pair = float(f"{point[0]:.3g}"), float(f"{point[1]:.3g}")  # as it will be typed
+            if pair not in tried:
+                tried[pair] = record(constant(settings, pair), settings, name="constant", **how).returns
+            progress(1)
+    return best(), tried
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestConstant(WalkingStudy):
+    """Find the constant ankle and toe stiffness with the highest mean return."""
+
+    policy: str = "pretrained"
+    """In whose environment and reward: any policy of evaluate.py; untrained for the defaults."""
+    episodes: int = 16
+    """Episodes of each candidate."""
+    seed: int = SEARCH_SEED
+    """Of every candidate's first episode; keep it apart from that of the comparison."""
+    environment: tyro.conf.OmitArgPrefixes[PushedFlags]  # type: ignore[valid-type]
+    """What to walk in."""
+
+    UNIT: ClassVar[str] = " tries"
+    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 1.0}
+
+    @property
+    def total(self) -> float:
+        """Candidates."""
+        return COARSE[0] * COARSE[1] + 9 * REFINEMENTS
+
+    def ask(self, progress: Progress) -> Answer:
+        """Search."""
+        _, settings = prepare(self.policy, pushed(self.seconds, self.environment))
+        (ankle, toe), tried = best_constant(settings, **self.how, progress=progress)
+        returns = tried[ankle, toe]
+        low, high = mean_interval(returns)
+        text = (
+            f"--constant {ankle:g} {toe:g}\n"
+            f"ankle {ankle:g}, toe {toe:g} N·m/rad for 1.70 m and 63 kg: mean return {returns.mean():.1f} "
+            f"[{low:.1f}, {high:.1f}] over the search's {len(returns)} episodes, the best of {self.total:g} tries.\n"
+            f"{INTERVALS}"
+        )
+        lines = [(*pair, float(each.mean())) for pair, each in tried.items()]
+        head = ["ankle_Nm_per_rad", "toe_Nm_per_rad", "return_mean"]
+        return Answer(text=text, files={"tried.csv": csv_text(head, lines)}, sections={"BEST-CONSTANT": text})

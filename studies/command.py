@@ -1,0 +1,111 @@
+"""The command `springfoot`: the same code as `train.py` and `evaluate.py`, and every study by its name."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .study import Study
+
+HELP = """usage: springfoot {train,evaluate,study} ...
+
+  springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
+  springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
+  springfoot study NAME             hold many walks against each other; springfoot study --help lists them
+
+Each takes --help."""
+
+STUDIES = {
+    "compare": ("comparison.Compare", "Does a policy walk better than every baseline?"),
+    "best-constant": ("best_constant.BestConstant", "Which constant stiffness earns most?"),
+    "seeds": ("seeds.Seeds", "How far apart are several policies, as one training from several seeds?"),
+    "bodies": ("body_sweep.Bodies", "Does a policy walk with any body at any speed?"),
+    "criteria": ("criteria_met.CriteriaMet", "Which criteria of a human-like walk does a policy meet?"),
+    "conditions": ("conditions.Conditions", "How does a policy walk elsewhere, and how do other springs?"),
+    "ablations": ("ablations.Ablations", "What does each part of the training contribute? (trains)"),
+    "stiffness-cost": ("stiffness_cost.StiffnessCost", "What does a cost on stiffness take and give? (trains)"),
+    "agreement": ("seed_agreement.SeedAgreement", "Do the springs of several policies agree over the stride?"),
+    "any-stiffness": ("identifiability.AnyStiffness", "Does a gait walk with any other stiffness?"),
+    "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
+    "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
+    "slope-tuning": ("slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
+    "thesis": ("thesis_page.Thesis", "How do the thesis's figures and claims stand against people?"),
+}
+"""Name of each study on the command line -> its class, imported when it is asked, and its question."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `springfoot`; returns the exit code, 2 for bad input and for a package that is not installed.
+
+    `arguments` are those of the process unless given. Imports no more than the asked command needs.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        match words:
+            case ["train", *rest]:
+                from springfoot.agents.train_command import train_main
+
+                return train_main(rest, "springfoot train")
+            case ["evaluate", *rest]:
+                from springfoot.evaluation.evaluate_command import evaluate_main
+
+                return evaluate_main(rest, "springfoot evaluate")
+            case ["study", *rest]:
+                return study_main(rest)
+            case [] | ["-h" | "--help"]:
+                print(HELP)
+                return 0
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith("springfoot"):
+            raise
+        extra = "evaluate" if words[0] == "evaluate" else "train"
+        print(
+            f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
+            file=sys.stderr,
+        )
+        return 2
+    print(f"springfoot: error: no command {words[0]!r}; there are train, evaluate and study", file=sys.stderr)
+    return 2
+
+
+def study_main(arguments: Sequence[str]) -> int:
+    """Run the study whose name comes first: 0 done, 1 a training failed, 2 bad input, 130 ended by Ctrl-C."""
+    name, *words = arguments or ["--help"]
+    if name in ("-h", "--help"):
+        print(study_help())
+        return 0
+    if name not in STUDIES:
+        print(f"springfoot study: error: no study {name!r}; there are {', '.join(STUDIES)}", file=sys.stderr)
+        return 2
+    import tyro
+
+    from springfoot.agents.command_line import exit_code
+
+    program = f"springfoot study {name}"
+    study = tyro.cli(study_class(name), args=words, prog=program)
+    study = replace(study, command=shlex.join([*program.split(), *words]))
+    return exit_code(program, lambda: study.run(name))
+
+
+def study_class(name: str) -> "type[Study]":
+    """The class of one of `STUDIES`."""
+    module, _, found = STUDIES[name][0].partition(".")
+    return getattr(import_module(f".{module}", __package__), found)
+
+
+def study_help() -> str:
+    """What there is to study."""
+    width = max(map(len, STUDIES))
+    lines = (f"  {name:<{width}}  {question}" for name, (_, question) in STUDIES.items())
+    return "\n".join(
+        [
+            "usage: springfoot study NAME [--quick] [--out FOLDER] [--page FILE] ...",
+            "",
+            *lines,
+            "",
+            "Each takes --help; with --quick it runs within seconds, only to be seen to run.",
+        ]
+    )

@@ -1,0 +1,143 @@
+"""One way to make a study: its flags, its progress, what it prints, and the files and the page it leaves behind.
+
+A study is a frozen dataclass of flags and a question: a subclass of `Study` (of `WalkingStudy` where policies walk
+episodes) gives the flags, their defaults and their `QUICK` values, and answers in `ask`. A line in
+`springfoot.studies.command.STUDIES` gives it its name on the command line. Nothing else is needed.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import tyro
+from tqdm import tqdm
+
+from springfoot.agents.files import next_free, whole_folder
+from springfoot.agents.markdown import write_section
+from springfoot.gait.errors import SpringfootError, require_count, require_number
+
+Progress = Callable[[float], object]
+"""Told how much more is done: simulated seconds, or whatever a study counts."""
+QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What a study found."""
+
+    text: str
+    """Markdown, to be printed."""
+    files: Mapping[str, str | Callable[[Path], object]] = field(default_factory=dict)
+    """Name -> text of a file of the study's folder, or what draws the picture of that path."""
+    sections: Mapping[str, str] = field(default_factory=dict)
+    """Name -> markdown of a section of a page."""
+    failed: bool = False
+    """Whether a part of it could not be had; the exit code is then 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A question, with the flags that every study has."""
+
+    quick: tyro.conf.FlagCreatePairsOff[bool] = False
+    """See that it runs, within seconds: tiny counts in place of what is flagged; its figures then mean nothing."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/STUDY-N)")] = None
+    """New folder for its CSV files and pictures."""
+    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """Also write its tables into this page, between the markers of its sections, and its pictures beside it."""
+    command: tyro.conf.Suppress[tyro.conf.Fixed[str]] = ""
+    """How it was asked, told with what it found."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {}
+    """Flags of `--quick`."""
+    UNIT: ClassVar[str] = "s"
+    """What its progress counts."""
+
+    def check(self) -> None:
+        """Raise `SpringfootError` for flags that cannot be, before anything is done."""
+
+    @property
+    def total(self) -> float | None:
+        """How much progress there will be, where that is known."""
+        return None
+
+    def ask(self, progress: Progress) -> Answer:
+        """The answer."""
+        raise NotImplementedError
+
+    def write_page(self, page: Path, answer: Answer) -> None:
+        """Write the answer's sections, each with the command that made it."""
+        for name, text in answer.sections.items():
+            write_section(page, name, f"{text}\n\nMade by `{self.command}`.")
+
+    def run(self, name: str) -> int:
+        """Ask, print and write what was found; the exit code: 0, or 1 where a part of it failed.
+
+        Raises `SpringfootError`, with nothing written, for bad flags, a folder that exists, and a page that cannot be.
+        """
+        study = replace(self, **self.QUICK) if self.quick else self
+        study.check()
+        out = study.out or next_free(Path("runs"), name)
+        if out.exists():
+            raise SpringfootError(f"{out} exists already; give --out a new folder")
+        if study.page is not None and not study.page.parent.is_dir():
+            raise SpringfootError(f"there is no folder {study.page.parent} for the page {study.page.name}")
+        with tqdm(
+            total=study.total, desc=name, unit=study.UNIT, unit_scale=True, leave=False, disable=None, delay=0.5
+        ) as bar:
+            answer = study.ask(bar.update)
+        if study.quick:
+            sections = {section: f"{QUICK_NOTE}\n\n{text}" for section, text in answer.sections.items()}
+            answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}", sections=sections)
+        print(answer.text)
+        with whole_folder(out) as folder:
+            for file, content in answer.files.items():
+                _write(folder / file, content)
+        if study.page is not None:
+            study.write_page(study.page, answer)
+            for file, content in answer.files.items():
+                if file.endswith(".png"):
+                    _write(study.page.parent / file, content)
+        print(f"\nResults: {out} ({', '.join(answer.files)})")
+        return 1 if answer.failed else 0
+
+
+def _write(path: Path, content: str | Callable[[Path], object]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if callable(content):
+        content(path)
+    else:
+        path.write_text(content, encoding="utf-8", newline="")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkingStudy(Study):
+    """A study whose rows are episodes of policies, the same seeds in every row."""
+
+    episodes: int = 20
+    """Episodes of each row."""
+    seconds: float = 20.0
+    """Length of each."""
+    seed: int = 0
+    """Episode i is seeded with seed + i, in every row."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
+
+    def check(self) -> None:
+        """Refuse counts and lengths that cannot be."""
+        for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
+            require_count(name, getattr(self, name), least)
+        require_number("seconds", self.seconds, 0, above=True, unit="s")
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """Arguments of `springfoot.evaluation.recording.record`."""
+        return {"episodes": self.episodes, "seed": self.seed, "threads": self.threads}
+
+    @property
+    def what_ran(self) -> str:
+        """The episodes of a row in words."""
+        return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"
