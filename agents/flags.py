@@ -5,13 +5,14 @@ import dataclasses
 import inspect
 import json
 import textwrap
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import tyro
 
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.gait.own_data import read_gait
 
 
@@ -82,48 +83,66 @@ def _metavar(kind: Any) -> str:
     return "|".join(map(_metavar, parts)) if parts else kind.__name__.upper()
 
 
-def optional_flags(name: str, settings: type, defaults: Any, leave_out: tuple[str, ...] = ()) -> type:
+def optional_flags(
+    name: str, settings: type, defaults: Any, leave_out: tuple[str, ...] = (), themes: Mapping[str, str] = THEMES
+) -> type:
     """A dataclass with every field of `settings` as an optional flag: None, its default, means "not given".
 
-    The help of each flag is the field's own docstring, with its value in `defaults` (an instance).
+    The help of each flag is the docstring of the field, with its value in `defaults` (an instance). Fields that name a
+    theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
+    `themes` has for it.
     """
-    help_of, flags = _field_help(settings), []
-    for item_name, kind in get_type_hints(settings).items():
-        if item_name in leave_out:
-            continue
-        default = getattr(defaults, item_name)
-        shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
-        hint = f"(default: {shown})"
-        is_json = dict in (get_origin(kind), *map(get_origin, get_args(kind)))
-        if item_name in FILE_FLAGS:
-            annotation = Annotated[
-                str | None, tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint, metavar="FILE")
-            ]
-        elif is_json:
-            annotation = Annotated[
-                dict | None, _JSON_FLAG, tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint)
-            ]
-        else:
-            annotation = Annotated[
-                kind | None,
-                tyro.conf.arg(help=help_of[item_name], help_behavior_hint=hint, metavar=_metavar(kind)),
-            ]
-        flags.append((item_name, annotation, None))
-    return dataclasses.make_dataclass(
-        name,
-        flags,
-        frozen=True,
-        kw_only=True,
-        namespace={"__doc__": settings.__doc__, "__module__": __name__},
-    )
+    help_of, flags, themed = _field_help(settings), [], {theme: [] for theme in themes}
+    hints, metadata = get_type_hints(settings), {item.name: item.metadata for item in dataclasses.fields(settings)}
+    for item_name, kind in hints.items():
+        if item_name not in leave_out:
+            annotation = _optional_flag(item_name, kind, help_of[item_name], getattr(defaults, item_name))
+            themed.get(metadata[item_name].get("theme"), flags).append((item_name, annotation, None))
+    for theme, inside in themed.items():
+        if inside:
+            group = _flags_class(f"{name}{theme.title()}", inside, themes[theme])
+            flags.append((theme, tyro.conf.OmitArgPrefixes[group], dataclasses.field(default_factory=group)))
+    return _flags_class(name, flags, settings.__doc__)
+
+
+def _flags_class(name: str, flags: list[tuple[str, Any, Any]], doc: str | None) -> type:
+    namespace = {"__doc__": doc, "__module__": __name__}
+    return dataclasses.make_dataclass(name, flags, frozen=True, kw_only=True, namespace=namespace)
+
+
+def _optional_flag(name: str, kind: Any, text: str, default: Any) -> Any:
+    """The annotation of a flag for a setting of this type, with its help and the default that is shown."""
+    shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
+    hint = f"(default: {shown})"
+    if name in FILE_FLAGS:
+        return Annotated[str | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar="FILE")]
+    if dict in (get_origin(kind), *map(get_origin, get_args(kind))):
+        return Annotated[dict | None, _JSON_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
+    return Annotated[kind | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar=_metavar(kind))]
 
 
 def given(flags: Any) -> dict[str, Any]:
-    """The flags that were given, by name, files read; raises `SpringfootError` for a bad file."""
-    values = {item.name: getattr(flags, item.name) for item in dataclasses.fields(flags)}
-    given_ones = {name: value for name, value in values.items() if value is not None}
-    return given_ones | {name: read(given_ones[name]) for name, read in FILE_FLAGS.items() if name in given_ones}
+    """The flags that were given, by name, themes aside and files read; raises `SpringfootError` for a bad file."""
+    values: dict[str, Any] = {}
+    for item in dataclasses.fields(flags):
+        value = getattr(flags, item.name)
+        if dataclasses.is_dataclass(value):
+            values |= given(value)
+        elif value is not None:
+            values[item.name] = FILE_FLAGS[item.name](value) if item.name in FILE_FLAGS else value
+    return values
 
 
-SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings())
-"""Every environment setting as an optional flag (dataclass for `tyro`)."""
+def _evaluated(theme: str) -> str:
+    """The help of a theme in an evaluation: which of its settings a trained policy brings with it."""
+    names = [name for name, its in THEME_OF.items() if its == theme]
+    own = [f"--{name.replace('_', '-')}" for name in names if name not in CONDITION_SETTINGS]
+    if len(own) == len(names):
+        return f"{THEMES[theme]} A trained policy brings its own."
+    return f"{THEMES[theme]} Of these a trained policy brings {' and '.join(own) or 'nothing'} with it."
+
+
+SettingsFlags = optional_flags(
+    "SettingsFlags", BipedSettings, BipedSettings(), themes={theme: _evaluated(theme) for theme in THEMES}
+)
+"""Every environment setting as an optional flag, of an evaluation, in groups by theme (dataclass for `tyro`)."""

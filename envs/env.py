@@ -12,7 +12,8 @@ from springfoot.gait.errors import SpringfootError
 from .biped_batch import Biped
 from .control.subjects import DRAWN
 from .physics.rendering import RENDER_MODES, Camera
-from .settings import check_start, settings_from
+from .setting_checks import check_start
+from .settings import settings_from
 from .step_result import INFO
 from .timing import ACTION_STEP
 
@@ -130,47 +131,54 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     reward term `reward/`. `phase/left`, `phase/right` [0, 1), `time` [s], `speed` [m/s], `termination`.
 
     ## Arguments
-    Every field of `springfoot.envs.settings.BipedSettings`, as plain JSON values:
+    Every field of `springfoot.envs.settings.BipedSettings`, by theme, as plain JSON values:
 
-    | Argument              | Default        | Meaning                                                           |
-    | --------------------- | -------------- | ----------------------------------------------------------------- |
-    | `height`              | `1.7`          | standing height [m]                                               |
-    | `mass`                | `63.0`         | body mass [kg]                                                    |
-    | `leg_ratio`           | `1.0`          | thigh and shank over the average at that height, trunk the rest   |
-    | `foot_ratio`          | `1.0`          | length of the foot over the average at that height                |
-    | `carried_ratio`       | `0.0`          | mass of a load on the back over body mass                         |
-    | `speed`               | `1.2`          | commanded speed [m/s]                                             |
-    | `height_range`        | `None`         | heights drawn at each reset [m], in place of `height`             |
-    | `mass_range`          | `None`         | body masses drawn at each reset [kg], in place of `mass`          |
-    | `speed_range`         | `None`         | speeds drawn at each reset [m/s], in place of `speed`             |
-    | `speed_interval`      | `None`         | mean time between changes of the commanded speed [s]              |
-    | `speed_rate`          | `0.25`         | rate at which it goes to a new one [m/s^2]                        |
-    | `cadence`             | `"people"`     | step length and time of `"people"` or of the `"thesis"`           |
-    | `equilibrium`         | `"planned"`    | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                  |
-    | `feedforward`         | `"people"`     | moments fed forward: measured on `"people"`, or the `"plan"`'s own |
-    | `action_mode`         | `"absolute"`   | `"absolute"` or `"residual"`                                      |
-    | `decisions`           | `"50hz"`       | steps of 10, 20, 40 ms (`"100hz"`, `"50hz"`, `"25hz"`), `"event"` |
-    | `stiffness_joints`    | `"both"`       | joints the action decides: `"both"`, `"ankle"` or `"toe"`         |
-    | `ankle_stiffness_range`| `(20.0, 800.0)` | ankle stiffness at action -1 and +1 [N m/rad]                     |
-    | `toe_stiffness_range` | `(5.0, 200.0)` | toe stiffness at action -1 and +1 [N m/rad]                       |
-    | `schedule`            | `None`         | a stiffness schedule in JSON form                                 |
-    | `human`               | `None`         | someone's own walk in people's place, JSON form of `OwnGait`      |
-    | `episode_seconds`     | `20.0`         | time until truncation [s]                                         |
-    | `start`               | `"random"`     | left leg's stride phase at the start, `"random"` or `"standing"`  |
-    | `stop_at`             | `None`         | time from which the body slows down, stops and stands [s]         |
-    | `start_noise`         | `0.0`          | relative spread of joint angles and velocities at the start       |
-    | `push_newton`         | `0.0`          | size of each push on the trunk [N] for 63 kg, scales with mass    |
-    | `push_seconds`        | `0.1`          | duration of each push [s]                                         |
-    | `push_interval`       | `4.0`          | one push at a random time in each interval [s]                    |
-    | `friction`            | `1.0`          | coefficient of friction between feet and ground                   |
-    | `slope_deg`           | `0.0`          | slope of the ground, uphill positive [deg]                        |
-    | `slope_range_deg`     | `None`         | slopes drawn at each reset [deg], in place of `slope_deg`         |
-    | `unevenness_m`        | `0.0`          | each footfall's ground is up to this much higher or lower [m]     |
-    | `sensor_noise`        | `0.0`          | SD of noise on what is measured of the observation                |
-    | `stiffness_delay_s`   | `0.0`          | a commanded stiffness acts this much later [s]                    |
-    | `stiffness_delay_range_s` | `None`         | delays drawn at each reset [s], in place of it                    |
-    | `reward_weights`      | `{}`           | weights that differ from the table above                          |
-    | `human`               | `None`         | own gait data in people's place: `read_gait(FILE).to_json()`      |
+    | Argument                  | Default         | Meaning                                                            |
+    | ------------------------- | --------------- | ------------------------------------------------------------------ |
+    | **body**                  |                 |                                                                    |
+    | `height`                  | `1.7`           | standing height [m]                                                |
+    | `mass`                    | `63.0`          | body mass [kg]                                                     |
+    | `leg_ratio`               | `1.0`           | thigh and shank over the average at that height, trunk the rest    |
+    | `foot_ratio`              | `1.0`           | length of the foot over the average at that height                 |
+    | `carried_ratio`           | `0.0`           | mass of a load on the back over body mass                          |
+    | `height_range`            | `None`          | heights drawn at each reset [m], in place of `height`              |
+    | `mass_range`              | `None`          | body masses drawn at each reset [kg], in place of `mass`           |
+    | **speed**                 |                 |                                                                    |
+    | `speed`                   | `1.2`           | commanded speed [m/s]                                              |
+    | `speed_range`             | `None`          | speeds drawn at each reset [m/s], in place of `speed`              |
+    | `speed_interval`          | `None`          | mean time between changes of the commanded speed [s]               |
+    | `speed_rate`              | `0.25`          | rate at which it goes to a new one [m/s^2]                         |
+    | **reference**             |                 |                                                                    |
+    | `cadence`                 | `"people"`      | step length and time of `"people"` or of the `"thesis"`            |
+    | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
+    | **springs**               |                 |                                                                    |
+    | `equilibrium`             | `"planned"`     | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                   |
+    | `feedforward`             | `"people"`      | moments fed forward: measured on `"people"`, or the `"plan"`'s own |
+    | `action_mode`             | `"absolute"`    | `"absolute"` or `"residual"`                                       |
+    | `decisions`               | `"50hz"`        | steps of 10, 20, 40 ms (`"100hz"`, `"50hz"`, `"25hz"`), `"event"`  |
+    | `stiffness_joints`        | `"both"`        | joints the action decides: `"both"`, `"ankle"` or `"toe"`          |
+    | `ankle_stiffness_range`   | `(20.0, 800.0)` | ankle stiffness at action -1 and +1 [N m/rad]                      |
+    | `toe_stiffness_range`     | `(5.0, 200.0)`  | toe stiffness at action -1 and +1 [N m/rad]                        |
+    | `schedule`                | `None`          | a stiffness schedule in JSON form                                  |
+    | **episode**               |                 |                                                                    |
+    | `episode_seconds`         | `20.0`          | time until truncation [s]                                          |
+    | `start`                   | `"random"`      | left leg's stride phase at the start, `"random"` or `"standing"`   |
+    | `stop_at`                 | `None`          | time from which the body slows down, stops and stands [s]          |
+    | `start_noise`             | `0.0`           | relative spread of joint angles and velocities at the start        |
+    | **ground**                |                 |                                                                    |
+    | `friction`                | `1.0`           | coefficient of friction between feet and ground                    |
+    | `slope_deg`               | `0.0`           | slope of the ground, uphill positive [deg]                         |
+    | `slope_range_deg`         | `None`          | slopes drawn at each reset [deg], in place of `slope_deg`          |
+    | `unevenness_m`            | `0.0`           | each footfall's ground is up to this much higher or lower [m]      |
+    | **disturbance**           |                 |                                                                    |
+    | `push_newton`             | `0.0`           | size of each push on the trunk [N] for 63 kg, scales with mass     |
+    | `push_seconds`            | `0.1`           | duration of each push [s]                                          |
+    | `push_interval`           | `4.0`           | one push at a random time in each interval [s]                     |
+    | `sensor_noise`            | `0.0`           | SD of noise on what is measured of the observation                 |
+    | `stiffness_delay_s`       | `0.0`           | a commanded stiffness acts this much later [s]                     |
+    | `stiffness_delay_range_s` | `None`          | delays drawn at each reset [s], in place of it                     |
+    | **reward**                |                 |                                                                    |
+    | `reward_weights`          | `{}`            | weights that differ from the table above                           |
 
     and `render_mode`: `"human"`, `"rgb_array"` or None.
 

@@ -1,10 +1,13 @@
-"""Everything that can be set about the walking task: plain JSON values, validated in one place."""
+"""Everything that can be set about the walking task: plain JSON values, validated in one place.
+
+The settings are flat, as `gym.make` takes them. Each one also names its theme, once; the groups of `--help`, the table
+of `SegmentedFootBiped` and what an evaluation sets anew follow from that.
+"""
 
 import json
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields
 from difflib import get_close_matches
-from math import isfinite
 from numbers import Real
 from typing import Any, Literal, get_args
 
@@ -16,6 +19,7 @@ from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 from .physics.foot_contact import FRICTION
+from .setting_checks import check_choice, check_range, check_span, check_start, check_weights
 from .timing import ACTION_STEP, CONTROL_WINDOW
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -24,17 +28,29 @@ ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
 
+THEMES = {
+    "body": "Whose body walks.",
+    "speed": "How fast it is commanded to walk.",
+    "reference": "Whose walk it is held to.",
+    "springs": "What its ankle and toe springs do, and which part of that the action decides.",
+    "episode": "How an episode starts and ends.",
+    "ground": "What it walks on.",
+    "disturbance": "What disturbs it: pushes, noise of the sensors, delay of the actuators.",
+    "reward": "What it is rewarded for.",
+}
+"""The themes of the settings, and what each one says."""
+
 
 FRICTION_RANGE = (0.4, 1.2)
-"""Of coefficients of friction, from wet floor to rough rubber."""
+"""Allowed coefficients of friction, from a wet floor to rough rubber [-]; chosen."""
 SLOPE_RANGE_DEG = (-5.0, 5.0)
-"""Of slopes, uphill positive [deg]; ramps for wheelchairs have 4.8."""
+"""Allowed slopes, uphill positive [deg]; ramps for wheelchairs have up to 4.8 (1:12, ADA Standards 2010, 405.2)."""
 MOST_UNEVENNESS = 0.03
-"""Largest unevenness [m]; feet swing about this far above the ground."""
+"""Largest unevenness [m]; chosen, as swinging feet clear the ground by about this much."""
 MOST_SENSOR_NOISE = 0.1
-"""Largest standard deviation of sensor noise, in units of the observation."""
+"""Largest standard deviation of sensor noise, in units of the observation [-]; chosen."""
 LONGEST_DELAY = 0.04
-"""Of a stiffness behind its command [s]."""
+"""Longest delay of a stiffness behind its command [s]: with more the fixed schedule falls (docs/design.md)."""
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
@@ -49,94 +65,99 @@ DEFAULT_WEIGHTS = {
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, a negative one is a cost."""
 
 
+_BODY, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = ({"theme": name} for name in THEMES)
+_DRAWN = {"drawn": True}  # the setting makes something differ between episodes, or change within one, by chance
+_KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
+
+
 @dataclass(frozen=True, kw_only=True)
 class BipedSettings:
     """The walking task of the biped with segmented feet; raises `SpringfootError` for a bad value."""
 
-    height: float = REFERENCE_HEIGHT
+    height: float = field(default=REFERENCE_HEIGHT, metadata=_BODY)
     """Standing height of the body [m]."""
-    mass: float = REFERENCE_MASS
+    mass: float = field(default=REFERENCE_MASS, metadata=_BODY)
     """Body mass [kg]."""
-    leg_ratio: float = 1.0
+    leg_ratio: float = field(default=1.0, metadata=_BODY)
     """Length of thigh and shank over the average at that height; the trunk takes the rest [-]."""
-    foot_ratio: float = 1.0
+    foot_ratio: float = field(default=1.0, metadata=_BODY)
     """Length of the foot over the average at that height [-]."""
-    carried_ratio: float = 0.0
+    carried_ratio: float = field(default=0.0, metadata=_BODY)
     """Mass of a load on the back over body mass [-]."""
-    speed: float = 1.2
+    speed: float = field(default=1.2, metadata=_SPEED)
     """Commanded walking speed [m/s]."""
-    height_range: tuple[float, float] | None = None
+    height_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
     """Heights drawn at each reset in place of `height` [m], evenly; with the mass anew if they make no body."""
-    mass_range: tuple[float, float] | None = None
+    mass_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
     """Body masses drawn at each reset in place of `mass` [kg], evenly and whatever the height."""
-    speed_range: tuple[float, float] | None = None
+    speed_range: tuple[float, float] | None = field(default=None, metadata=_SPEED | _DRAWN)
     """Walking speeds drawn at each reset in place of `speed` [m/s], evenly."""
-    speed_interval: float | None = None
+    speed_interval: float | None = field(default=None, metadata=_SPEED | _DRAWN)
     """Mean time between changes of the commanded speed within an episode, drawn from `speed_range` [s]."""
-    speed_rate: float = 0.25
+    speed_rate: float = field(default=0.25, metadata=_SPEED | _KEPT)
     """Rate at which the commanded speed goes to a new one [m/s^2]."""
-    cadence: Cadence = "people"
+    cadence: Cadence = field(default="people", metadata=_REFERENCE)
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
-    equilibrium: Equilibrium = "planned"
+    equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
     """Equilibrium angle of ankle and toe: the planned angle with the planned moment fed forward, the planned
     angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
-    feedforward: Feedforward = "people"
+    feedforward: Feedforward = field(default="people", metadata=_SPRINGS)
     """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
     that inverse dynamics give for the plan (a prediction: no force of people's is used)."""
-    action_mode: ActionMode = "absolute"
+    action_mode: ActionMode = field(default="absolute", metadata=_SPRINGS)
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
-    decisions: Decisions = "50hz"
+    decisions: Decisions = field(default="50hz", metadata=_SPRINGS)
     """When stiffness is decided: in every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
     strike and at people's foot flat, heel-off and toe-off, the action being held between them (event)."""
-    stiffness_joints: StiffnessJoints = "both"
+    stiffness_joints: StiffnessJoints = field(default="both", metadata=_SPRINGS)
     """Joints whose stiffness the action decides; the other has the fixed schedule, and its actions are read as 0."""
-    ankle_stiffness_range: tuple[float, float] = (LOWEST_STIFFNESS[0], 800.0)
+    ankle_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[0], 800.0), metadata=_SPRINGS)
     """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
-    toe_stiffness_range: tuple[float, float] = (LOWEST_STIFFNESS[1], 200.0)
+    toe_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[1], 200.0), metadata=_SPRINGS)
     """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
-    schedule: dict[str, Any] | None = None
+    schedule: dict[str, Any] | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
-    human: dict[str, Any] | None = None
+    human: dict[str, Any] | None = field(default=None, metadata=_REFERENCE)
     """Someone's own walk in place of people's, JSON form of `springfoot.gait.own_data.OwnGait` (on the command line a
     CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time follow it."""
-    episode_seconds: float = 20.0
+    episode_seconds: float = field(default=20.0, metadata=_EPISODE | _KEPT)
     """Time after which an episode is truncated [s]."""
-    start: Literal["random", "standing"] | float = "random"
+    start: Literal["random", "standing"] | float = field(default="random", metadata=_EPISODE)
     """Start of an episode: walking at this stride phase of the left leg [0..1), at a random one within single support,
     or standing: the body sets off by itself within 3 s (`springfoot.envs.control.standing`)."""
-    stop_at: float | None = None
+    stop_at: float | None = field(default=None, metadata=_EPISODE)
     """Time in the episode from which the body slows down, then stops and stands [s]; not before 3 s if it starts
     standing."""
-    start_noise: float = 0.0
+    start_noise: float = field(default=0.0, metadata=_EPISODE)
     """Relative spread of the joint angles and velocities at the start [0..1]."""
-    push_newton: float = 0.0
+    push_newton: float = field(default=0.0, metadata=_DISTURBANCE)
     """Size of each push on the trunk, forward or backward at random [N] for 63 kg; scales with mass; 0 for none."""
-    push_seconds: float = 0.1
+    push_seconds: float = field(default=0.1, metadata=_DISTURBANCE | _KEPT)
     """Duration of each push [s]."""
-    push_interval: float = 4.0
+    push_interval: float = field(default=4.0, metadata=_DISTURBANCE | _KEPT)
     """One push at a random time in each interval of this length [s]."""
-    friction: float = FRICTION
+    friction: float = field(default=FRICTION, metadata=_GROUND)
     """Coefficient of friction between feet and ground [0.4..1.2]."""
-    slope_deg: float = 0.0
+    slope_deg: float = field(default=0.0, metadata=_GROUND)
     """Slope of the ground [-5..5 deg], uphill positive."""
-    slope_range_deg: tuple[float, float] | None = None
+    slope_range_deg: tuple[float, float] | None = field(default=None, metadata=_GROUND | _DRAWN)
     """Slopes drawn at each reset in place of `slope_deg` [deg], evenly."""
-    unevenness_m: float = 0.0
+    unevenness_m: float = field(default=0.0, metadata=_GROUND)
     """The ground of each footfall is up to this much higher or lower than the mean ground [0..0.03 m], evenly; a
     swinging foot gets that of its next footfall in mid-swing."""
-    sensor_noise: float = 0.0
+    sensor_noise: float = field(default=0.0, metadata=_DISTURBANCE)
     """Standard deviation of Gaussian noise, new at every step, on all that is measured of the observation, in its own
     dimensionless units [0..0.1]: 0.01 is 0.6 deg, 9 mm of hip height, 2 deg/s, and 1 % of body weight."""
-    stiffness_delay_s: float = 0.0
+    stiffness_delay_s: float = field(default=0.0, metadata=_DISTURBANCE)
     """A commanded ankle or toe stiffness acts this much later (pure delay) [0..0.04 s, in steps of 0.01 s]."""
-    stiffness_delay_range_s: tuple[float, float] | None = None
+    stiffness_delay_range_s: tuple[float, float] | None = field(default=None, metadata=_DISTURBANCE | _DRAWN)
     """Delays drawn at each reset in place of `stiffness_delay_s`, evenly from the steps of 0.01 s [s]."""
-    reward_weights: dict[str, float] = field(default_factory=dict)
+    reward_weights: dict[str, float] = field(default_factory=dict, metadata=_REWARD)
     """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
 
     def __post_init__(self) -> None:
-        body_of(self)  # refuses impossible ones
+        body_of(self)  # raises for an impossible one
         require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
         self._check_draws()
         for name, choices in (
@@ -147,10 +168,15 @@ class BipedSettings:
             ("decisions", Decisions),
             ("stiffness_joints", StiffnessJoints),
         ):
-            _check_choice(name, getattr(self, name), get_args(choices))
-        _check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
-        _check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
-        self._check_schedule()
+            check_choice(name, getattr(self, name), get_args(choices))
+        check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
+        check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
+        if self.schedule is not None:
+            StiffnessSchedule.from_json(self.schedule)
+        elif self.equilibrium == "phase":
+            raise SpringfootError(
+                "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
+            )
         if self.human is not None:
             OwnGait.from_json(self.human)
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
@@ -162,7 +188,7 @@ class BipedSettings:
         require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
         require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         self._check_world()
-        _check_weights(self.reward_weights)
+        check_weights(self.reward_weights, DEFAULT_WEIGHTS)
 
     @property
     def step_seconds(self) -> float:
@@ -176,7 +202,7 @@ class BipedSettings:
             ("speed_range", PLAN_SPEED_RANGE, "m/s"),
         ):
             if getattr(self, name) is not None:
-                _check_range(name, getattr(self, name), unit)
+                check_range(name, getattr(self, name), unit)
                 for value in getattr(self, name):
                     require_within(name, value, allowed, unit)
         (short, tall), (light, heavy) = self.height_range or 2 * (self.height,), self.mass_range or 2 * (self.mass,)
@@ -192,13 +218,14 @@ class BipedSettings:
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
 
     def _check_world(self) -> None:
+        """Ground, noise and delays."""
         require_number("friction", self.friction, *FRICTION_RANGE)
         require_number("slope_deg", self.slope_deg, *SLOPE_RANGE_DEG, unit="deg")
-        _check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
+        check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
         require_number("unevenness_m", self.unevenness_m, 0.0, MOST_UNEVENNESS, "m")
         require_number("sensor_noise", self.sensor_noise, 0.0, MOST_SENSOR_NOISE, "(observation units)")
         require_number("stiffness_delay_s", self.stiffness_delay_s, 0.0, LONGEST_DELAY, "s")
-        _check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
+        check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
         for name, delays in (
             ("stiffness_delay_s", (self.stiffness_delay_s,)),
             ("stiffness_delay_range_s", self.stiffness_delay_range_s or ()),
@@ -208,18 +235,26 @@ class BipedSettings:
                     f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {getattr(self, name)!r}"
                 )
 
-    def _check_schedule(self) -> None:
-        if self.schedule is None:
-            if self.equilibrium == "phase":
-                raise SpringfootError(
-                    "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
-                )
-        else:
-            StiffnessSchedule.from_json(self.schedule)
+
+THEME_OF: dict[str, str] = {item.name: item.metadata["theme"] for item in fields(BipedSettings)}
+"""Theme of each setting, by its name."""
+DRAWN_SETTINGS = tuple(item.name for item in fields(BipedSettings) if item.metadata.get("drawn"))
+"""Names of the settings that make something differ between episodes, or change within one, by chance."""
+CONDITION_THEMES = ("body", "speed", "episode", "ground", "disturbance")
+"""Themes that say who walks where, whatever the policy was trained on."""
+CONDITION_SETTINGS = tuple(
+    item.name
+    for item in fields(BipedSettings)
+    if item.metadata["theme"] in CONDITION_THEMES and not item.metadata.get("kept")
+)
+"""Names of the settings that every evaluation sets anew; the other ones a trained policy brings with it."""
 
 
 def settings_from(**values: Any) -> BipedSettings:
-    """Settings from keyword arguments or JSON: lists become tuples, numbers float; bad names are refused."""
+    """Settings from keyword arguments or JSON: lists become tuples, numbers become floats.
+
+    Raises `SpringfootError` for an unknown name or a bad value.
+    """
     names = [setting.name for setting in fields(BipedSettings)]
     for name in values:
         if name not in names:
@@ -239,21 +274,15 @@ def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
 
 
 def body_of(settings: BipedSettings) -> Body:
-    """The settings' body."""
+    """The body of the settings."""
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
 
 
 def reference_gait(settings: BipedSettings) -> HumanGait:
-    """Whose walk the settings hold the body to: people's at its speed and height, or that of `settings.human`."""
+    """The walk that the body is held to: people's at its speed and height, or that of `settings.human`."""
     if settings.human is None:
         return human_gait(settings.speed, settings.height)
     return OwnGait.from_json(settings.human).gait(settings.speed, settings.height)
-
-
-def check_start(start: Any) -> None:
-    """Refuses what is neither "random" nor "standing" nor a stride phase in [0, 1)."""
-    if start not in ("random", "standing") and not (_is_number(start) and 0 <= start < 1):
-        raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {start!r}")
 
 
 def _plain(value: Any) -> Any:
@@ -263,38 +292,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return tuple(_plain(item) for item in value)
     return deepcopy(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isfinite(as_float(value))
-
-
-def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
-
-
-def _check_range(name: str, value: Any, unit: str) -> None:
-    numbers = isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
-    if not numbers or not 0 < value[0] < value[1]:
-        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {value!r}")
-
-
-def _check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -> None:
-    numbers = isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
-    if value is not None and not (numbers and allowed[0] <= value[0] < value[1] <= allowed[1]):
-        raise SpringfootError(
-            f"{name} must be (low, high) with low < high in [{allowed[0]:g}, {allowed[1]:g}] {unit}, got {value!r}"
-        )
-
-
-def _check_weights(weights: Any) -> None:
-    if not isinstance(weights, dict):
-        raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {weights!r}")
-    for name, weight in weights.items():
-        if name not in DEFAULT_WEIGHTS:
-            raise SpringfootError(f"reward_weights has no term {name!r}; valid: {', '.join(DEFAULT_WEIGHTS)}")
-        cost = DEFAULT_WEIGHTS[name] < 0
-        if not _is_number(weight) or (weight > 0 if cost else weight < 0):
-            allowed = "<= 0 (a cost)" if cost else ">= 0 (a reward)"
-            raise SpringfootError(f"reward_weights[{name!r}] must be a finite number {allowed}, got {weight!r}")

@@ -21,17 +21,19 @@ from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.control.subjects import DRAWN
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import JOINTS, SIDES
-from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.envs.settings import (
+    CONDITION_SETTINGS,
+    DRAWN_SETTINGS,
+    BipedSettings,
+    settings_from,
+    settings_to_json,
+)
 from springfoot.envs.step_result import Tick
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.plan import WalkPlan
 
-_WHO = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed")
-_RANGES = ("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg", "stiffness_delay_range_s")
-_WORLD = ("push_newton", "friction", "slope_deg", "unevenness_m", "sensor_noise", "stiffness_delay_s")
-_START = ("start", "stop_at", "start_noise")
-CONDITIONS = {name: getattr(BipedSettings, name) for name in (*_WHO, *_RANGES, *_WORLD, *_START)}
+CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -103,8 +105,8 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[PolicyFunc
     """
     wanted = CONDITIONS | given
     if name.partition(":")[0] in BASELINES:
-        who = settings_from(**{key: wanted[key] for key in _WHO})
-        settings = settings_from(**(own_settings(name, who) | wanted))
+        conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
+        settings = settings_from(**(own_settings(name, conditions) | wanted))
         return baseline(name, settings, seed), settings
     if name != "pretrained" and not Path(name).exists():
         known = ", ".join(["pretrained", *BASELINES])
@@ -155,9 +157,9 @@ def record(
 
     Raises `SpringfootError` for settings that draw what may differ between episodes.
     """
-    if any(getattr(settings, name) is not None for name in _RANGES):
+    if any(getattr(settings, name) is not None for name in DRAWN_SETTINGS):
         raise SpringfootError(
-            f"a recording is of one body at one speed in one world: {', '.join(_RANGES)} must be None"
+            f"a recording is of one body at one speed in one world: {', '.join(DRAWN_SETTINGS)} must be None"
         )
     ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, (model, legs), progress)
     return Recording(
@@ -196,7 +198,7 @@ def record_each(
     ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, (None, None), progress)
     recordings = []
     for index in range(episodes):
-        own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(_RANGES)
+        own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
         alone, row = replace(settings, **own), slice(index, index + 1)
         recordings.append(
             Recording(

@@ -7,7 +7,18 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, reference_gait, settings_from, settings_to_json
+from springfoot.envs.settings import (
+    CONDITION_SETTINGS,
+    CONDITION_THEMES,
+    DEFAULT_WEIGHTS,
+    DRAWN_SETTINGS,
+    THEME_OF,
+    THEMES,
+    BipedSettings,
+    reference_gait,
+    settings_from,
+    settings_to_json,
+)
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
 
@@ -60,6 +71,21 @@ def test_every_setting_is_documented():
     for setting in fields(BipedSettings):
         after = source.split(f"\n    {setting.name}: ")[1].split("\n", 1)[1]
         assert after.startswith('    """'), setting.name
+
+
+def test_every_setting_has_a_theme_and_every_theme_a_setting():
+    assert list(THEME_OF) == [setting.name for setting in fields(BipedSettings)]
+    assert set(THEME_OF.values()) == set(THEMES)
+    assert set(CONDITION_THEMES) < set(THEMES)
+
+
+def test_an_evaluation_sets_anew_who_walks_where_and_leaves_a_policy_its_springs_and_reward():
+    kept = {"speed_rate", "episode_seconds", "push_seconds", "push_interval"}
+    asked = {name for name, theme in THEME_OF.items() if theme in CONDITION_THEMES}
+    assert kept < asked and set(CONDITION_SETTINGS) == asked - kept
+    assert len(CONDITION_SETTINGS) == 21
+    assert all(getattr(BipedSettings(), name) is None for name in DRAWN_SETTINGS)
+    assert set(DRAWN_SETTINGS) < set(CONDITION_SETTINGS)
 
 
 BAD = [

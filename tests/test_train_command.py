@@ -9,13 +9,14 @@ import time
 from pathlib import Path
 
 import pytest
+import tyro
 
 import train
 from springfoot.agents import train_command
 from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.agents.policy import load_policy
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import THEME_OF, THEMES, BipedSettings
 
 SCRIPT, RUN = Path(train.__file__), "run.json"
 SHORT = [
@@ -34,16 +35,35 @@ def test_every_setting_is_a_flag_with_the_settings_own_help(monkeypatch, capsys)
     with pytest.raises(SystemExit) as stopped:
         main(monkeypatch, "--help")
     assert stopped.value.code == 0
-    text = " ".join(capsys.readouterr().out.split())
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())  # frames of the groups
     for name in (*BipedSettings.__dataclass_fields__, *TrainingConfig.__dataclass_fields__):
         assert name == "environment" or f"--{name.replace('_', '-')} " in text
     assert "Commanded walking speed [m/s]. (default: 1.2)" in text
     assert "None" not in text.replace("(default: None)", "")
 
 
+def flagged(*words: str) -> dict:
+    """The settings that these words on a command line give."""
+    return given(tyro.cli(SettingsFlags, args=words))
+
+
 def test_flags_that_were_not_given_are_not_given():
-    assert given(SettingsFlags()) == {}
-    assert given(SettingsFlags(height=1.8, start="random")) == {"height": 1.8, "start": "random"}
+    assert flagged() == {}
+    assert flagged("--height", "1.8", "--start", "random") == {"height": 1.8, "start": "random"}
+
+
+def test_help_groups_the_settings_by_theme_and_says_what_a_trained_policy_brings(capsys):
+    with pytest.raises(SystemExit):
+        flagged("--help")
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    groups = dict(part.split(" options ", 1) for part in text.split("╭─ ")[1:] if " options " in part)
+    for theme, says in THEMES.items():
+        assert says in groups[theme]
+        for name, its in THEME_OF.items():
+            assert (f"--{name.replace('_', '-')} " in groups[theme]) == (its == theme), name
+    assert "a trained policy brings nothing with it" in groups["body"]
+    assert "a trained policy brings --speed-rate with it" in groups["speed"]
+    assert "A trained policy brings its own." in groups["springs"]
 
 
 def test_flags_take_the_place_of_the_preset():
@@ -58,7 +78,7 @@ def test_flags_take_the_place_of_the_preset():
 def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     rows = [f"{percent},{10 + percent % 100},{name}" for name in ("slow", "fast") for percent in range(101)]
     (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
-    own = given(SettingsFlags(human=f"{tmp_path / 'mean.csv'}:fast"))["human"]
+    own = flagged("--human", f"{tmp_path / 'mean.csv'}:fast")["human"]
     assert own["name"] == "mean.csv:fast" and list(own["mean"]) == ["knee"]
     assert train_command.configured(PRESETS["walk"], {}, {"human": own}).environment.human == own
     time = [k / 100 for k in range(500)]
@@ -66,7 +86,7 @@ def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t + 0.3))}" for t in time]
     for name, curve in (("thigh", thigh), ("knee", knee)):
         (tmp_path / f"{name}.csv").write_text("\n".join([f"time_s,{name}_flexion_deg", *curve]))
-    own = given(SettingsFlags(human=f"{tmp_path / 'thigh.csv'},{tmp_path / 'knee.csv'}"))["human"]
+    own = flagged("--human", f"{tmp_path / 'thigh.csv'},{tmp_path / 'knee.csv'}")["human"]
     assert own["name"] == "thigh.csv,knee.csv" and own["stride_time"] == pytest.approx(1.0, abs=0.01)
 
 
