@@ -1,1 +1,46 @@
-"""Training, evaluation and reports: everything that needs a learner."""
+"""What needs a learner: training by PPO, policies as files, and the baselines they are held against.
+
+Training and the stable-baselines3 environment import torch; they are imported when first asked for, so that a policy
+can be loaded and run where torch is not installed.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .baselines import BASELINES, PolicyFunction, baseline
+from .config import PRESETS, TrainingConfig
+from .policy import Policy, load_policy, save_policy
+
+if TYPE_CHECKING:
+    from .multi_seed import train_seeds
+    from .sb3_vec_env import SegmentedFootBipedVecEnv
+    from .training import resume, train
+
+__all__ = [
+    "BASELINES",
+    "PRESETS",
+    "Policy",
+    "PolicyFunction",
+    "SegmentedFootBipedVecEnv",
+    "TrainingConfig",
+    "baseline",
+    "load_policy",
+    "resume",
+    "save_policy",
+    "train",
+    "train_seeds",
+]
+
+_NEEDS_TORCH = {
+    "SegmentedFootBipedVecEnv": "sb3_vec_env",
+    "resume": "training",
+    "train": "training",
+    "train_seeds": "multi_seed",
+}
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+
+    def __getattr__(name: str) -> Any:
+        if name not in _NEEDS_TORCH:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_NEEDS_TORCH[name]}"), name)

@@ -4,7 +4,7 @@ import gymnasium as gym
 
 from .biped_batch import Biped
 from .env import SegmentedFootBiped
-from .settings import BipedSettings, settings_from, settings_to_json
+from .settings import BipedSettings, body_of, reference_gait, settings_from, settings_to_json
 from .vector_env import SegmentedFootBipedVector
 
 __all__ = [
@@ -12,6 +12,8 @@ __all__ = [
     "BipedSettings",
     "SegmentedFootBiped",
     "SegmentedFootBipedVector",
+    "body_of",
+    "reference_gait",
     "settings_from",
     "settings_to_json",
 ]

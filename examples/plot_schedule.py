@@ -9,9 +9,8 @@ import argparse
 
 from matplotlib.figure import Figure
 
-from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
-from springfoot.gait.cycle import PERCENT
+from springfoot.evaluation import measure, prepare, record
+from springfoot.gait import PERCENT
 
 ROWS = {
     "stiffness\nN·m/rad": ("ankle_stiffness_Nm_per_rad", "toe_stiffness_Nm_per_rad"),

@@ -10,7 +10,7 @@ import numpy as np
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.agents import SegmentedFootBipedVecEnv
 
 
 def main() -> None:

@@ -1,7 +1,8 @@
-"""springfoot.gait: the science of walking. NumPy and SciPy only: no simulator, no learning."""
+"""The science of walking. NumPy and SciPy only: no simulator, no learner."""
 
 from .body import GRAVITY, Body
 from .bout import Bout, plan_bout
+from .cycle import PERCENT
 from .errors import SpringfootError
 from .human import HumanGait, human_gait
 from .identification import PhaseSpring, identify
@@ -14,6 +15,7 @@ from .stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
 
 __all__ = [
     "GRAVITY",
+    "PERCENT",
     "Body",
     "Bout",
     "FootLoad",

@@ -1,1 +1,41 @@
 """Many walks held against each other; each runs as `springfoot study NAME`."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .body_sweep import draw_pairs, walk_pairs
+    from .comparison import best_constant, compare
+    from .identifiability import any_stiffness, mean_springs, rebuilt, spring_work
+    from .seed_agreement import agreements
+
+__all__ = [
+    "agreements",
+    "any_stiffness",
+    "best_constant",
+    "compare",
+    "draw_pairs",
+    "mean_springs",
+    "rebuilt",
+    "spring_work",
+    "walk_pairs",
+]
+
+_MODULE = {
+    "agreements": "seed_agreement",
+    "any_stiffness": "identifiability",
+    "best_constant": "comparison",
+    "compare": "comparison",
+    "draw_pairs": "body_sweep",
+    "mean_springs": "identifiability",
+    "rebuilt": "identifiability",
+    "spring_work": "identifiability",
+    "walk_pairs": "body_sweep",
+}
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULE:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
