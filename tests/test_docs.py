@@ -44,12 +44,7 @@ def test_links_lead_somewhere(page):
 
 
 def test_readme_examples_run_in_their_order(folder):
-    code = (
-        "\n".join(BLOCKS)
-        .replace("1_000_000", "64")
-        .replace("SegmentedFootBipedVecEnv(64", "SegmentedFootBipedVecEnv(2")
-    )
-    code = code.replace("n_steps=128, batch_size=1024", "n_steps=8, batch_size=16").replace("range(500)", "range(50)")
+    code = "\n".join(BLOCKS).replace("range(500)", "range(50)").replace("episodes=4", "episodes=1")
     assert len(BLOCKS) == 5
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -61,6 +56,6 @@ def test_readme_commands_are_understood(folder):
         "evaluate.py": EvaluateFlags,
         "-m springfoot.studies.comparison": studies.BestConstant | studies.Compare | studies.Seeds | studies.Bodies,
     }
-    assert {program for program, _ in COMMANDS} == set(programs)
+    assert {program for program, _ in COMMANDS} <= set(programs)
     for program, words in COMMANDS:
         tyro.cli(programs[program], args=shlex.split(words.replace("TBD", "1")))  # exits where it does not understand
