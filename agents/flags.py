@@ -135,7 +135,7 @@ def given(flags: Any) -> dict[str, Any]:
 
 def _evaluated(theme: str) -> str:
     """The help of a theme in an evaluation: which of its settings a trained policy brings with it."""
-    names = [name for name, its in THEME_OF.items() if its == theme]
+    names = [name for name, its in THEME_OF.items() if its == theme and name != "episode_seconds"]  # given as --seconds
     own = [f"--{name.replace('_', '-')}" for name in names if name not in CONDITION_SETTINGS]
     if len(own) == len(names):
         return f"{THEMES[theme]} A trained policy brings its own."

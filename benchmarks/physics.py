@@ -1,16 +1,19 @@
-"""Which physics settings leave the walk unchanged, and what each costs: the table of docs/physics.md.
+"""Which physics settings and joint constants leave the walk unchanged: the tables of docs/physics.md.
 
     python -m benchmarks.physics
     python -m benchmarks.physics --policies schedule --episodes 4
+    python -m benchmarks.physics --vary joints
 
-Every row walks the same policies from the same seeds under settings that differ in what the row says. The walk is
-held against that of the finest timestep; cost is `mj_step` alone over a control window, on recorded walking states.
+Every row walks the same policies from the same seeds, and differs from the default in what the row says. The walk is
+held against that of the first row: with `--vary settings` the finest timestep, with `--vary joints` the default. What
+a physics setting costs is `mj_step` alone over a control window, on recorded walking states.
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
@@ -20,7 +23,8 @@ from tqdm import tqdm
 
 from springfoot.agents.baselines import PolicyFunction
 from springfoot.agents.command_line import exit_code
-from springfoot.envs.physics.model import build_model
+from springfoot.envs.physics import model as physics_model
+from springfoot.envs.physics.model import JOINTS, build_model
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.timing import CONTROL_WINDOW, PHYSICS_STEP, WINDOWS_PER_STEP
 from springfoot.evaluation.metrics import Gait, measure
@@ -89,6 +93,37 @@ ROWS: dict[str, Edit] = {
 """What a row changes of the default model; the first one is the reference. 4 ms does not divide a control window."""
 
 
+LEGS, FEET = ("hip", "knee"), ("ankle", "toe")
+JOINT_ROWS: dict[str, tuple[str, tuple[str, ...], float]] = {
+    "the default": ("DAMPING_TIME", JOINTS, 1.0),
+    **{
+        f"{title} x {factor:g}": (constant, joints, factor)
+        for title, constant, joints, factors in (
+            ("beta of hip and knee", "DAMPING_TIME", LEGS, (0.5, 1.5)),
+            ("beta of ankle and toe", "DAMPING_TIME", FEET, (0.5, 1.5)),
+            ("torque limits", "TORQUE_LIMIT", JOINTS, (0.5, 0.75, 1.5)),
+            ("armature", "ARMATURE", JOINTS, (0.0, 0.5, 1.5)),
+            ("joint damping", "PASSIVE_DAMPING", JOINTS, (0.0, 0.5, 1.5)),
+        )
+        for factor in factors
+    },
+}
+"""What a row changes: which constant of `envs.physics.model`, at which joints, by which factor. The leg constants stay
+those that were tuned with the default; the first row is the reference."""
+
+
+@contextmanager
+def joint_constant(name: str, joints: tuple[str, ...], factor: float) -> Iterator[None]:
+    """Within the context a constant of `envs.physics.model` is `factor` times itself at `joints`."""
+    default = getattr(physics_model, name)
+    changed = tuple(value * (factor if joint in joints else 1.0) for joint, value in zip(JOINTS, default, strict=True))
+    setattr(physics_model, name, changed)
+    try:
+        yield
+    finally:
+        setattr(physics_model, name, default)
+
+
 def edited(edit: Edit, body: Body | None = None) -> mujoco.MjModel:
     """The default model with one change."""
     model = build_model(body or Body())
@@ -108,8 +143,10 @@ def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:
     return 1e6 * spent[:, 1:].reshape(len(models), -1) / (WINDOWS_PER_STEP * walk.actions.shape[1])
 
 
-def walked(policy: PolicyFunction, settings: BipedSettings, model: mujoco.MjModel, episodes: int, threads: int) -> Gait:
-    """The gait of a policy on a model."""
+def walked(
+    policy: PolicyFunction, settings: BipedSettings, model: mujoco.MjModel | None, episodes: int, threads: int
+) -> Gait:
+    """The gait of a policy on a model, the default one if None."""
     return measure(record(policy, settings, name="physics", episodes=episodes, threads=threads, model=model))
 
 
@@ -130,10 +167,8 @@ def row(gait: Gait, reference: Gait) -> list[str]:
     ]
 
 
+COST_HEAD = ("cost µs", "of the default")
 HEAD = (
-    "settings",
-    "cost µs",
-    "of the default",
     "falls",
     "speed m/s",
     "RMSE to people thigh / knee / ankle °",
@@ -155,7 +190,10 @@ def _text(values: list[float | None], pattern: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Flags:
-    """Walk the same policies under other physics settings; prints markdown tables."""
+    """Walk the same policies with other physics settings or joint constants; prints markdown tables."""
+
+    vary: Literal["settings", "joints"] = "settings"
+    """Settings of MuJoCo, or constants of the joints: damping time beta, torque limit, armature, joint damping."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY ...")] = ("schedule", "pretrained")
     """Any policies of evaluate.py."""
@@ -170,26 +208,46 @@ class Flags:
 
 
 def run(flags: Flags) -> None:
-    """Measure the costs, walk every row, print."""
+    """Walk every row, and of physics settings measure the costs; print."""
     for name in ("episodes", "rounds", "threads"):
         require_count(name, getattr(flags, name))
     prepared = {name: prepare(name, {"episode_seconds": flags.seconds}) for name in flags.policies}
-    models = [edited(edit) for edit in ROWS.values()]
     about = machine()
     print(f"{about['processor']}, load {load():.2f}, MuJoCo {about['versions']['mujoco']}")
+    vary = _vary_settings if flags.vary == "settings" else _vary_joints
+    vary(flags, prepared)
+
+
+def _vary_settings(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSettings]]) -> None:
+    models = [edited(edit) for edit in ROWS.values()]
     spent = costs(models, record_walk(BODIES, 50), flags.rounds)
     default = spent[list(ROWS).index(DEFAULT)]
     for policy_name, (policy, settings) in prepared.items():
-        lines = [list(HEAD), ["---"] * len(HEAD)]
-        body, reference = body_of(settings), None
+        lines, reference = [["settings", *COST_HEAD, *HEAD]], None
         rows = tqdm(ROWS.items(), desc=policy_name, leave=False, disable=None)
         for (name, edit), cost in zip(rows, spent, strict=True):
-            gait = walked(policy, settings, edited(edit, body), flags.episodes, flags.threads)
+            gait = walked(policy, settings, edited(edit, body_of(settings)), flags.episodes, flags.threads)
             reference = reference or gait
             price = [f"{np.median(cost):.1f}", f"{np.median(cost / default):.2f}"]
             lines.append([name, *price, *row(gait, reference)])
-        print(f"\n`{policy_name}`, {flags.episodes} episodes x {flags.seconds:g} s\n")
-        print("\n".join("| " + " | ".join(cells) + " |" for cells in lines))
+        _print_table(flags, policy_name, lines)
+
+
+def _vary_joints(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSettings]]) -> None:
+    for policy_name, (policy, settings) in prepared.items():
+        lines, reference = [["constant", *HEAD]], None
+        for name, change in tqdm(JOINT_ROWS.items(), desc=policy_name, leave=False, disable=None):
+            with joint_constant(*change):
+                gait = walked(policy, settings, None, flags.episodes, flags.threads)
+            reference = reference or gait
+            lines.append([name, *row(gait, reference)])
+        _print_table(flags, policy_name, lines)
+
+
+def _print_table(flags: Flags, policy: str, lines: list[list[str]]) -> None:
+    print(f"\n`{policy}`, {flags.episodes} episodes x {flags.seconds:g} s\n")
+    lines.insert(1, ["---"] * len(lines[0]))
+    print("\n".join("| " + " | ".join(cells) + " |" for cells in lines))
 
 
 def main() -> int:

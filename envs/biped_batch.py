@@ -20,7 +20,7 @@ from .control.foot_springs import FootSprings, draw_delay
 from .control.leg_constants import LegConstants, SlopeConstants, slope_constants
 from .control.leg_controller import LegController, slope_table
 from .control.reference_walk import reference_walks, rows
-from .control.standing import Standing, off_phase
+from .control.standing import WALKING, Standing, off_phase
 from .control.subjects import Subjects
 from .physics.energy import WindowWork
 from .physics.foot_contact import CONTACTS
@@ -122,6 +122,16 @@ class Biped:
     def measurement(self) -> Measurement:
         """The measurement at the end of the last control window, or right after a reset."""
         return self._now
+
+    @property
+    def leg_phase(self) -> NDArray:
+        """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike; a copy."""
+        return self._legs.phase.copy()
+
+    @property
+    def standing_mode(self) -> NDArray:
+        """(N,) as `envs.control.standing.Standing.mode`: walking, standing, starting, stopping or stopped; a copy."""
+        return np.full(self.num_envs, WALKING) if self._standing is None else self._standing.mode.copy()
 
     def data(self, index: int) -> mujoco.MjData:
         """A copy of environment `index`'s state, to render or to inspect."""

@@ -31,7 +31,7 @@ from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings import BipedSettings, body_of
-from springfoot.envs.task.reward import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
+from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import TICK, Recording, prepare, record
 from springfoot.evaluation.stride_tally import WARM_UP

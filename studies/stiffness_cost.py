@@ -26,7 +26,7 @@ from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.markdown import MISSING, table, text_of, write_section
 from springfoot.agents.multi_seed import is_finished, train_missing
 from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
-from springfoot.envs.task.reward import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
+from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
 from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.recording import TICK, Recording, prepare, record

@@ -7,6 +7,7 @@ from springfoot.agents.baselines import BASELINES, baseline, leg_phase, own_sett
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.envs.task.observation import OBSERVATION
 from springfoot.gait import Body, SpringfootError
 
 
@@ -42,7 +43,7 @@ def test_phase_is_read_from_the_observation():
 def test_constant_is_300_and_40_newton_metres_a_radian_scaled_with_the_body():
     for values, scale in (({}, 1.0), ({"height": 1.87, "mass": 90.0}, 1.1 * 90 / 63)):
         settings = settings_of("constant", **values)
-        result = started(settings, [0.2]).step(baseline("constant", settings)(np.zeros((1, 60))))
+        result = started(settings, [0.2]).step(baseline("constant", settings)(np.zeros((1, len(OBSERVATION)))))
         for joint, value in (("ankle", 300.0), ("toe", 40.0)):
             for side in ("left", "right"):
                 assert result.info[f"stiffness/{joint}_{side}"][0] == pytest.approx(value * scale, rel=1e-6)
@@ -50,7 +51,7 @@ def test_constant_is_300_and_40_newton_metres_a_radian_scaled_with_the_body():
 
 def test_constant_of_other_stiffness():
     settings = BipedSettings()
-    action = baseline("constant:450,30", settings)(np.zeros((1, 60)))
+    action = baseline("constant:450,30", settings)(np.zeros((1, len(OBSERVATION))))
     assert stiffness_of(action.reshape(2, 2), settings, Body()) == pytest.approx(
         np.array([[450.0, 30.0]] * 2), rel=1e-5
     )
@@ -99,7 +100,7 @@ def test_schedule_follows_one_that_is_given():
 
 
 def test_untrained_is_mid_range_and_random_is_seeded():
-    observation = np.zeros((5, 60))
+    observation = np.zeros((5, len(OBSERVATION)))
     assert not baseline("untrained", BipedSettings())(observation).any()
     first, again, other = (baseline("random", BipedSettings(), seed)(observation) for seed in (1, 1, 2))
     assert np.array_equal(first, again) and not np.array_equal(first, other)

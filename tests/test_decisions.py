@@ -24,10 +24,6 @@ def settings(**values: Any) -> BipedSettings:
     return settings_from(**values)
 
 
-def phases(biped: Biped) -> np.ndarray:
-    return biped._legs.phase.copy()
-
-
 def begun(num: int = 3, **values: Any) -> Biped:
     biped = Biped(settings(**values), num)
     biped.reset(np.arange(num), range(num))
@@ -88,7 +84,7 @@ def test_per_event_each_leg_takes_a_new_action_at_its_events_alone():
     before: Any = None
     changes, running = np.zeros((2, 4), int), np.ones(4, bool)
     for _ in range(100):
-        phase = phases(biped)
+        phase = biped.leg_phase
         action = random.uniform(0.2, 0.6, (4, 4))
         result = biped.step(action, running)
         k = np.stack([[result.info[f"stiffness/{joint}_{side}"] for joint in ("ankle", "toe")] for side in names])
@@ -141,7 +137,7 @@ def test_a_schedules_rest_angle_changes_with_its_stiffness(rate):
     held: list[tuple[np.ndarray, np.ndarray]] = []
     biped.on_tick = lambda tick: held.append((tick.stiffness[0, 0, 2:].copy(), tick.equilibrium[0, 0, 2:].copy()))
     for _ in range(RATES[rate] // 2):
-        spot = int(phases(biped)[0, 0] * len(GRID))
+        spot = int(biped.leg_phase[0, 0] * len(GRID))
         held.clear()
         biped.step(np.zeros((3, 4)))
         if inside[spot]:

@@ -37,11 +37,6 @@ def standing(num: int = 2, **settings: Any) -> Biped:
     return biped
 
 
-def modes(biped: Biped) -> np.ndarray:
-    assert biped._standing is not None
-    return biped._standing.mode
-
-
 def waiting(biped: Biped, until: float = STAND_SECONDS[0]) -> int:
     """Steps before anyone sets off."""
     return round(until / biped.dt) - 1
@@ -78,7 +73,7 @@ def test_a_standing_body_bears_its_weight_under_its_com_and_moves_little():
     assert (cop > m.contact[:, :, 0, 0].max(axis=1)).all() and (cop < m.contact[:, :, 2, 0].min(axis=1)).all()
     assert np.abs(m.com_velocity).max() < 0.03
     np.testing.assert_allclose(result.info["phase/left"] % 0.5, OFF_PHASE)
-    assert (modes(biped) == STANDING).all()
+    assert (biped.standing_mode == STANDING).all()
 
 
 def test_stiffness_while_standing_is_the_springs_own_and_info_tells_it():
@@ -120,7 +115,9 @@ def test_a_policy_acts_in_the_steady_walk_only():
     for _ in range(375):
         result = biped.step(np.tile([0.5, 0.2], (2, 2)))
         k = np.sqrt(low * high) * np.sqrt(high / low) ** 0.5
-        for mode, own in zip(modes(biped).tolist(), np.isclose(result.info["stiffness/ankle_left"], k), strict=True):
+        for mode, own in zip(
+            biped.standing_mode.tolist(), np.isclose(result.info["stiffness/ankle_left"], k), strict=True
+        ):
             seen.setdefault(mode, set()).add(bool(own))
         if result.terminated.any():
             break
@@ -140,7 +137,7 @@ def test_who_stands_walks_and_stops_has_the_same_bits_alone_and_together():
     for _ in range(260):
         result = together.step(actions)
         each = [biped.step(actions[i : i + 1]) for i, biped in enumerate(alone)]
-        seen.update(modes(together).tolist())
+        seen.update(together.standing_mode.tolist())
         for name in ("observation", "reward", "values"):
             np.testing.assert_array_equal(getattr(result, name), np.concatenate([getattr(one, name) for one in each]))
     assert {STANDING, STARTING, STOPPED} <= seen

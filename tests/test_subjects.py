@@ -8,13 +8,18 @@ import pytest
 
 from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.biped_batch import Biped
-from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.equilibrium import foot_curves
+from springfoot.envs.control.foot_springs import FootSprings, action_of
+from springfoot.envs.control.leg_constants import slope_constants
+from springfoot.envs.control.leg_controller import LegController, slope_table
+from springfoot.envs.control.reference_walk import rows as rows_of
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.step_result import Tick
 from springfoot.envs.task.observation import OBSERVATION
+from springfoot.envs.task.reward import Task
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
@@ -255,18 +260,24 @@ def test_the_commanded_speed_goes_to_a_new_one_at_its_rate():
 
 def test_nothing_jumps_as_the_speed_changes():
     """Springs, legs and plan follow the speed without a jump where one tabulated speed takes over from another."""
-    biped = Biped(BipedSettings(**ANYBODY), 1)
+    settings = BipedSettings(**ANYBODY)
+    biped = Biped(settings, 1)
     biped.reset(np.arange(1), [0], start=0.3)
-    m, subjects = biped.measurement, biped.subjects
-    control = np.zeros((1, 2, 4, 2))
+    m, phase, control = biped.measurement, biped.leg_phase, np.zeros((1, 2, 4, 2))
+    table, incline = list(rows_of(biped.walks)), slope_table(slope_constants())
+    subjects = Subjects(settings, tabulated_speeds(settings), 1)
+    legs, task = LegController(table, subjects, incline), Task(settings, table, subjects)
+    legs.reset(np.arange(1), phase[:, 0])
+    curves = [np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True)]
+    springs = FootSprings(settings, biped.body, *curves, subjects, incline)
     rows = []
     for speed in np.linspace(0.8, 1.6, 401):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
-        biped._legs.follow()
-        biped._springs.move_equilibrium(biped._legs.phase, m.angle, control)
-        biped._legs.command(m, control)
-        equilibrium = 100 * biped._springs.equilibrium
-        plan = 100 * biped._task.tracking(m, biped._legs.phase)
+        legs.follow()
+        springs.move_equilibrium(phase, m.angle, control)
+        legs.command(m, control)
+        equilibrium = 100 * springs.equilibrium
+        plan = 100 * task.tracking(m, phase)
         rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
     change = np.abs(np.diff(rows, axis=0))
     assert change.max() < 1.0  # [N m, N m/rad, 0.01 rad, cm, cm/s] for 2 mm/s

@@ -1,0 +1,79 @@
+"""What the reward holds a step against: people and plan at each phase of the stride, and tolerances of one body."""
+
+from functools import lru_cache
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.human import ANGLES, HumanGait
+from springfoot.gait.plan import WalkPlan
+
+from ..control.phase_table import GRID
+from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
+
+MIN_HIP_HEIGHT = 0.65
+"""A hip lower than this [m at 1.70 m, scaled with height] is a fall (design study)."""
+COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.1, 0.03
+"""Error of the CoM at which its reward is 1/e [m at 1.70 m, scaled with height] (design study)."""
+SPEED_TOLERANCE = 0.10
+"""Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]."""
+POSE_WEIGHTS = {HIP: 3.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
+"""Share of each joint in the pose error E; the toe counts little, its curve is of other people."""
+ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
+"""Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height] (design study)."""
+TOE_SHARE = 0.25
+"""Weight of the toe against the ankle in the cost of stiffness (design study)."""
+
+REFERENCE = np.dtype(
+    [
+        ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
+        ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
+        ("force_sd", float, 2),  # its standard deviation
+        ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
+        ("speed", float),  # the plan's forward speed of the CoM [m/s]
+        ("stride_length", float),  # of the plan [m], the same at every phase
+    ]
+)
+"""What people and the plan do at a phase of one leg's stride; `com` and `speed` where its stance began last."""
+SCALES = np.dtype(
+    [
+        ("min_hip_height", float),  # [m]
+        ("tolerance", float, 3),  # of the CoM's x, z [m] and forward speed [m/s]
+        ("pose_share", float, len(JOINTS)),
+        ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
+        ("stiffness_share", float, 2),
+        ("weight", float),  # of body and load [N]
+    ]
+)
+"""What one body is measured by."""
+
+
+@lru_cache(maxsize=256)
+def body_scales(body: Body) -> NDArray:
+    """(1,) of `SCALES`."""
+    length = body.length_scale
+    scales = np.zeros(1, SCALES)
+    scales["min_hip_height"] = MIN_HIP_HEIGHT * length
+    scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
+    scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
+    scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
+    scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
+    scales["weight"] = body.total_mass * GRAVITY
+    return scales
+
+
+def reference_curves(plan: WalkPlan, human: HumanGait, step_seconds: float) -> NDArray:
+    """(SAMPLES,) of `REFERENCE`, for steps of `step_seconds`."""
+    curves = np.zeros(len(GRID), REFERENCE)
+    curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
+    middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
+    for axis, name in enumerate(("grf_forward", "grf_vertical")):
+        curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
+    step = (2 * GRID) % 1.0
+    x, z = plan.com(step)
+    curves["com"] = np.stack((x - plan.step_length * step, z), -1)
+    curves["speed"], _ = plan.com_velocity(step)
+    curves["stride_length"] = 2 * plan.step_length
+    return curves
