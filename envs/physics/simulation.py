@@ -135,7 +135,8 @@ class Simulation:
         timestep = self.model.opt.timestep
         held = self._held.copy()
         if ids is not None:
-            held[np.setdiff1d(np.arange(self.num), ids)] = np.nan
+            still = np.setdiff1d(np.arange(self.num), ids)
+            held[still], steps.before[still], push[still] = np.nan, 0.0, 0.0
         work = window_work(self._parts, steps, self.control, held, angle, push, state, timestep)
         self._held[:] = self.control
         return self._measure(self.control), work
