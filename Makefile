@@ -7,11 +7,12 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help install walk test check format bench clean
+.PHONY: help install walk test test-wheel check format bench clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
 	@echo "make test     run the tests"
+	@echo "make test-wheel  build the wheel and evaluate with it alone, in a clean environment and an empty folder"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
@@ -35,6 +36,19 @@ walk: install
 
 test: install
 	$(BIN)/python -m pytest
+
+# As users get it: built from what git knows, without torch, away from this folder.
+test-wheel: install
+	@set -e; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	git archive HEAD | tar -x -C "$$folder"; \
+	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$$folder/dist" "$$folder"; \
+	$(PYTHON) -m venv "$$folder/venv"; \
+	"$$folder/venv/bin/pip" install --quiet --disable-pip-version-check --constraint constraints.txt \
+	  "springfoot[evaluate] @ file://$$(ls "$$folder"/dist/*.whl)"; \
+	mkdir "$$folder/empty"; cd "$$folder/empty"; PATH="$$folder/venv/bin:$$PATH"; set -x; \
+	springfoot --help; springfoot study --help; springfoot study criteria --quick; \
+	springfoot evaluate pretrained --episodes 1; ls runs/*; \
+	! python -c "import torch" 2> /dev/null
 
 check: install build/typing/made
 	$(BIN)/ruff format --check .

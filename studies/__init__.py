@@ -5,11 +5,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .body_sweep import draw_pairs, walk_pairs
-    from .comparison import best_constant, compare
+    from .comparison import compare
+    from .constant_search import best_constant
     from .identifiability import any_stiffness, mean_springs, rebuilt, spring_work
     from .seed_agreement import agreements
+    from .study import Answer, Study, WalkingStudy
 
 __all__ = [
+    "Answer",
+    "Study",
+    "WalkingStudy",
     "agreements",
     "any_stiffness",
     "best_constant",
@@ -22,9 +27,12 @@ __all__ = [
 ]
 
 _MODULE = {
+    "Answer": "study",
+    "Study": "study",
+    "WalkingStudy": "study",
     "agreements": "seed_agreement",
     "any_stiffness": "identifiability",
-    "best_constant": "comparison",
+    "best_constant": "constant_search",
     "compare": "comparison",
     "draw_pairs": "body_sweep",
     "mean_springs": "identifiability",

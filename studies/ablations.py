@@ -1,42 +1,41 @@
 """Ablations: what each part of preset `walk` contributes, trained without it, and each input of the fixed walk.
 
-    python -m springfoot.studies.ablations --out runs/ablations --seeds 3 --constant 298 112 --page docs/results.md
+    springfoot study ablations --seeds 3 --constant 298 112 --page docs/results.md
 
 Every row differs from the preset in its flags and in nothing else. A seed that is finished is not trained again, nor
 measured again, so the command may be stopped, begun anew with more rows or seeds, and run with `--no-train` to write
 the page from what there is. All rows earn the default reward when measured, so their returns compare.
 """
 
-import json
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import partial
 from itertools import product
-from operator import getitem
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import tyro
 
-from springfoot.agents.command_line import exit_code
 from springfoot.agents.config import PRESETS, TrainingConfig
-from springfoot.agents.files import write_atomically
-from springfoot.agents.markdown import MISSING, table, text_of, write_section
-from springfoot.agents.multi_seed import is_finished, train_missing
+from springfoot.agents.files import csv_text
+from springfoot.agents.markdown import MISSING, plus_minus, table, text_of
+from springfoot.agents.multi_seed import is_finished
 from springfoot.envs.control.equilibrium import PLATEAUS, foot_curves
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings, reference_gait, settings_from, settings_to_json
 from springfoot.envs.timing import ACTION_STEP
-from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
 from springfoot.evaluation.report import people_metrics
-from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 from springfoot.gait.stiffness import SPRINGS, Segment, StiffnessSchedule
+
+from .protocol import Protocol, measured
+from .quantities import JOINTS, Quantity
+from .study import Answer, Progress
+from .trainings import TrainingStudy
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
@@ -80,20 +79,19 @@ INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
     "no foot placement by speed": lambda c: replace(c, swing_speed_gain=0.0),
 }
 """Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
-_JOINTS = ("thigh", "knee", "ankle")
-QUANTITIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("falls", ".1f", ("undisturbed", "falls")),
-    ("pushed", ".1f", ("pushed", "falls")),
-    ("return", ".0f", ("undisturbed", "return", "mean")),
-    ("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
-    *((f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in _JOINTS),
-    *((f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
-    ("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
-    ("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
-    ("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
-    ("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
+QUANTITIES = (
+    Quantity("falls", ".1f", ("undisturbed", "falls")),
+    Quantity("pushed", ".1f", ("pushed", "falls")),
+    Quantity("return", ".0f", ("undisturbed", "return", "mean")),
+    Quantity("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
+    *(Quantity(f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in JOINTS),
+    *(Quantity(f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
+    Quantity("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
+    Quantity("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
+    Quantity("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
+    Quantity("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
 )
-"""Columns of every table: format of each number, and its place in the metrics of a row."""
+"""Columns of every table."""
 
 RESULT = "ablation.json"
 """In a trained row's folder, what was measured of it."""
@@ -143,53 +141,6 @@ def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> 
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Protocol:
-    """How every row is measured."""
-
-    episodes: int = 20
-    """Episodes of each row, and of each seed, undisturbed, and as many pushed."""
-    seconds: float = 20.0
-    """Length of each."""
-    push_newton: float = 150.0
-    """Size of the pushes [N]."""
-    threads: int = 2
-    """Threads of the physics; the results are the same with any number."""
-
-    def of(self, policy: str, given: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
-        """The policy's metrics `undisturbed` and `pushed`, with the default reward."""
-        metrics = {}
-        for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
-            wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})
-            walker, settings = prepare(policy, wanted)
-            how: dict[str, Any] = {"episodes": self.episodes, "threads": self.threads, "legs": legs}
-            metrics[condition] = measure(record(walker, settings, name=policy, **how)).metrics
-        return metrics
-
-    @property
-    def sentence(self) -> str:
-        """What the columns are of."""
-        return (
-            f"Falls of {self.episodes} episodes × {self.seconds:g} s, undisturbed and pushed by "
-            f"±{self.push_newton:g} N, the same seeds in every row; all else undisturbed: return of the default "
-            "reward, speed, RMSE of thigh, knee and ankle to people's mean, vertical force peaks, r of both forces "
-            "with people's, largest ankle moment and where in the stride. What falls is measured before its falls."
-        )
-
-
-def measured(path: Path, how: Protocol, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """What `make` found, kept in the file `path` as long as neither `how` nor `key` changes."""
-    asked = json.loads(json.dumps({"how": {**vars(how), "threads": None}, "of": key}))
-    if path.is_file():
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["asked"] == asked:
-            return kept["metrics"]
-    metrics = make()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, (json.dumps({"asked": asked, "metrics": metrics}, indent=1) + "\n").encode())
-    return metrics
-
-
 def trained(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
     """Row -> the metrics of each of its finished seeds, in order; rows without any are left out."""
     rows = {}
@@ -224,98 +175,89 @@ def fixed(out: Path, how: Protocol, constant: tuple[float, float] | None) -> dic
     }
 
 
-def rows_table(rows: dict[str, list[dict[str, Any]]], head: str, people: bool = False) -> str:
+Rows = dict[str, list[dict[str, Any]]]
+"""Name -> metrics of each seed."""
+
+
+def rows_table(rows: Rows, head: str, people: bool = False) -> str:
     """Markdown: rows down, `QUANTITIES` across, mean ± SD (n - 1) over the seeds of a row that has several."""
     lines = []
     for name, seeds in rows.items():
         cells = [name, str(len(seeds))]
-        for _, pattern, keys in QUANTITIES:
-            found: list[Any] = [reduce(getitem, keys, each) for each in seeds]
-            values = [value for value in found if value is not None]
-            spread = mean_sd(values)
-            whole = pattern == ".1f" and keys[-1] == "falls" and len(values) == 1
-            mean = text_of(spread["mean"], ".0f" if whole else pattern)
-            cells.append(mean if spread["sd"] is None else f"{mean} ± {text_of(spread['sd'], pattern)}")
+        for each in QUANTITIES:
+            values = [value for value in map(each.of, seeds) if value is not None]
+            whole = each.path[-1] == "falls" and len(values) == 1
+            cells.append(plus_minus(mean_sd(values), ".0f" if whole else each.pattern))
         lines.append(cells)
     if people:
         theirs = people_metrics(reference_gait(BipedSettings()))
         known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
         known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
-        lines.append(["people", MISSING, *(_known(known, pattern, keys) for _, pattern, keys in QUANTITIES)])
-    return table([head, "seeds", *(label for label, _, _ in QUANTITIES)], lines)
+        lines.append(["people", MISSING, *(_known(known, each) for each in QUANTITIES)])
+    return table([head, "seeds", *(each.label for each in QUANTITIES)], lines)
 
 
-def _known(metrics: dict[str, Any], pattern: str, keys: tuple[str, ...]) -> str:
+def _known(metrics: dict[str, Any], quantity: Quantity) -> str:
     """A number of people's, where there is one."""
     value: Any = metrics
-    for key in keys[1:]:
+    for key in quantity.path[1:]:
         value = value.get(key) if isinstance(value, dict) else None
-    return text_of(value, pattern)
+    return text_of(value, quantity.pattern)
+
+
+def _numbers(tables: dict[str, Rows]) -> str:
+    """CSV: a line for each seed of each row."""
+    lines = [
+        [section, row, index, *(each.of(metrics) for each in QUANTITIES)]
+        for section, rows in tables.items()
+        for row, seeds in rows.items()
+        for index, metrics in enumerate(seeds)
+    ]
+    return csv_text(["table", "row", "seed", *(each.column for each in QUANTITIES)], lines)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flags:
-    """Train preset `walk` without each of its parts, measure, and write the tables."""
+class Ablations(TrainingStudy):
+    """Train preset `walk` without each of its parts, measure, and tell what each contributes.
 
-    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/ablations")
-    """Folder of all trainings and results; what is finished in it is kept."""
-    seeds: int = 3
-    """Seeds of each training, 0 and the next ones."""
+    A seed that is finished is neither trained nor measured again: the command may be stopped and begun anew.
+    """
+
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/ablations")
+    """Folder of all trainings and what was measured of them; what is finished in it is kept."""
     only: tuple[str, ...] = ()
     """Rows to train, all of them unless given."""
-    timesteps: int | None = None
-    """Steps of 20 ms of each training, the preset's unless given."""
-    train: bool = True
-    """Train what is missing; without, use what there is."""
     constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
-    """Best fixed spring [N m/rad], as `springfoot.studies.comparison best-constant` finds it."""
-    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Also write the ablations into this page, between the markers of ABLATIONS and INPUTS."""
-    readme: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Also write the table of springs into this page, between the markers of SPRINGS."""
-    how: tyro.conf.OmitArgPrefixes[Protocol] = Protocol()
-    """How to measure."""
+    """Best fixed spring [N m/rad], as `springfoot study best-constant` finds it."""
+    push_newton: float = 150.0
+    """Size of the pushes [N]."""
 
-
-def run(flags: Flags) -> int:
-    """Train, measure, print and write."""
-    how = flags.how
-    for name, count in (("seeds", flags.seeds), ("episodes", how.episodes), ("threads", how.threads)):
-        require_count(name, count)
-    if flags.timesteps is not None:
-        require_count("timesteps", flags.timesteps)
-    require_number("seconds", how.seconds, ACTION_STEP, unit="s")
-    for name in flags.only:
-        if name not in ABLATIONS:
-            raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
-    status = "finished"
-    if flags.train:
-        status = train_missing(jobs(flags.out, flags.only or tuple(ABLATIONS), flags.seeds, flags.timesteps))
-        if status == "interrupted":
-            return 130
-    rows = trained(flags.out, how)
-    springs = fixed(flags.out, how, flags.constant)
-    learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
-    springs |= {f"{label} (`{name}`)": rows[name] for name, label in learned.items() if name in rows}
-    sections = {
-        "SPRINGS": rows_table(springs, "spring", people=True),
-        "ABLATIONS": rows_table({f"`{name}`: {MEANING[name]}": each for name, each in rows.items()}, "training"),
-        "INPUTS": rows_table(inputs(flags.out, how), "fixed schedule"),
+    QUICK: ClassVar[dict[str, Any]] = {
+        **TrainingStudy.QUICK,
+        **{"runs": Path("runs/ablations-quick"), "only": ("walk",)},
     }
-    ran = f"{how.sentence} Mean ± SD over training seeds. Made by `python -m springfoot.studies.ablations`."
-    for name, text in sections.items():
-        print(f"{text}\n")
-        target = flags.readme if name == "SPRINGS" else flags.page
-        if target is not None:
-            write_section(target, name, f"{text}\n\n{ran}" if name != "INPUTS" else text)
-    return 1 if status == "failed" else 0
 
+    def check(self) -> None:
+        """Refuse rows that are not there as well."""
+        super().check()
+        for name in self.only:
+            if name not in ABLATIONS:
+                raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
 
-def main() -> int:
-    """Exit code: 0 done, 1 a training failed, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(Flags, prog="springfoot.studies.ablations", description=__doc__)
-    return exit_code("ablations", lambda: run(flags))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    def ask(self, progress: Progress) -> Answer:
+        """Train what is missing, and measure."""
+        how = Protocol(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
+        failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
+        rows = trained(self.runs, how)
+        springs = fixed(self.runs, how, self.constant)
+        learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
+        springs |= {f"{label} (`{name}`)": rows[name] for name, label in learned.items() if name in rows}
+        explained = {f"`{name}`: {MEANING[name]}": each for name, each in rows.items()}
+        tables = {"SPRINGS": springs, "ABLATIONS": explained, "INPUTS": inputs(self.runs, how)}
+        heads = {"SPRINGS": "spring", "ABLATIONS": "training", "INPUTS": "fixed schedule"}
+        ran = f"{how.sentence} Mean ± SD over training seeds."
+        sections = {
+            name: f"{rows_table(each, heads[name], people=name == 'SPRINGS')}\n\n{ran}" for name, each in tables.items()
+        }
+        text = "\n\n".join(sections.values())
+        return Answer(text=text, files={"ablations.csv": _numbers(tables)}, sections=sections, failed=failed)

@@ -1,7 +1,7 @@
 """Is the stiffness of a gait identified? The same gait walked with any other stiffness, its equilibrium rebuilt.
 
-    python -m springfoot.studies.identifiability schedule
-    python -m springfoot.studies.identifiability pretrained --episodes 100 --page docs/results.md
+    springfoot study any-stiffness schedule
+    springfoot study any-stiffness pretrained --episodes 100 --page docs/results.md
 
 A recorded gait has a mean angle, velocity and torque of ankle and toe at each phase of the leg controller. For any
 K(phase) > 0, theta_eq = theta + beta dtheta/dt + tau/K gives back that torque. Each such pair of K and theta_eq is a
@@ -10,22 +10,17 @@ is decided at 100 Hz, as theta_eq moves: held longer, K and theta_eq would be th
 """
 
 import json
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, nan
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from springfoot.agents.baselines import schedule
-from springfoot.agents.command_line import exit_code
-from springfoot.agents.files import write_atomically
-from springfoot.agents.markdown import table, text_of, write_section
+from springfoot.agents.markdown import table, text_of
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, plateau_curve
 from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
 from springfoot.envs.control.phase_table import GRID
@@ -36,8 +31,11 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import TICK, Recording, prepare, record
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.body import Body
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import SPRINGS, TOE_STIFFNESS, Segment, StiffnessSchedule
+
+from .quantities import falls_text, rmse_text, walks_csv
+from .study import Answer, Progress, WalkingStudy
 
 SECTION = "ANY-K"
 """Of the results page."""
@@ -52,7 +50,7 @@ its own backwards in time; people's quasi-stiffness."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeanSprings:
-    """Ankle and toe of both legs over the phase of the leg controller, means of a recording, (PHASE_SEGMENTS, 2) each."""
+    """Ankle and toe of both legs over the phase of the leg controller, means of a recording: (PHASE_SEGMENTS, 2)."""
 
     body: Body
     angle: NDArray
@@ -89,7 +87,7 @@ def mean_springs(recording: Recording) -> MeanSprings:
 
 
 def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
-    """K (PHASE_SEGMENTS, 2) > 0 [N m/rad] with the equilibrium at which it gives the gait's torque on the gait's course."""
+    """K (PHASE_SEGMENTS, 2) > 0 [N m/rad] and the equilibrium at which it gives the gait's torque on its course."""
     beta = np.array(damping_times(springs.body))[FEET]
     rest = springs.angle + beta * springs.velocity + springs.torque / stiffness
     columns = zip(SPRINGS, stiffness.T, rest.T, strict=True)
@@ -162,7 +160,7 @@ def any_stiffness(
     stiffnesses: Sequence[str] = STIFFNESSES,
     disturbances: dict[str, dict[str, Any]] | None = None,
     *,
-    progress: Callable[[float], object] = lambda seconds: None,
+    progress: Progress = lambda seconds: None,
     **how: Any,
 ) -> tuple[list[Row], dict[str, StiffnessSchedule]]:
     """The policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
@@ -216,90 +214,67 @@ def stiffness_table(rows: Sequence[Row]) -> str:
         lines.append(
             [
                 f"`{row.name}`",
-                _falls(m),
+                falls_text(m),
                 text_of(m["speed_m_s"]["mean"], ".3f"),
-                _rmse(m),
+                rmse_text(m),
                 " / ".join(text_of(force, ".2f") for force in forces),
                 " / ".join(text_of(work, ".2f") for work in m["ankle_work_J_kg"].values()),
                 " / ".join(text_of(work, "+.3f") for work in row.work.values()),
-                *(f"{_falls(row.metrics[name])}, {_rmse(row.metrics[name])}" for name in disturbed),
+                *(f"{falls_text(row.metrics[name])}, {rmse_text(row.metrics[name])}" for name in disturbed),
             ]
         )
     return table(head, lines)
 
 
-def _falls(metrics: dict[str, Any]) -> str:
-    return f"{metrics['falls']} of {metrics['episodes']}"
-
-
-def _rmse(metrics: dict[str, Any]) -> str:
-    return " / ".join(text_of(metrics["joints"][joint]["rmse_deg"], ".1f") for joint in ("thigh", "knee", "ankle"))
+def _numbers(rows: Sequence[Row]) -> str:
+    """CSV: a line for each stiffness and condition."""
+    return walks_csv(
+        [
+            (
+                {"stiffness": row.name, "condition": name}
+                | {f"work_by_{by}_J_kg": work for by, work in row.work.items()},
+                m,
+            )
+            for row in rows
+            for name, m in row.metrics.items()
+        ]
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flags:
-    """Walk a gait again with any stiffness, its equilibrium rebuilt, undisturbed and disturbed."""
+class AnyStiffness(WalkingStudy):
+    """Walk a gait again with any stiffness, its equilibrium rebuilt, undisturbed and disturbed.
+
+    Its folder also holds each K with its equilibrium, for evaluate.py schedule --equilibrium phase --decisions 100hz
+    --schedule FILE.
+    """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "schedule"
     """Whose gait: any policy of evaluate.py."""
     stiffness: tuple[str, ...] = STIFFNESSES
     """The K walked with: recorded, flat:N (ankle N N·m/rad, toe a fifth of it), times:X, reversed, people."""
-    episodes: int = 20
-    """Episodes of each row and condition."""
     seconds: float = 12.0
     """Length of each."""
-    seed: int = 0
-    """Episode i is seeded with seed + i, in every row."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
     unevenness_m: float = 0.01
     """Unevenness of the ground [m]."""
-    threads: int = 2
-    """Threads of the physics; the results are the same with any number."""
-    schedules: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Also write each K with its equilibrium there, for evaluate.py schedule --equilibrium phase --decisions 100hz
-    --schedule FILE."""
-    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Also write the table into this page, between the markers of ANY-K."""
 
-
-def run(flags: Flags) -> None:
-    """Walk every row, print the table, and write what was asked for."""
-    for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
-        require_count(name, getattr(flags, name), least)
-    disturbances = {
-        f"±{flags.push_newton:g} N": {"push_newton": flags.push_newton},
-        f"±{100 * flags.unevenness_m:g} cm": {"unevenness_m": flags.unevenness_m},
-    }
-    how = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
-    given = {"episode_seconds": flags.seconds}
-    with tqdm(desc="any stiffness", unit="s", unit_scale=True, leave=False, disable=None) as bar:
-        rows, schedules = any_stiffness(flags.policy, given, flags.stiffness, disturbances, progress=bar.update, **how)
-    text = f"{stiffness_table(rows)}\n\n{_what_ran(flags)}"
-    print(text)
-    if flags.schedules is not None:
-        flags.schedules.mkdir(parents=True, exist_ok=True)
-        for name, each in schedules.items():
-            content = json.dumps(each.to_json()) + "\n"
-            write_atomically(flags.schedules / f"{name.replace(':', '-')}.json", content.encode())
-    if flags.page is not None:
-        command = f"`python -m springfoot.studies.identifiability {flags.policy}`"
-        write_section(flags.page, SECTION, f"{text} Made by {command}.")
-
-
-def _what_ran(flags: Flags) -> str:
-    return (
-        f"First row: `{flags.policy}` itself; each other row walks its mean torque with this K and "
-        f"θ_eq = θ + β·θ̇ + τ/K over the controller's phase. {flags.episodes} episodes × {flags.seconds:g} s, the same "
-        f"seeds in every row; RMSE to people's mean; work put into one ankle's spring a stride, net."
-    )
-
-
-def main() -> int:
-    """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(Flags, prog="springfoot.studies.identifiability", description=__doc__)
-    return exit_code("identified", lambda: run(flags))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    def ask(self, progress: Progress) -> Answer:
+        """Walk every row."""
+        disturbances = {
+            f"±{self.push_newton:g} N": {"push_newton": self.push_newton},
+            f"±{100 * self.unevenness_m:g} cm": {"unevenness_m": self.unevenness_m},
+        }
+        given = {"episode_seconds": self.seconds}
+        rows, schedules = any_stiffness(self.policy, given, self.stiffness, disturbances, progress=progress, **self.how)
+        text = (
+            f"{stiffness_table(rows)}\n\n"
+            f"First row: `{self.policy}` itself; each other row walks its mean torque with this K and "
+            f"θ_eq = θ + β·θ̇ + τ/K over the controller's phase. {self.episodes} episodes × {self.seconds:g} s, the "
+            f"same seeds in every row; RMSE to people's mean; work put into one ankle's spring a stride, net."
+        )
+        files = {
+            f"{name.replace(':', '-')}.json": json.dumps(each.to_json()) + "\n" for name, each in schedules.items()
+        }
+        return Answer(text=text, files={"stiffness.csv": _numbers(rows)} | files, sections={SECTION: text})

@@ -1,14 +1,11 @@
 """How fast a walk is learned: curves of one training from several seeds, and whether each came to walk.
 
-    python -m springfoot.studies.learning_curves runs/seed-0 runs/seed-1 runs/seed-2 --out docs/learning.png
-
-Prints a markdown table: wall time of the whole training, when its policy first fell in no evaluation episode, and which
-limits of a walk the best policy misses over 20 episodes of 20 s.
+springfoot study learning-curves runs/seed-0 runs/seed-1 runs/seed-2 --page docs/learning.md
 """
 
 import json
-import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Annotated, Any
@@ -17,16 +14,20 @@ import matplotlib
 import tyro
 from matplotlib.figure import Figure
 
-from springfoot.agents.command_line import exit_code
-from springfoot.agents.training import RUN
+from springfoot.agents.files import csv_text
+from springfoot.agents.markdown import MISSING, table
+from springfoot.agents.policy import RUN
 from springfoot.evaluation.criteria import WALKS, unmet
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.errors import SpringfootError
 
-EPISODES, SECONDS = 20, 20.0
-"""What the best policy is judged on."""
+from .quantities import walks_csv
+from .study import Answer, Progress, WalkingStudy
+
+KEYS = ("timesteps", "seconds", "return_mean", "falls")
+"""Of a periodic evaluation: what is drawn and kept."""
 
 
 def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | None:
@@ -56,54 +57,56 @@ def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flags:
-    """Learning curves of several runs of the same training, and whether each came to walk."""
+class LearningCurves(WalkingStudy):
+    """Learning curves of several runs of the same training, and whether each came to walk.
 
-    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")]
+    Tells the wall time of each whole training, when its policy first fell in no evaluation episode, and which criteria
+    of a walk its best policy misses.
+    """
+
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
     """Run folders of train.py."""
-    out: Path = Path("learning.png")
-    """The picture."""
-    threads: int = 2
-    """Threads of the physics."""
 
+    def check(self) -> None:
+        """Refuse no runs as well."""
+        super().check()
+        if not self.runs:
+            raise SpringfootError("give one run folder of train.py or more")
 
-def run(flags: Flags) -> None:
-    """Judge every run, print the table and write the picture."""
-    if not flags.runs:
-        raise SpringfootError("give one run folder of train.py or more")
-    runs = {folder.name: _read(folder) for folder in flags.runs}
-    print(f"| run | wall time s | steps | no falls from | missed over {EPISODES} episodes × {SECONDS:g} s |")
-    print("| --- | --- | --- | --- | --- |")
-    for folder, (name, record_of_run) in zip(flags.runs, runs.items(), strict=True):
-        policy, settings = prepare(str(folder), {"episode_seconds": SECONDS})
-        metrics = measure(record(policy, settings, name=name, episodes=EPISODES, threads=flags.threads)).metrics
-        steady = first_without_falls(record_of_run["evaluations"])
-        when = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else "–"
-        seconds, steps = record_of_run["seconds"], record_of_run["timesteps"]
-        print(f"| {name} | {seconds:.0f} | {steps:,} | {when} | {', '.join(unmet(metrics, WALKS)) or 'nothing'} |")
-    print(f"\nMedian wall time {median(record_of_run['seconds'] for record_of_run in runs.values()):.0f} s.")
-    save_curves(flags.out, runs)
+    def ask(self, progress: Progress) -> Answer:
+        """Judge every run."""
+        runs = {folder.name: _read(folder) for folder in self.runs}
+        lines, walks = [], []
+        for folder, (name, run) in zip(self.runs, runs.items(), strict=True):
+            policy, settings = prepare(str(folder), {"episode_seconds": self.seconds}, self.seed)
+            metrics = measure(record(policy, settings, name=name, progress=progress, **self.how)).metrics
+            steady = first_without_falls(run["evaluations"])
+            when = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else MISSING
+            missed = ", ".join(unmet(metrics, WALKS)) or "nothing"
+            lines.append([name, f"{run['seconds']:.0f}", f"{run['timesteps']:,}", when, missed])
+            walks.append(({"run": name} | {f"training_{key}": run[key] for key in ("seconds", "timesteps")}, metrics))
+        head = ["run", "wall time s", "steps", "no falls from"]
+        head.append(f"missed over {self.episodes} episodes × {self.seconds:g} s")
+        text = f"{table(head, lines)}\n\nMedian wall time {median(run['seconds'] for run in runs.values()):.0f} s."
+        evaluations = [
+            [name, *(entry[key] for key in KEYS)] for name, run in runs.items() for entry in run["evaluations"]
+        ]
+        files = {
+            "evaluations.csv": csv_text(["run", *KEYS], evaluations),
+            "policies.csv": walks_csv(walks),
+            "learning.png": partial(save_curves, runs=runs),
+        }
+        return Answer(text=text, files=files, sections={"LEARNING": text})
 
 
 def _read(folder: Path) -> dict[str, Any]:
     """The record of a finished run, with the time of every evaluation."""
     try:
         record_of_run = json.loads((folder / RUN).read_text(encoding="utf-8"))
-        keys = ("seconds", "return_mean", "timesteps", "falls")
-        numbers = [entry[key] for entry in record_of_run["evaluations"] for key in keys]
+        numbers = [entry[key] for entry in record_of_run["evaluations"] for key in KEYS]
         float(sum(numbers) + record_of_run["seconds"] + record_of_run["timesteps"])
     except (OSError, ValueError, KeyError, TypeError):
         raise SpringfootError(
             f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"
         ) from None
     return record_of_run
-
-
-def main() -> int:
-    """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(Flags, description=__doc__)
-    return exit_code("learning_curves", lambda: run(flags))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

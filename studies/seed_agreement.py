@@ -1,14 +1,15 @@
 """Do seeds agree? The springs of several policies over the stride, and which limits of a human-like walk each misses.
 
-    python -m springfoot.studies.seed_agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --out docs/agreement.png
+    springfoot study agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --page docs/results.md
 
-Stiffness alone is not identified (`springfoot.studies.identifiability`), so K stands beside the equilibrium and the torque.
-K of a joint is judged where that joint carries load, by its coefficient of variation (SD / mean) over the policies.
+Stiffness alone is not identified (`springfoot.studies.identifiability`), so K stands beside the equilibrium and the
+torque. K of a joint is judged where that joint carries load, by its coefficient of variation (SD / mean) over the
+policies.
 """
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,17 +20,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from springfoot.agents.command_line import exit_code
-from springfoot.agents.files import write_atomically
-from springfoot.agents.markdown import table, write_section
+from springfoot.agents.files import csv_text
+from springfoot.agents.markdown import table
 from springfoot.evaluation.criteria import HUMAN_LIKE, Criterion, number_text, numbers
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.cycle import PERCENT
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.errors import SpringfootError
+
+from .quantities import walks_csv
+from .study import Answer, Progress, WalkingStudy
 
 SECTION = "AGREEMENT"
 """Of the results page."""
@@ -82,8 +84,7 @@ class Agreement:
 
 def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
     """Ankle and toe of two gaits or more; raises `SpringfootError` for fewer, and for one without strides."""
-    if len(gaits) < 2:
-        raise SpringfootError(f"agreement needs two policies or more, got {len(gaits)}")
+    _require_two(len(gaits))
     if idle := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
         raise SpringfootError(f"{idle[0]} walks no strides to compare")
     found = []
@@ -91,6 +92,11 @@ def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
         stiffness, equilibrium, torque = (np.stack([gait.both.mean(name) for gait in gaits]) for name in names)
         found.append(Agreement(joint=joint, stiffness=stiffness, equilibrium=equilibrium, torque=torque))
     return found
+
+
+def _require_two(policies: int) -> None:
+    if policies < 2:
+        raise SpringfootError(f"agreement needs two policies or more, got {policies}")
 
 
 def agreement_table(found: Sequence[Agreement]) -> str:
@@ -149,7 +155,7 @@ def _state(limit: Criterion, values: dict[str, Any]) -> str:
     return "(" if limit.loosened().holds(values) else "**"
 
 
-def csv_text(found: Sequence[Agreement]) -> str:
+def curves_csv(found: Sequence[Agreement]) -> str:
     """CSV over percent of the stride: mean and SD over the policies of K, theta_eq and torque, CV of K, load."""
     columns: dict[str, NDArray] = {"percent": PERCENT}
     for each in found:
@@ -158,8 +164,7 @@ def csv_text(found: Sequence[Agreement]) -> str:
         ):
             columns |= {name: curves.mean(axis=0), f"{name}_sd": curves.std(axis=0, ddof=1)}
         columns |= {f"{each.joint}_stiffness_cv": each.variation, f"{each.joint}_loaded": each.loaded.astype(int)}
-    rows = (",".join(f"{value:.6g}" for value in row) for row in zip(*columns.values(), strict=True))
-    return "\n".join([",".join(columns), *rows]) + "\n"
+    return csv_text(list(columns), zip(*columns.values(), strict=True))
 
 
 def save_figure(path: Path, found: Sequence[Agreement]) -> None:
@@ -194,57 +199,35 @@ def save_figure(path: Path, found: Sequence[Agreement]) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flags:
+class SeedAgreement(WalkingStudy):
     """Hold several policies, such as one training from several seeds, against each other and against people."""
 
-    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")]
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ()
     """Two policies of evaluate.py or more: run folders, files, names."""
-    episodes: int = 20
-    """Episodes of each."""
-    seconds: float = 20.0
-    """Length of each."""
-    seed: int = 0
-    """Episode i is seeded with seed + i, for every policy."""
-    threads: int = 2
-    """Threads of the physics; the results are the same with any number."""
-    out: Path = Path("agreement.png")
-    """The picture; the curves lie beside it as .csv."""
-    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Also write the tables into this page, between the markers of AGREEMENT."""
 
+    def check(self) -> None:
+        """Refuse fewer than two policies as well."""
+        super().check()
+        _require_two(len(self.policies))
 
-def run(flags: Flags) -> None:
-    """Walk every policy, print the tables, and write the picture and the curves."""
-    for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
-        require_count(name, getattr(flags, name), least)
-    how: dict[str, Any] = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
-    prepared = [(name, *prepare(name, {"episode_seconds": flags.seconds}, flags.seed)) for name in flags.policies]
-    gaits = []
-    with tqdm(desc="agreement", unit="s", unit_scale=True, leave=False, disable=None) as bar:
-        for name, policy, settings in prepared:
-            gaits.append(measure(record(policy, settings, name=name, progress=bar.update, **how)))
-    found = agreements(gaits)
-    labels = [Path(name).name for name in flags.policies]
-    text = "\n\n".join(
-        [
-            agreement_table(found),
-            limits_table(labels, [gait.metrics for gait in gaits]),
-            f"{flags.episodes} episodes × {flags.seconds:g} s each. (Brackets): met by the loosened limit alone; "
-            "**bold**: missed.",
+    def ask(self, progress: Progress) -> Answer:
+        """Walk every policy."""
+        prepared = [(name, *prepare(name, {"episode_seconds": self.seconds}, self.seed)) for name in self.policies]
+        gaits = [
+            measure(record(policy, settings, name=name, progress=progress, **self.how))
+            for name, policy, settings in prepared
         ]
-    )
-    print(text)
-    save_figure(flags.out, found)
-    write_atomically(flags.out.with_suffix(".csv"), csv_text(found).encode())
-    if flags.page is not None:
-        write_section(flags.page, SECTION, text)
-
-
-def main() -> int:
-    """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(Flags, prog="springfoot.studies.seed_agreement", description=__doc__)
-    return exit_code("agreement", lambda: run(flags))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        found = agreements(gaits)
+        labels = [Path(name).name for name in self.policies]
+        text = "\n\n".join(
+            [
+                agreement_table(found),
+                limits_table(labels, [gait.metrics for gait in gaits]),
+                f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened limit alone; "
+                "**bold**: missed.",
+            ]
+        )
+        walks = walks_csv([({"policy": name}, gait.metrics) for name, gait in zip(labels, gaits, strict=True)])
+        draw = partial(save_figure, found=found)
+        files = {"agreement.csv": curves_csv(found), "policies.csv": walks, "agreement.png": draw}
+        return Answer(text=text, files=files, sections={SECTION: text})

@@ -1,6 +1,6 @@
-"""Finds what a slope adds to the legs' targets (`slope` in `envs/legs.json`): CMA-ES on walks up and down.
+"""Finds what a slope adds to the legs' targets (`slope` in `envs/control/legs.json`): CMA-ES on walks up and down.
 
-    python -m springfoot.studies.slope_tuning --generations 20
+    springfoot study slope-tuning --generations 20
 
 Every candidate walks with the fixed schedule at each of `SLOPES_DEG`. It pays for falls, for speeds other than the
 commanded one, for reward that the same walk earns on level ground, and for heels that strike hard. What was found is
@@ -8,16 +8,17 @@ then held against what it began with, on longer walks from other starts, and wri
 """
 
 import json
-import sys
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Annotated, Any, ClassVar
 
 import cma
 import numpy as np
 import tyro
 from numpy.typing import NDArray
+from tqdm import tqdm
 
-from springfoot.agents.command_line import exit_code
+from springfoot.agents.files import csv_text
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import SlopeConstants, slope_constants_from
@@ -26,7 +27,8 @@ from springfoot.envs.step_result import Tick
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
-from .leg_tuning import read_table
+from .constants_file import CONSTANTS, read_constants, write_constants
+from .study import Answer, Progress, Study
 
 SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
 """Walked on by every candidate."""
@@ -40,28 +42,6 @@ TOLERANCE = {"speed": 0.06, "reward": 0.1, "heel": 0.3}
 """Error e [m/s, share of the level walk's reward, body weights] at which sqrt(1 + (e / tolerance)^2) - 1 costs 0.41."""
 JUDGED_WALKS, JUDGED_SECONDS = 16, 10.0
 """Walks at each slope that judge what was found, and their length [s]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlopeFlags:
-    """Find the constants for slopes by CMA-ES and write them into a file of constants."""
-
-    generations: int = 20
-    """Generations of the search."""
-    population: int = 12
-    """Candidates in each."""
-    sigma: float = 0.2
-    """First spread, in the constants' own units."""
-    walks: int = 3
-    """Walks of a candidate at each slope."""
-    seconds: float = 6.0
-    """Length of each [s]."""
-    seed: int = 0
-    """Seed of the search and of the walks."""
-    threads: int = 2
-    """Threads of the physics."""
-    out: Path = Path("envs/legs.json")
-    """File of constants to begin with and to write."""
 
 
 def constants_of(vector: NDArray) -> SlopeConstants:
@@ -124,64 +104,94 @@ def cost(walked: dict[str, NDArray], level_reward: float) -> float:
     return float(np.where(walked["missing"] > 0, FALL_COST * walked["missing"], paid).mean())
 
 
-def search(flags: SlopeFlags) -> None:
-    """Run the search, judge what it found, print both, and write the better.
+@dataclass(frozen=True, kw_only=True)
+class SlopeTuning(Study):
+    """Find the constants for slopes by CMA-ES and write them into a file of constants, if they pay less there."""
 
-    Raises `SpringfootError`, with nothing written, for numbers out of range or another kind of file.
-    """
-    for count, least in (("generations", 0), ("population", 4), ("walks", 1), ("seed", 0), ("threads", 1)):
-        require_count(count, getattr(flags, count), least)
-    require_number("sigma", flags.sigma, 0, above=True)
-    require_number("seconds", flags.seconds, SETTLED, above=True)
-    table = read_table(flags.out)
-    try:
-        began = slope_constants_from(table["slope"]["constants"])
-    except (KeyError, TypeError):
-        raise SpringfootError(f"{flags.out} has no constants for slopes to begin with") from None
-    options = {"popsize": flags.population, "seed": flags.seed + 1, "verbose": -9}
-    strategy = cma.CMAEvolutionStrategy(vector_of(began), flags.sigma, options)
-    for generation in range(flags.generations):
-        vectors, seed = strategy.ask(), flags.seed + 1000 * generation
-        level = walk(None, (0.0,), flags.walks, flags.seconds, seed, flags.threads)["reward"].mean()
-        found = [walk(constants_of(v), SLOPES_DEG, flags.walks, flags.seconds, seed, flags.threads) for v in vectors]
-        paid = [cost(walked, level) for walked in found]
-        strategy.tell(vectors, paid)
-        print(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}", flush=True)
-    judged = {"began with": (began, _judge(began, flags))}
-    if flags.generations:
-        mean = constants_of(strategy.mean)
-        judged["found"] = mean, _judge(mean, flags)
-    best = min(judged, key=lambda name: judged[name][1])
-    if best == "found":
-        command = " ".join(["python -m springfoot.studies.slope_tuning", *sys.argv[1:]])
-        table = read_table(flags.out)  # anew: another search may have written its own
-        table["slope"] = table["slope"] | {"found_by": command, "constants": asdict(judged[best][0])}
-        flags.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
-    print("wrote what it found" if best == "found" else "wrote nothing: what it began with pays no more")
+    generations: int = 20
+    """Generations of the search."""
+    population: int = 12
+    """Candidates in each."""
+    sigma: float = 0.2
+    """First spread, in the constants' own units."""
+    walks: int = 3
+    """Walks of a candidate at each slope."""
+    seconds: float = 6.0
+    """Length of each [s]."""
+    seed: int = 0
+    """Seed of the search and of the walks."""
+    threads: int = 2
+    """Threads of the physics."""
+    constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
+    """File of constants to begin with and to write."""
 
+    QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4, "walks": 1, "seconds": 3.0}
+    UNIT: ClassVar[str] = " generations"
 
-def _judge(constants: SlopeConstants, flags: SlopeFlags) -> float:
-    """Print how walks from starts that the search does not know go, and return what they pay."""
-    seed = flags.seed + 1_000_000
-    level = walk(constants, (0.0,), JUDGED_WALKS, JUDGED_SECONDS, seed, flags.threads)["reward"].mean()
-    walked = walk(constants, SLOPES_DEG, JUDGED_WALKS, JUDGED_SECONDS, seed, flags.threads)
-    paid = cost(walked, level)
-    print(f"{json.dumps(asdict(constants))} pays {paid:.2f} in {walked['missing'].size} walks of {JUDGED_SECONDS:g} s")
-    for row, slope_deg in enumerate(SLOPES_DEG):
-        missing, speed, heel, reward = (walked[name][row] for name in ("missing", "speed", "heel", "reward"))
-        print(
-            f"  {slope_deg:+.1f} deg: {(missing > 0).sum()} fall, {speed.mean():+.3f} m/s too fast, heel peak "
-            f"{heel.mean():.2f} body weights, reward {reward.mean() / level:.2f} of the level walk's",
-            flush=True,
-        )
-    return paid
+    def check(self) -> None:
+        """Refuse numbers out of range."""
+        for count, least in (("generations", 0), ("population", 4), ("walks", 1), ("seed", 0), ("threads", 1)):
+            require_count(count, getattr(self, count), least)
+        require_number("sigma", self.sigma, 0, above=True)
+        require_number("seconds", self.seconds, SETTLED, above=True)
 
+    @property
+    def total(self) -> float:
+        """Generations."""
+        return self.generations
 
-def main() -> int:
-    """Exit code: 0 done, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(SlopeFlags, description=__doc__)
-    return exit_code("slopes", lambda: search(flags))
+    def ask(self, progress: Progress) -> Answer:
+        """Search, judge what was found, and write it if it is better; with --quick never.
 
+        Raises `SpringfootError`, with nothing written, for another kind of file.
+        """
+        try:
+            began = slope_constants_from(read_constants(self.constants)["slope"]["constants"])
+        except (KeyError, TypeError):
+            raise SpringfootError(f"{self.constants} has no constants for slopes to begin with") from None
+        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(vector_of(began), self.sigma, options)
+        lines, how = [], (self.walks, self.seconds)
+        for generation in range(self.generations):
+            vectors, seed = strategy.ask(), self.seed + 1000 * generation
+            level = walk(None, (0.0,), *how, seed, self.threads)["reward"].mean()
+            found = [walk(constants_of(v), SLOPES_DEG, *how, seed, self.threads) for v in vectors]
+            paid = [cost(walked, level) for walked in found]
+            strategy.tell(vectors, paid)
+            lines.append([generation + 1, min(paid), np.median(paid)])
+            tqdm.write(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}")
+            progress(1)
+        pays, told = self._judge(began)
+        verdict = "wrote nothing: what it began with pays no more"
+        if self.generations:
+            found_pays, found_told = self._judge(mean := constants_of(strategy.mean))
+            told = f"{told}\n{found_told}"
+            if found_pays < pays:
+                verdict = "wrote nothing: --quick" if self.quick else "wrote what it found"
+                self._keep(mean)
+        files = {"generations.csv": csv_text(["generation", "best", "median"], lines)}
+        return Answer(text=f"{told}\n{verdict}", files=files)
 
-if __name__ == "__main__":
-    sys.exit(main())
+    def _keep(self, found: SlopeConstants) -> None:
+        """Write what was found, and the command that did, into the file of constants; with --quick nothing."""
+        if self.quick:
+            return
+        table = read_constants(self.constants)  # anew: another search may have written its own
+        table["slope"] = table["slope"] | {"found_by": self.command, "constants": asdict(found)}
+        write_constants(self.constants, table)
+
+    def _judge(self, constants: SlopeConstants) -> tuple[float, str]:
+        """What walks from starts that the search does not know pay, and how they go."""
+        walks, seconds = (1, 3.0) if self.quick else (JUDGED_WALKS, JUDGED_SECONDS)
+        seed = self.seed + 1_000_000
+        level = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()
+        walked = walk(constants, SLOPES_DEG, walks, seconds, seed, self.threads)
+        paid = cost(walked, level)
+        told = [f"{json.dumps(asdict(constants))} pays {paid:.2f} in {walked['missing'].size} walks of {seconds:g} s"]
+        for row, slope_deg in enumerate(SLOPES_DEG):
+            missing, speed, heel, reward = (walked[name][row] for name in ("missing", "speed", "heel", "reward"))
+            told.append(
+                f"  {slope_deg:+.1f} deg: {(missing > 0).sum()} fall, {speed.mean():+.3f} m/s too fast, heel peak "
+                f"{heel.mean():.2f} body weights, reward {reward.mean() / level:.2f} of the level walk's"
+            )
+        return paid, "\n".join(told)

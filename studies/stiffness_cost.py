@@ -1,17 +1,17 @@
 """What stiffness is worth: trainings of preset `walk` with different weights of its cost, and the knee of the curve.
 
-    python -m springfoot.studies.stiffness_cost --out runs/tradeoff --figure docs/tradeoff.png --page docs/results.md
+    springfoot study stiffness-cost --page docs/results.md
 
-Without disturbance the stiffness of a gait is not identified (`springfoot.studies.identifiability`): a cost on K picks the
-softest springs that still walk like people and stand pushes. A seed that is finished is not trained again, so the
+Without disturbance the stiffness of a gait is not identified (`springfoot.studies.identifiability`): a cost on K picks
+the softest springs that still walk like people and stand pushes. A seed that is finished is not trained again, so the
 command may be stopped and begun anew, with more weights or seeds, or with `--no-train` to measure what there is.
 """
 
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import matplotlib
 import numpy as np
@@ -19,22 +19,24 @@ import tyro
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm
 
-from springfoot.agents.command_line import exit_code
 from springfoot.agents.config import PRESETS, TrainingConfig
-from springfoot.agents.markdown import MISSING, table, text_of, write_section
-from springfoot.agents.multi_seed import is_finished, train_missing
+from springfoot.agents.files import csv_text
+from springfoot.agents.markdown import MISSING, plus_minus, table
+from springfoot.agents.multi_seed import is_finished
 from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
 from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
 from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.recording import TICK, Recording, prepare, record
 from springfoot.evaluation.stride_tally import WARM_UP
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 
+from .quantities import JOINTS
 from .seed_agreement import agreements
+from .study import Answer, Progress
+from .trainings import TrainingStudy
 
 SECTION = "TRADE-OFF"
 """Of the results page."""
@@ -42,14 +44,12 @@ WEIGHTS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)
 """Of the cost."""
 PUSHES = (150.0, 200.0, 250.0)
 """Sizes of pushes [N]."""
-JOINTS = ("thigh", "knee", "ankle")
-"""Whose RMSE to people's mean is averaged."""
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195")
 Term = Literal["stiffness", "stiffness_rate"]
 
 
 def stiffness_cost(recording: Recording) -> float | None:
-    """Mean of the reward term `stiffness` (`springfoot.envs.task.reward`) after `WARM_UP`; None for shorter episodes."""
+    """Mean of the reward term `stiffness` (`envs.task.reward`) after `WARM_UP`; None for shorter episodes."""
     unit = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body_of(recording.settings).stiffness_scale
     share = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
     squares = (recording.series["stiffness"][:, round(WARM_UP / TICK) :] / unit) ** 2 @ share
@@ -101,7 +101,7 @@ def measure_point(
     folders: Sequence[Path],
     pushes: Sequence[float] = PUSHES,
     seconds: float = 20.0,
-    progress: Callable[[float], object] = lambda simulated: None,
+    progress: Progress = lambda simulated: None,
     **how: Any,
 ) -> WeightResult:
     """Walk the best policy of each run folder, undisturbed and under each push; `how` as for `recording.record`."""
@@ -163,20 +163,14 @@ def tradeoff_table(points: Sequence[WeightResult], term: Term) -> str:
             [
                 f"{point.weight:g}",
                 str(len(point.gaits)),
-                _spread(point.cost, ".2f"),
-                _spread(point.rmse, ".2f"),
+                _spread(point.cost),
+                _spread(point.rmse),
                 *(f"{100 * np.mean(each):.0f} %" for each in (falls, *point.falls.values())),
                 MISSING if variation is None else ", ".join(f"{100 * value:.0f} %" for value in variation.values()),
                 ", ".join(marks),
             ]
         )
     return table(head, lines)
-
-
-def _spread(values: Sequence[float | None], pattern: str) -> str:
-    known = mean_sd([value for value in values if value is not None])
-    mean = text_of(known["mean"], pattern)
-    return mean if known["sd"] is None else f"{mean} ± {text_of(known['sd'], pattern)}"
 
 
 def save_figure(path: Path, points: Sequence[WeightResult], term: Term) -> None:
@@ -222,77 +216,80 @@ def _line(ax: Axes, x: NDArray, y: NDArray, color: str, label: str) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flags:
-    """Train with different weights of the stiffness cost, walk and be pushed, and draw what each costs and gives."""
+class StiffnessCost(TrainingStudy):
+    """Train with different weights of the stiffness cost, walk and be pushed, and draw what each costs and gives.
 
-    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/tradeoff")
-    """Folder of the trainings; what is finished in it is kept."""
+    A seed that is finished is not trained again: the command may be stopped and begun anew.
+    """
+
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/stiffness-cost")
+    """Folder of all trainings; what is finished in it is kept."""
     term: Term = "stiffness"
     """Which cost: of K, or of changing it."""
     weights: tuple[float, ...] = WEIGHTS
     """Its weights."""
-    seeds: int = 3
-    """Seeds of each, 0 and the next ones."""
-    timesteps: int | None = None
-    """Steps of each training, the preset's unless given."""
-    train: bool = True
-    """Train what is missing; without, measure what there is."""
     pushes: tuple[float, ...] = PUSHES
     """Sizes of the pushes [N]."""
-    episodes: int = 20
-    """Episodes of each policy, undisturbed and under each push."""
-    seconds: float = 20.0
-    """Length of each."""
-    threads: int = 2
-    """Threads of the physics when measuring; the results are the same with any number."""
-    figure: Path = Path("tradeoff.png")
-    """The picture."""
-    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Also write the table into this page, between the markers of TRADE-OFF."""
 
+    QUICK: ClassVar[dict[str, Any]] = {
+        **TrainingStudy.QUICK,
+        **{"runs": Path("runs/stiffness-cost-quick"), "weights": (0.02,)},
+    }
 
-def run(flags: Flags) -> int:
-    """Train what is missing, measure, print the table and write the picture."""
-    for name in ("seeds", "episodes", "threads"):
-        require_count(name, getattr(flags, name))
-    weights = sorted(set(flags.weights))
-    if not weights or not flags.pushes:
-        raise SpringfootError("give one weight and one push or more")
-    jobs = []
-    for seed in range(flags.seeds):  # every weight once before any twice
+    def check(self) -> None:
+        """Refuse no weights and no pushes as well."""
+        super().check()
+        if not self.weights or not self.pushes:
+            raise SpringfootError("give one weight and one push or more")
+
+    def ask(self, progress: Progress) -> Answer:
+        """Train what is missing, walk and be pushed."""
+        weights = sorted(set(self.weights))
+        folders = {
+            (weight, seed): folder_of(self.runs, self.term, weight, seed)
+            for seed in range(self.seeds)  # every weight once before any twice
+            for weight in weights
+        }
+        jobs = [
+            (config_of(*key, self.term, self.timesteps), folder, f"{self.term} {key[0]:g}, seed {key[1]}")
+            for key, folder in folders.items()
+        ]
+        failed = self.train_missing(jobs)
+        points = []
         for weight in weights:
-            config = config_of(weight, seed, flags.term, flags.timesteps)
-            folder = folder_of(flags.out, flags.term, weight, seed)
-            jobs.append((config, folder, f"{flags.term} {weight:g}, seed {seed}"))
-    status = train_missing(jobs) if flags.train else "finished"
-    if status == "interrupted":
-        return 130
-    points = []
-    with tqdm(desc="trade-off", unit="s", unit_scale=True, leave=False, disable=None) as bar:
-        for weight in weights:
-            folders = [folder_of(flags.out, flags.term, weight, seed) for seed in range(flags.seeds)]
-            if done := [folder for folder in folders if is_finished(folder)]:
-                how: dict[str, Any] = {"episodes": flags.episodes, "threads": flags.threads, "progress": bar.update}
-                points.append(measure_point(weight, done, flags.pushes, flags.seconds, **how))
-    if not points:
-        raise SpringfootError(f"no finished training of {flags.term} in {flags.out}")
-    text = f"{tradeoff_table(points, flags.term)}\n\n" + (
-        f"{flags.episodes} episodes × {flags.seconds:g} s of each seed's best policy; mean ± SD over seeds; CV of K: "
-        "over seeds, mean where the joint carries load. Knee: of RMSE and falls under pushes, each scaled to 0..1 and "
-        "added, against the K² cost, the point farthest below the line between the curve's ends (Kneedle)."
-    )
-    print(text)
-    save_figure(flags.figure, points, flags.term)
-    if flags.page is not None:
-        write_section(flags.page, SECTION, text)
-    return 1 if status == "failed" else 0
+            done = [folder for key, folder in folders.items() if key[0] == weight and is_finished(folder)]
+            if done:
+                points.append(measure_point(weight, done, self.pushes, self.seconds, progress=progress, **self.how))
+        if not points:
+            raise SpringfootError(f"no finished training of {self.term} in {self.runs}")
+        text = f"{tradeoff_table(points, self.term)}\n\n" + (
+            f"{self.episodes} episodes × {self.seconds:g} s of each seed's best policy; mean ± SD over seeds; CV of K: "
+            "over seeds, mean where the joint carries load. Knee: of RMSE and falls under pushes, each scaled to 0..1 "
+            "and added, against the K² cost, the point farthest below the line between the curve's ends (Kneedle)."
+        )
+        files: dict[str, Any] = {"policies.csv": points_csv(points)}
+        if any(None not in (*point.rmse, *point.cost) for point in points):
+            files["tradeoff.png"] = partial(save_figure, points=points, term=self.term)
+        return Answer(text=text, files=files, sections={SECTION: text}, failed=failed)
 
 
-def main() -> int:
-    """Exit code: 0 done, 1 a training failed, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(Flags, prog="springfoot.studies.stiffness_cost", description=__doc__)
-    return exit_code("tradeoff", lambda: run(flags))
+def _spread(values: Sequence[float | None]) -> str:
+    return plus_minus(mean_sd([value for value in values if value is not None]), ".2f")
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def points_csv(points: Sequence[WeightResult]) -> str:
+    """CSV: a line for each policy, its weight, cost, RMSE, and share of falls undisturbed and under each push."""
+    head = [
+        "weight",
+        "policy",
+        "stiffness_cost",
+        "rmse_deg",
+        "falls",
+        *(f"falls_{push:g}_N" for push in points[0].falls),
+    ]
+    lines = []
+    for point in points:
+        for index, (gait, cost, rmse) in enumerate(zip(point.gaits, point.cost, point.rmse, strict=True)):
+            falls = [gait.metrics["falls"] / gait.metrics["episodes"], *(each[index] for each in point.falls.values())]
+            lines.append([point.weight, gait.metrics["policy"], cost, rmse, *falls])
+    return csv_text(head, lines)

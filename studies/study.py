@@ -87,7 +87,7 @@ class Study:
             total=study.total, desc=name, unit=study.UNIT, unit_scale=True, leave=False, disable=None, delay=0.5
         ) as bar:
             answer = study.ask(bar.update)
-        if study.quick:
+        if study.quick and study.QUICK:
             sections = {section: f"{QUICK_NOTE}\n\n{text}" for section, text in answer.sections.items()}
             answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}", sections=sections)
         print(answer.text)

@@ -178,41 +178,22 @@ def _integrated_twice(acceleration: NDArray, period: float) -> NDArray:
 Draw = Callable[[Axes, DrawnWalk], None]
 
 
-def save_figures(folder: Path, walks: Sequence[DrawnWalk]) -> None:
-    """Write figure-6.png ... figure-10.png into `folder`: a column a walk, a row a quantity, one scale a row."""
-    figures: dict[int, list[tuple[str, Draw]]] = {
-        6: [
-            ("CoM x against\nmean motion (cm)", lambda ax, walk: _line(ax, walk, 100 * walk.com_wave[0])),
-            ("CoM z about\nits mean (cm)", lambda ax, walk: _line(ax, walk, 100 * walk.com_wave[1])),
-        ],
-        7: [
-            ("ankle x (m)", lambda ax, walk: _path(ax, walk, "ankle", 0)),
-            ("ankle z (m)", lambda ax, walk: _path(ax, walk, "ankle", 1)),
-        ],
-        8: [
-            ("toe joint x (m)", lambda ax, walk: _path(ax, walk, "toe_joint", 0)),
-            ("toe joint z (m)", lambda ax, walk: _path(ax, walk, "toe_joint", 1)),
-        ],
-        9: [
-            ("fore-aft force (BW)", lambda ax, walk: _forces(ax, walk, 0)),
-            ("vertical force (BW)", lambda ax, walk: _forces(ax, walk, 1)),
-        ],
-        10: [("ZMP x (m)", _zmp)],
-    }
-    for number, rows in figures.items():
-        with matplotlib.rc_context(STYLE):
-            figure = Figure(figsize=(9.0, 1.0 + 1.75 * len(rows)), layout="constrained")
-            grid = figure.subplots(len(rows), len(walks), sharex=True, sharey="row", squeeze=False)
-            for axes, (ylabel, draw) in zip(grid, rows, strict=True):
-                axes[0].set_ylabel(ylabel)
-                for ax, walk in zip(axes, walks, strict=True):
-                    _contact(ax, walk)
-                    draw(ax, walk)
-            for ax, walk in zip(grid[0], walks, strict=True):
-                ax.set_title(walk.title)
-            for ax in grid[-1]:
-                ax.set_xlabel("% of this foot's stride")
-            _save(figure, folder / f"figure-{number}.png")
+def save_figure(number: int, walks: Sequence[DrawnWalk], path: Path) -> None:
+    """Write one of `FIGURES`: a column a walk, a row a quantity, one scale a row."""
+    rows = FIGURES[number]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 1.0 + 1.75 * len(rows)), layout="constrained")
+        grid = figure.subplots(len(rows), len(walks), sharex=True, sharey="row", squeeze=False)
+        for axes, (ylabel, draw) in zip(grid, rows, strict=True):
+            axes[0].set_ylabel(ylabel)
+            for ax, walk in zip(axes, walks, strict=True):
+                _contact(ax, walk)
+                draw(ax, walk)
+        for ax, walk in zip(grid[0], walks, strict=True):
+            ax.set_title(walk.title)
+        for ax in grid[-1]:
+            ax.set_xlabel("% of this foot's stride")
+        _save(figure, path)
 
 
 def _save(figure: Figure, path: Path) -> None:
@@ -252,3 +233,25 @@ def _zmp(ax: Axes, walk: DrawnWalk) -> None:
         ax.fill_between(100 * PHASE, *walk.support, color="#f1d9a7", alpha=0.6, lw=0)
     _line(ax, walk, walk.zmp)
     ax.plot(100 * PHASE, walk.com[0], color="#777777", lw=0.9, ls=(0, (1, 1.2)))
+
+
+FIGURES: dict[int, list[tuple[str, Draw]]] = {
+    6: [
+        ("CoM x against\nmean motion (cm)", lambda ax, walk: _line(ax, walk, 100 * walk.com_wave[0])),
+        ("CoM z about\nits mean (cm)", lambda ax, walk: _line(ax, walk, 100 * walk.com_wave[1])),
+    ],
+    7: [
+        ("ankle x (m)", lambda ax, walk: _path(ax, walk, "ankle", 0)),
+        ("ankle z (m)", lambda ax, walk: _path(ax, walk, "ankle", 1)),
+    ],
+    8: [
+        ("toe joint x (m)", lambda ax, walk: _path(ax, walk, "toe_joint", 0)),
+        ("toe joint z (m)", lambda ax, walk: _path(ax, walk, "toe_joint", 1)),
+    ],
+    9: [
+        ("fore-aft force (BW)", lambda ax, walk: _forces(ax, walk, 0)),
+        ("vertical force (BW)", lambda ax, walk: _forces(ax, walk, 1)),
+    ],
+    10: [("ZMP x (m)", _zmp)],
+}
+"""Number in the thesis -> rows: what is drawn, and how."""

@@ -1,22 +1,23 @@
 """docs/thesis.md and its pictures: the thesis as printed, corrected, and people.
 
-python -m springfoot.studies.thesis_page
+springfoot study thesis --page docs/thesis.md
 """
 
-import argparse
 import re
-import sys
 import textwrap
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from springfoot.agents.command_line import exit_code
+from springfoot.agents.files import write_atomically
 from springfoot.agents.markdown import table
 from springfoot.gait import thesis_schedule
 from springfoot.gait.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
 
-from .thesis_figures import PHASE, DrawnWalk, as_planned, as_printed, of_people, save_figures
+from .study import Answer, Progress, Study
+from .thesis_figures import FIGURES, PHASE, DrawnWalk, as_planned, as_printed, of_people, save_figure
 from .thesis_tables import BODY, STRIDE, THESIS_SPEED, cart_table, claims, corrected, moments, people_work, springs
 
 LINE_WIDTH = 130
@@ -48,10 +49,10 @@ def _head() -> str:
 
 D. W. Nam, *Numerical analysis of ZMP based biped walking model with different stiffness of ankle and toe joint*, DGIST
 2016. **As printed** is `springfoot.gait.thesis`: its via-points and formulas, faults included; names that its program
-never defines are read as `READINGS` there says. **Corrected** is `plan_walk(Body(), {THESIS_SPEED}, "thesis")`: the same body,
-step ({plan.step_length:.1f} m in {plan.step_time:.1f} s) and double support ({plan.double_support:.2f} s), and a CoM
-that obeys equation (1) over a ZMP under the feet. **People** are the mean curves of `human_gait({THESIS_SPEED})`. `python -m
-springfoot.studies.thesis_page` writes this page.
+never defines are read as `READINGS` there says. **Corrected** is `plan_walk(Body(), {THESIS_SPEED}, "thesis")`: the
+same body, step ({plan.step_length:.1f} m in {plan.step_time:.1f} s) and double support ({plan.double_support:.2f} s),
+and a CoM that obeys equation (1) over a ZMP under the feet. **People** are the mean curves of
+`human_gait({THESIS_SPEED})`. `springfoot study thesis --page docs/thesis.md` writes this page.
 
 All figures show the thesis's 0.75 s on one axis: from the other foot's heel strike (50 % of this foot's stride) over
 its own (100 %) into stance. Double support is grey, dots are via-points."""
@@ -132,8 +133,8 @@ def _figures(printed: DrawnWalk, plan: DrawnWalk, people: DrawnWalk) -> list[str
             f"""Yellow: feet on the ground; dotted: CoM. By equation (1) the printed ZMP is off the feet
             {100 * np.mean(outside != 0):.0f} % of the time, by up to {100 * outside.max():.0f} cm ahead of the toes
             ({PRINTED_TIMES[outside.argmax()]:.2f} s, heel strike) and {-100 * outside.min():.0f} cm behind the heel
-            ({PRINTED_TIMES[outside.argmin()]:.2f} s), each foot counted whole from heel strike to toe-off. The thesis saw it
-            follow the CoM "under the plantar": its program divides two rows by `/`, in MATLAB one least-squares
+            ({PRINTED_TIMES[outside.argmin()]:.2f} s), each foot counted whole from heel strike to toe-off. The thesis
+            saw it follow the CoM "under the plantar": its program divides two rows by `/`, in MATLAB one least-squares
             quotient and not a division at each time, and so gets the CoM moved by a constant ({behind:.0f} mm for the
             least-squares cubic). The plan's is inside at 10 000 samples of a step, by {margin:.1f} mm at least.
             (People's: centres of pressure of both feet, one subject's, weighed by their forces.)""",
@@ -172,21 +173,19 @@ def _references() -> str:
     return "## Claims of its references that can be tested here\n\n" + table(("claim", "test"), rows)
 
 
-def write(folder: Path) -> None:
-    """Writes thesis.md and thesis/figure-6.png ... figure-10.png into `folder`."""
-    (folder / "thesis").mkdir(parents=True, exist_ok=True)
-    text = page()
-    save_figures(folder / "thesis", walks())
-    (folder / "thesis.md").write_text(text, encoding="utf-8")
+@dataclass(frozen=True, kw_only=True)
+class Thesis(Study):
+    """The thesis as printed, corrected, and people: a page of text, tables and figures, every number computed.
 
+    `--page docs/thesis.md` writes the whole page, not a section of one, and its pictures into a folder beside it.
+    """
 
-def main() -> int:
-    """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m springfoot.studies.thesis_page", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of thesis.md (default: docs)")
-    out: Path = parser.parse_args().out
-    return exit_code("thesis_page", lambda: write(out))
+    def ask(self, progress: Progress) -> Answer:
+        """Compute the page."""
+        drawn, text = walks(), page()
+        files = {f"thesis/figure-{number}.png": partial(save_figure, number, drawn) for number in FIGURES}
+        return Answer(text=text, files={"thesis.md": text} | files)
 
-
-if __name__ == "__main__":
-    sys.exit(main())
+    def write_page(self, page: Path, answer: Answer) -> None:
+        """Write the whole page."""
+        write_atomically(page, answer.text.encode())

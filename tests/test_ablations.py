@@ -1,7 +1,6 @@
 """Ablations: rows that differ from the preset in their flags alone, a study that may be stopped, and its pages."""
 
 import json
-import sys
 from dataclasses import replace
 
 import pytest
@@ -13,13 +12,13 @@ from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.envs.timing import ACTION_STEP
 from springfoot.evaluation.recording import record
 from springfoot.studies import ablations
+from springfoot.studies.command import study_main
 
 SHORT = ("--episodes", "1", "--seconds", "0.5", "--threads", "1")
 
 
-def main(monkeypatch, *words):
-    monkeypatch.setattr(sys, "argv", ["ablations", *map(str, words)])
-    return ablations.main()
+def main(*words):
+    return study_main(["ablations", *map(str, words)])
 
 
 def test_every_row_differs_from_the_preset_in_its_flags_and_walks_as_long():
@@ -51,26 +50,28 @@ def test_what_is_finished_is_kept_what_is_not_begins_anew_and_the_page_is_made_o
         num_envs=8, update_steps=512, eval_interval=512, eval_episodes=2, environment=BipedSettings(episode_seconds=0.5)
     )
     monkeypatch.setitem(ablations.PRESETS, "walk", quick)
-    out, page, readme = tmp_path / "out", tmp_path / "page.md", tmp_path / "readme.md"
-    folder = out / "25hz" / "seed-0"
+    runs, page = tmp_path / "runs", tmp_path / "page.md"
+    folder = runs / "25hz" / "seed-0"
     folder.mkdir(parents=True)
     (folder / RUN).write_text(json.dumps({"status": "running"}))
     (folder / "half").touch()
-    words = ["--out", out, "--seeds", 1, "--only", "25hz", "--timesteps", 512, *SHORT]
-    assert main(monkeypatch, *words, "--page", page, "--readme", readme) == 0
+    words = ["--runs", runs, "--seeds", 1, "--only", "25hz", "--timesteps", 512, *SHORT]
+    assert main(*words, "--page", page, "--out", tmp_path / "one") == 0
     assert not (folder / "half").exists()
     done = json.loads((folder / RUN).read_text())
     assert done["status"] == "finished" and done["timesteps"] == 256  # as long a walk, in steps twice as long
-    written = page.read_bytes(), readme.read_bytes()
-    assert b"K decided at 25 Hz" in written[0] and b"thesis lines" in written[1]
+    written = page.read_text().replace("/one", ""), (tmp_path / "one" / "ablations.csv").read_bytes()
+    assert "K decided at 25 Hz" in written[0] and "thesis lines" in written[0]
+    assert written[1].startswith(b"table,row,seed,undisturbed_falls,pushed_falls,")
 
     page.unlink()
-    assert main(monkeypatch, *words, "--page", page, "--readme", readme) == 0
-    assert (page.read_bytes(), readme.read_bytes()) == written
+    assert main(*words, "--page", page, "--out", tmp_path / "two") == 0
+    again = page.read_text().replace("/two", ""), (tmp_path / "two" / "ablations.csv").read_bytes()
+    assert again == written
     assert json.loads((folder / RUN).read_text()) == done
     capsys.readouterr()
     words[words.index("--timesteps") + 1] = 1024
-    assert main(monkeypatch, *words) == 2
+    assert main(*words) == 2
     assert "was trained with other settings" in capsys.readouterr().err
 
 
@@ -82,11 +83,11 @@ def test_what_is_finished_is_kept_what_is_not_begins_anew_and_the_page_is_made_o
         (["--seconds", -1], "seconds"),
     ],
 )
-def test_bad_input_is_one_line_and_nothing_on_disk(monkeypatch, capsys, tmp_path, words, message):
-    assert main(monkeypatch, "--out", tmp_path / "out", *words) == 2
+def test_bad_input_is_one_line_and_nothing_on_disk(capsys, tmp_path, words, message):
+    assert main("--runs", tmp_path / "runs", "--out", tmp_path / "out", *words) == 2
     error = capsys.readouterr().err
     assert message in error and error.count("\n") == 1
-    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_table_has_mean_and_spread_over_seeds_and_people_beside_them():

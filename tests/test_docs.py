@@ -13,17 +13,39 @@ import tyro
 from springfoot.agents.train_command import TrainFlags
 from springfoot.evaluation.evaluate_command import EvaluateFlags
 from springfoot.gait import human_gait
-from springfoot.studies import comparison as studies
+from springfoot.studies.command import STUDIES, main, study_class
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-COMMANDS = re.findall(
-    r"(?:^|`)python (train\.py|evaluate\.py|-m springfoot\.studies\.comparison) ([^`#\n…]*)(?=[`#\n])",
-    README,
-    re.MULTILINE,
-)
+PREFIXES = ("python ", "make ", "springfoot ")
+
+
+def commands_in(text):
+    """Every command in a page: each line of a block of shell, and each `code` that begins like one."""
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    lines = [line.partition("#")[0] for block in blocks for line in block.splitlines()]
+    prose = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    lines += [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", prose)]
+    return [line.strip() for line in lines if line.startswith(PREFIXES)]
+
+
+MAKE_HELP = re.findall(r'@echo "(make [\w-]+)', (ROOT / "Makefile").read_text(encoding="utf-8"))
+COMMANDS = sorted({*(line for page in PAGES for line in commands_in(page.read_text(encoding="utf-8"))), *MAKE_HELP})
+
+
+def program_of(command):
+    """The program of a command, as words, and what is told it."""
+    words = shlex.split(command)
+    if words[0] == "python" and words[1] in ("train.py", "evaluate.py"):
+        words = ["springfoot", words[1].removesuffix(".py"), *words[2:]]
+    several = words[:2] in (["python", "-m"], ["springfoot", "study"])
+    size = 3 if several and words[2:] and words[2] not in ("--help", "NAME") else 2
+    return tuple(words[:size]), words[size:]
+
+
+PROGRAMS = sorted({program_of(command)[0] for command in COMMANDS})
 
 
 @pytest.fixture
@@ -44,18 +66,47 @@ def test_links_lead_somewhere(page):
 
 
 def test_readme_examples_run_in_their_order(folder):
-    code = "\n".join(BLOCKS).replace("range(500)", "range(50)").replace("episodes=4", "episodes=1")
+    code = (
+        "\n".join(BLOCKS)
+        .replace("1_000_000", "64")
+        .replace("SegmentedFootBipedVecEnv(64", "SegmentedFootBipedVecEnv(2")
+    )
+    code = code.replace("n_steps=128, batch_size=1024", "n_steps=8, batch_size=16").replace("range(500)", "range(50)")
     assert len(BLOCKS) == 5
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
 
 
-def test_readme_commands_are_understood(folder):
-    programs = {
-        "train.py": TrainFlags,
-        "evaluate.py": EvaluateFlags,
-        "-m springfoot.studies.comparison": studies.BestConstant | studies.Compare | studies.Seeds | studies.Bodies,
-    }
-    assert {program for program, _ in COMMANDS} <= set(programs)
-    for program, words in COMMANDS:
-        tyro.cli(programs[program], args=shlex.split(words.replace("TBD", "1")))  # exits where it does not understand
+def test_the_documents_name_the_commands_there_are():
+    assert {("springfoot", "train"), ("springfoot", "evaluate"), ("make", "test"), ("make", "walk")} <= set(PROGRAMS)
+    named = {program[2] for program in PROGRAMS if program[:2] == ("springfoot", "study") and program[2:]}
+    assert named == set(STUDIES)
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=" ".join)
+def test_every_program_that_a_document_names_answers_help(program, capsys):
+    if program[0] == "make":
+        done = subprocess.run(["make", "--dry-run", "--always-make", *program[1:]], cwd=ROOT, capture_output=True)
+        assert done.returncode == 0, done.stderr
+    elif program[:2] == ("python", "-m"):
+        done = subprocess.run([sys.executable, *program[1:], "--help"], cwd=ROOT, capture_output=True)
+        assert done.returncode == 0 and done.stdout, done.stderr
+    elif program[0] == "python":
+        assert (ROOT / program[1]).is_file()  # test_examples.py runs it
+    else:
+        try:
+            code = main([*program[1:], "--help"])
+        except SystemExit as end:  # how tyro ends
+            code = end.code
+        assert code == 0 and "usage: springfoot" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS if "…" not in command])
+def test_every_command_that_a_document_names_is_understood(command):
+    program, words = program_of(command)
+    if program[:2] == ("springfoot", "study") and program[2:]:
+        tyro.cli(study_class(program[2]), args=words)  # exits where it does not understand
+    elif program[0] == "springfoot" and program[1] != "study" and words:
+        tyro.cli({"train": TrainFlags, "evaluate": EvaluateFlags}[program[1]], args=words)
+    else:
+        assert program[0] != "springfoot" or words in ([], ["--help"], ["NAME"])

@@ -1,7 +1,6 @@
 """Any stiffness with its rebuilt equilibrium gives the gait's torque, and walks."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from springfoot.envs.physics.model import damping_times
 from springfoot.evaluation.recording import prepare, record
 from springfoot.gait import SpringfootError
 from springfoot.studies import identifiability as identified
+from springfoot.studies.command import study_main
 from springfoot.studies.identifiability import (
     PHASE_SEGMENTS,
     STARTS,
@@ -85,17 +85,18 @@ def test_a_flat_stiffness_walks_the_same_gait_without_work_of_its_own(walked):
         assert theirs["speed_m_s"]["mean"] == pytest.approx(ours["speed_m_s"]["mean"], abs=speed)
 
 
-def test_the_command_writes_table_and_schedules(monkeypatch, capsys, tmp_path):
+def test_the_command_writes_table_and_schedules(capsys, tmp_path):
     words = ["schedule", "--stiffness", "times:0.9", "--episodes", "1", "--seconds", "5", "--threads", "1"]
     page = tmp_path / "results.md"
     page.write_text("# Results\n\n<!-- ANY-K BEGIN -->\nold\n<!-- ANY-K END -->\n\nMore.\n")
-    words += ["--page", str(page), "--schedules", str(tmp_path / "springs")]
-    monkeypatch.setattr(sys, "argv", ["identified", *words])
-    assert identified.main() == 0
+    words += ["--page", str(page), "--out", str(tmp_path / "springs")]
+    assert study_main(["any-stiffness", *words]) == 0
     assert "| `times:0.9` | 0 of 1 |" in capsys.readouterr().out
     text = page.read_text()
     assert text.startswith("# Results\n\n<!-- ANY-K BEGIN -->\n| K |") and text.endswith("END -->\n\nMore.\n")
     assert "old" not in text
+    numbers = (tmp_path / "springs" / "stiffness.csv").read_text().splitlines()
+    assert numbers[0].startswith("stiffness,condition,work_by_stiffness_J_kg,") and len(numbers) == 1 + 2 * 3
     _, settings = prepare(
         "schedule",
         {"equilibrium": "phase", "schedule": json.loads((tmp_path / "springs/times-0.9.json").read_text())},

@@ -1,12 +1,11 @@
 """Learning curves: when a run stopped falling, and the command."""
 
 import dataclasses
-import sys
 
 from springfoot.agents.config import TrainingConfig
 from springfoot.agents.training import train
 from springfoot.envs.settings import BipedSettings
-from springfoot.studies import learning_curves
+from springfoot.studies.command import study_main
 from springfoot.studies.learning_curves import first_without_falls
 
 
@@ -17,7 +16,7 @@ def test_the_last_fall_counts():
     assert first_without_falls(entries[:3]) is None
 
 
-def test_the_command_draws_and_judges_a_run(tmp_path, monkeypatch, capsys):
+def test_the_command_draws_and_judges_a_run(tmp_path, capsys):
     config = TrainingConfig(
         timesteps=64,
         num_envs=2,
@@ -29,12 +28,14 @@ def test_the_command_draws_and_judges_a_run(tmp_path, monkeypatch, capsys):
         environment=BipedSettings(episode_seconds=0.2),
     )
     train(dataclasses.replace(config, threads=1), tmp_path / "run")
-    monkeypatch.setattr(sys, "argv", ["learning_curves", str(tmp_path / "run"), "--out", str(tmp_path / "l.png")])
-    assert learning_curves.main() == 0
-    assert (tmp_path / "l.png").read_bytes().startswith(b"\x89PNG")
+    words = ["learning-curves", str(tmp_path / "run"), "--threads", "1"]
+    assert study_main([*words, "--out", str(tmp_path / "out"), "--page", str(tmp_path / "learning.md")]) == 0
+    assert (tmp_path / "out" / "learning.png").read_bytes() == (tmp_path / "learning.png").read_bytes()
+    assert (tmp_path / "learning.png").read_bytes().startswith(b"\x89PNG")
     row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("| run |") and "64" in line)
-    assert "speed off by" in row
+    assert "speed off by" in row and row in (tmp_path / "learning.md").read_text()
+    evaluations = (tmp_path / "out" / "evaluations.csv").read_text().splitlines()
+    assert evaluations[0] == "run,timesteps,seconds,return_mean,falls" and len(evaluations) == 4
 
-    monkeypatch.setattr(sys, "argv", ["learning_curves", str(tmp_path / "none")])
-    assert learning_curves.main() == 2
+    assert study_main(["learning-curves", str(tmp_path / "none")]) == 2
     assert "none holds no run.json" in capsys.readouterr().err

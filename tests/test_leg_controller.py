@@ -22,7 +22,7 @@ def test_every_set_of_constants_says_what_found_it():
     assert set(table["found_by"]) == set(table["constants"])
     for equilibrium, cadence in (("planned", "people"), ("planned", "thesis"), ("neutral", "people")):
         name = constants_name(equilibrium, cadence)
-        assert table["found_by"][name].startswith("python -m springfoot.studies.leg_tuning")
+        assert table["found_by"][name].startswith("springfoot study leg-tuning")
 
 
 def test_angle_and_phase_share_the_planned_constants():

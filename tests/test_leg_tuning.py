@@ -1,7 +1,7 @@
 """The search for leg constants: its units, what it pays for, and what it writes."""
 
+import csv
 import json
-import sys
 from dataclasses import asdict, replace
 from importlib import resources
 from math import exp
@@ -11,7 +11,9 @@ import pytest
 
 from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.settings import BipedSettings
+from springfoot.studies import leg_cost
 from springfoot.studies import leg_tuning as tuning
+from springfoot.studies.command import study_main
 
 COMMITTED = leg_constants("planned", "people")
 
@@ -36,25 +38,27 @@ def test_the_search_begins_at_its_start_and_steps_in_the_constants_own_units():
 def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_legs_that_fall():
     farther = replace(COMMITTED, hip_knots_deg=tuple(1.5 + knot for knot in COMMITTED.hip_knots_deg))
     limp = replace(COMMITTED, hip_stiffness=(20.0, 20.0), knee_stiffness=(20.0, 20.0))
-    settings = BipedSettings(episode_seconds=tuning.SECONDS + 1)
-    paid = tuning.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=150.0, ease=0.0)
+    settings = BipedSettings(episode_seconds=leg_cost.SECONDS + 1)
+    paid = leg_cost.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=150.0, ease=0.0)
     assert paid[1] < paid[2] < paid[0]
 
 
-def run(monkeypatch, *words):
-    monkeypatch.setattr(sys, "argv", ["tuning", *map(str, words)])
-    return tuning.main()
+def run(*words):
+    return study_main(["leg-tuning", *map(str, words)])
 
 
-def test_a_search_writes_its_constants_and_its_command_and_leaves_the_others_alone(monkeypatch, constants):
+def test_a_search_writes_its_constants_and_its_command_and_leaves_the_others_alone(constants):
     before = json.loads(constants.read_text())
-    words = ["--generations", "1", "--population", "4", "--threads", "1", "--out", constants]
-    assert run(monkeypatch, *words) == 0
+    words = ["--generations", "1", "--population", "4", "--threads", "1", "--constants", constants]
+    words += ["--out", constants.parent / "out"]
+    assert run(*words) == 0
     after = json.loads(constants.read_text())
     found = after["constants"].pop("planned")
     assert found != before["constants"].pop("planned") and set(found) == set(asdict(COMMITTED))
     assert after["constants"] == before["constants"]
-    assert after["found_by"]["planned"] == " ".join(["python -m springfoot.studies.leg_tuning", *map(str, words)])
+    assert after["found_by"]["planned"] == " ".join(["springfoot study leg-tuning", *map(str, words)])
+    (row,) = csv.DictReader((constants.parent / "out" / "generations.csv").read_text().splitlines())
+    assert row["generation"] == "1" and float(row["best"]) <= float(row["median"])
 
 
 @pytest.mark.parametrize(
@@ -65,15 +69,21 @@ def test_a_search_writes_its_constants_and_its_command_and_leaves_the_others_alo
         (["--generations", "0"], "generations must be"),
         (["--sigma", "nan"], "sigma must be"),
         (["--push-newton", "-1"], "push_newton must be"),
-        (["--out", "nowhere.json"], "nowhere.json"),
-        (["--out", "foreign.json"], "not a file of leg constants"),
+        (["--constants", "nowhere.json"], "nowhere.json"),
+        (["--constants", "foreign.json"], "not a file of leg constants"),
     ],
 )
 def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, capsys, tmp_path, constants, words, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "foreign.json").write_text("[1]")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert run(monkeypatch, "--out", "legs.json", "--population", "2", *words) == 2
+    assert run("--constants", "legs.json", "--population", "2", *words) == 2
     out, error = capsys.readouterr()
     assert said in error and error.count("\n") == 1 and not out
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_quick_search_writes_no_constants(constants, capsys):
+    before = constants.read_text()
+    assert run("--quick", "--generations", "150", "--constants", constants, "--out", constants.parent / "out") == 0
+    assert constants.read_text() == before and "these figures mean nothing" in capsys.readouterr().out

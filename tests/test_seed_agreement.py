@@ -1,6 +1,6 @@
 """Agreement of policies: judged where the joint carries load, and the command's tables."""
 
-import sys
+import shlex
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 from springfoot.evaluation.metrics import Gait
 from springfoot.gait import SpringfootError
 from springfoot.studies import seed_agreement as agreement
+from springfoot.studies.command import study_main
 from springfoot.studies.seed_agreement import Agreement
 
 
@@ -36,19 +37,22 @@ def test_one_policy_or_one_that_walks_not_is_refused():
         agreement.agreements([Gait(metrics={"policy": "nobody"})] * 2)
 
 
-def test_the_command_prints_both_tables_and_writes_picture_and_curves(monkeypatch, capsys, tmp_path):
+def test_the_command_prints_both_tables_and_writes_picture_and_curves(capsys, tmp_path):
     words = ["schedule", "constant:250,30", "--episodes", "1", "--seconds", "6", "--threads", "1"]
-    words += ["--out", str(tmp_path / "a.png"), "--page", str(tmp_path / "results.md")]
-    monkeypatch.setattr(sys, "argv", ["agreement", *words])
-    assert agreement.main() == 0
+    words += ["--out", str(tmp_path / "a"), "--page", str(tmp_path / "results.md")]
+    assert study_main(["agreement", *words]) == 0
     out = capsys.readouterr().out
     assert "**do not agree**" in next(line for line in out.splitlines() if line.startswith("| ankle |"))
     *limits, missed = [line.split(" | ")[3:] for line in out.split("\n\n")[1].splitlines()[2:]]
     for column, count in enumerate(missed):  # in bold what the row `missed` counts
         assert sum("**" in row[column] for row in limits) == int(count.strip(" |")) > 0
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    assert out.strip() in (tmp_path / "results.md").read_text()
-    header, *rows = (tmp_path / "a.csv").read_text().splitlines()
+    assert (tmp_path / "a" / "agreement.png").read_bytes().startswith(b"\x89PNG")
+    tables, results = out.strip().rsplit("\n\n", 1)
+    assert tables in (tmp_path / "results.md").read_text()
+    assert results == f"Results: {tmp_path / 'a'} (agreement.csv, policies.csv, agreement.png)"
+    assert f"Made by `springfoot study agreement {shlex.join(words)}`." in (tmp_path / "results.md").read_text()
+    assert (tmp_path / "agreement.png").exists()
+    header, *rows = (tmp_path / "a" / "agreement.csv").read_text().splitlines()
     column = header.split(",").index("ankle_stiffness_Nm_per_rad")
     values = np.array([row.split(",") for row in rows], float)
     assert len(rows) == 101 and 100 < values[:, column].mean() < 300

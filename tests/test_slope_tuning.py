@@ -1,7 +1,6 @@
 """The search for what a slope adds: nothing on level ground, what it pays for, and what it writes."""
 
 import json
-import sys
 from dataclasses import replace
 from importlib import resources
 
@@ -13,6 +12,7 @@ from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.settings import BipedSettings
 from springfoot.studies import slope_tuning as slopes
+from springfoot.studies.command import study_main
 
 COMMITTED = slope_constants()
 LARGE = slopes.constants_of(np.arange(10.0))
@@ -26,9 +26,8 @@ def constants(tmp_path):
     return path
 
 
-def run(monkeypatch, *words):
-    monkeypatch.setattr(sys, "argv", ["slopes", "--threads", "1", *map(str, words)])
-    return slopes.main()
+def run(*words):
+    return study_main(["slope-tuning", "--threads", "1", *map(str, words)])
 
 
 def test_the_numbers_add_nothing_where_the_ground_is_level_even_beside_a_slope():
@@ -66,21 +65,20 @@ def test_the_committed_numbers_pay_less_than_none():
 def test_better_numbers_are_written_with_their_command_and_worse_ones_are_not(monkeypatch, capsys, constants):
     monkeypatch.setattr(slopes, "JUDGED_WALKS", 1)
     monkeypatch.setattr(slopes, "JUDGED_SECONDS", 3.0)
+    monkeypatch.chdir(constants.parent)  # where the results go
     before = constants.read_text()
-    assert run(monkeypatch, "--generations", "0", "--out", constants) == 0
+    assert run("--generations", "0", "--constants", constants) == 0
     assert constants.read_text() == before and "wrote nothing" in capsys.readouterr().out
     poor = replace(COMMITTED, hip=(-1.0, 0.0, 0.0))  # leans the thigh the wrong way: falls at 5 deg
     table = json.loads(before)
     table["slope"]["constants"] = vars(poor)
     constants.write_text(json.dumps(table))
     words = ["--generations", "3", "--population", "6", "--walks", "1", "--seconds", "2.5", "--sigma", "0.4"]
-    assert run(monkeypatch, *words, "--out", constants) == 0
+    assert run(*words, "--constants", constants) == 0
     after, said = json.loads(constants.read_text()), capsys.readouterr().out
     assert "wrote what it found" in said
     assert after["constants"] == table["constants"] and after["slope"]["constants"] != table["slope"]["constants"]
-    assert after["slope"]["found_by"].startswith(
-        "python -m springfoot.studies.slope_tuning --threads 1 --generations 3"
-    )
+    assert after["slope"]["found_by"].startswith("springfoot study slope-tuning --threads 1 --generations 3")
 
 
 @pytest.mark.parametrize(
@@ -91,10 +89,10 @@ def test_better_numbers_are_written_with_their_command_and_worse_ones_are_not(mo
         (["--sigma", "0"], "sigma must be"),
         (["--seconds", "nan"], "seconds must be"),
         (["--seconds", "2"], "seconds must be"),
-        (["--out", "nowhere.json"], "nowhere.json"),
-        (["--out", "foreign.json"], "not a file of leg constants"),
-        (["--out", "level.json"], "no constants for slopes"),
-        (["--out", "short.json"], "no constants for slopes"),
+        (["--constants", "nowhere.json"], "nowhere.json"),
+        (["--constants", "foreign.json"], "not a file of leg constants"),
+        (["--constants", "level.json"], "no constants for slopes"),
+        (["--constants", "short.json"], "no constants for slopes"),
     ],
 )
 def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, capsys, tmp_path, constants, words, said):
@@ -103,7 +101,7 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, caps
     (tmp_path / "level.json").write_text('{"constants": {}}')
     (tmp_path / "short.json").write_text('{"constants": {}, "slope": {"constants": {"hip": [1, 2]}}}')
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert run(monkeypatch, "--out", "legs.json", *words) == 2
+    assert run("--constants", "legs.json", *words) == 2
     out, error = capsys.readouterr()
     assert said in error and error.count("\n") == 1 and not out
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -1,6 +1,6 @@
 """The trade-off: the measure of stiffness is the reward's, the knee is found, finished trainings are kept."""
 
-import sys
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.evaluation.recording import prepare, record
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.studies import stiffness_cost as tradeoff
+from springfoot.studies.command import study_main
 from springfoot.studies.stiffness_cost import config_of, folder_of, knee, stiffness_cost
 
 
@@ -47,24 +48,26 @@ def test_the_command_trains_what_is_missing_draws_and_keeps_what_is_finished(mon
 
     def main(*words):
         short = ["--seeds", "1", "--timesteps", "512", "--episodes", "1", "--seconds", "6", "--pushes", "150"]
-        files = ["--out", str(tmp_path / "runs"), "--figure", str(tmp_path / "t.png")]
-        monkeypatch.setattr(sys, "argv", ["tradeoff", "--weights", "0.4", "0", *short, *files, *words])
-        code = tradeoff.main()
+        files = ["--runs", str(tmp_path / "runs"), "--out", str(out)]
+        code = study_main(["stiffness-cost", "--weights", "0.4", "0", *short, *files, *words])
+        shutil.rmtree(tmp_path / "before", ignore_errors=True)
+        if out.exists():
+            out.rename(tmp_path / "before")
         return code, *capfd.readouterr()
 
-    code, out, error = main()
+    out = tmp_path / "out"
+    code, said, error = main()
     assert code == 0 and "stiffness 0.4, seed 0: " in error
-    assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "before" / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
     best = folder_of(tmp_path / "runs", "stiffness", 0.4, 0) / "best.safetensors"
     written = best.stat().st_mtime_ns
-    assert main()[:2] == (0, out) and best.stat().st_mtime_ns == written
+    assert main()[:2] == (0, said) and best.stat().st_mtime_ns == written
     code, _, error = main("--timesteps", "1024")
     assert code == 2 and "trained with other settings" in error
     code, _, error = main("--no-train", "--term", "stiffness_rate")
     assert code == 2 and "no finished training of stiffness_rate" in error
 
 
-def test_a_bad_weight_is_refused_before_anything_is_trained(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(sys, "argv", ["tradeoff", "--weights", "-0.1", "--out", str(tmp_path / "runs")])
-    assert tradeoff.main() == 2
+def test_a_bad_weight_is_refused_before_anything_is_trained(capsys, tmp_path):
+    assert study_main(["stiffness-cost", "--weights", "-0.1", "--runs", str(tmp_path / "runs")]) == 2
     assert "must be a finite number <= 0" in capsys.readouterr().err and not (tmp_path / "runs").exists()

@@ -1,7 +1,6 @@
 """docs/thesis.md is what its command writes, and its pictures are there."""
 
 import re
-import sys
 from decimal import Decimal
 from functools import cache
 from pathlib import Path
@@ -9,8 +8,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from springfoot.studies.thesis_figures import save_figures
-from springfoot.studies.thesis_page import main, page, walks
+from springfoot.studies.command import study_main
+from springfoot.studies.thesis_page import page, walks
 
 DOCS = Path(__file__).parents[1] / "docs"
 NUMBER = re.compile(r"[−+]?\d+(?:\.\d+)?")
@@ -45,9 +44,11 @@ def test_page_shows_each_picture_once_and_they_are_light():
 
 
 def test_pictures_are_written(tmp_path):
-    save_figures(tmp_path, walks())
+    assert study_main(["thesis", "--out", str(tmp_path / "out"), "--page", str(tmp_path / "thesis.md")]) == 0
+    assert (tmp_path / "thesis.md").read_bytes() == (tmp_path / "out" / "thesis.md").read_bytes()
     for name in FIGURES:
-        with Image.open(tmp_path / name) as new, Image.open(DOCS / "thesis" / name) as committed:
+        assert (tmp_path / "thesis" / name).read_bytes() == (tmp_path / "out" / "thesis" / name).read_bytes()
+        with Image.open(tmp_path / "thesis" / name) as new, Image.open(DOCS / "thesis" / name) as committed:
             assert new.size == committed.size and len(new.getcolors() or ()) > 8  # more than an empty sheet
 
 
@@ -60,10 +61,11 @@ def test_walks_share_one_frame():
         assert walk.com[0][500] - walk.com[0][0] == pytest.approx(walk.step_length, abs=1e-6)
 
 
-def test_bad_folder_is_one_line_and_nothing_half_written(tmp_path, monkeypatch, capsys):
+def test_bad_folder_is_one_line_and_nothing_half_written(tmp_path, capsys):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(sys, "argv", ["thesis_page", "--out", str(tmp_path / "file")])
-    assert main() == 2
-    error = capsys.readouterr().err
-    assert error.startswith("thesis_page: error:") and error.count("\n") == 1
+    assert study_main(["thesis", "--out", str(tmp_path / "file")]) == 2
+    assert study_main(["thesis", "--page", str(tmp_path / "nowhere" / "thesis.md")]) == 2
+    first, error = capsys.readouterr().err.splitlines(keepends=True)
+    assert "file exists already" in first and "no folder" in error
+    assert error.startswith("springfoot study thesis: error:") and error.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

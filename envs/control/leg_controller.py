@@ -2,8 +2,8 @@
 
 Each hip and knee is a spring like the ankle (variable impedance) around people's curves at the walking speed, with
 people's moments fed forward; the stance hip also holds the trunk and the speed, and touchdown resets the phase. The
-constants of `legs.json` were found by `python -m springfoot.studies.leg_tuning`, those for slopes by
-`python -m springfoot.studies.slope_tuning` (command and seed stand in that file).
+constants of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by
+`springfoot study slope-tuning` (command and seed stand in that file).
 Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
 """
 

@@ -37,7 +37,7 @@ def best_constant(
     threads: int = 2,
     progress: Progress = lambda candidates: None,
 ) -> tuple[tuple[float, float], dict[tuple[float, float], NDArray]]:
-    """The constant ankle and toe stiffness of the highest mean return in `settings`; of each pair its returns (episodes,).
+    """The constant ankle and toe stiffness of the highest mean return in `settings`, and the returns of all tried.
 
     A log `grid` over the settings' ranges, then `refinements` around the best; all candidates walk the same episodes.
     Stiffness [N m/rad] is for 1.70 m and 63 kg. The return of the best of many is optimistic: judge it on other seeds.
