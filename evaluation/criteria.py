@@ -41,7 +41,7 @@ class Criterion:
         return value is not None and self.low <= value <= self.high
 
     def loosened(self) -> "Criterion":
-        """With either end farther out by `LOOSENED_BY` of itself, or by `LOOSENED_R_BY`; as it is where neither is meant."""
+        """With either end farther out by `LOOSENED_BY` of itself, or by `LOOSENED_R_BY`, as `loosen` says."""
         if self.loosen == "share":
             return replace(
                 self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)

@@ -103,5 +103,5 @@ class Conditions(WalkingStudy):
         policy, settings = prepare(
             flags.policy, {"episode_seconds": flags.seconds} | given(flags.environment), flags.seed
         )
-        how = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
+        how: dict[str, Any] = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
         return measure(record(policy, settings, name=flags.policy, progress=progress, **how)).metrics

@@ -11,8 +11,8 @@ from springfoot.agents.baselines import BASELINES, constant
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.evaluation.recording import prepare, record
 from springfoot.studies import comparison, quantities
-from springfoot.studies.constant_search import best_constant
 from springfoot.studies.command import study_main
+from springfoot.studies.constant_search import best_constant
 from springfoot.studies.seeds import seeds_table
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}

@@ -90,6 +90,27 @@ def test_a_room_works_without_the_floors_above(room, absent):
     assert not absent & set(loaded)
 
 
+def test_evaluating_and_the_studies_that_train_nothing_need_no_learner():
+    names = ("compare", "best-constant", "seeds", "bodies", "criteria", "conditions", "agreement", "any-stiffness")
+    code = f"""
+import sys
+from springfoot.studies.command import main, study_class
+assert main(["--help"]) == main(["study", "--help"]) == 0
+assert not {{"numpy", "mujoco", "tyro"}} & set(sys.modules)
+for name in {(*names, "learning-curves", "thesis")}:
+    study_class(name)
+try:
+    main(["evaluate", "--help"])
+except SystemExit:
+    print(*sys.modules)
+"""
+    loaded = run(code).splitlines()[-1].split()
+    extra = {Requirement(line).name for line in PROJECT["project"]["optional-dependencies"]["train"]}
+    learner = {"stable_baselines3", *(extra - {"springfoot", "stable-baselines3"})}
+    assert "springfoot.evaluation.evaluate_command" in loaded
+    assert not learner & set(loaded)
+
+
 SOURCES = [path for path in files(*ROOMS, "examples", "benchmarks") if path.suffix == ".py"] + [
     path.relative_to(ROOT) for path in sorted(ROOT.glob("*.py"))
 ]
