@@ -97,7 +97,7 @@ def optional_flags(
     for item_name, kind in hints.items():
         if item_name not in leave_out:
             annotation = _optional_flag(item_name, kind, help_of[item_name], getattr(defaults, item_name))
-            themed.get(metadata[item_name].get("theme"), flags).append((item_name, annotation, None))
+            themed.get(metadata[item_name].get("theme", ""), flags).append((item_name, annotation, None))
     for theme, inside in themed.items():
         if inside:
             group = _flags_class(f"{name}{theme.title()}", inside, themes[theme])

@@ -99,9 +99,9 @@ JOINT_ROWS: dict[str, tuple[str, tuple[str, ...], float]] = {
     **{
         f"{title} x {factor:g}": (constant, joints, factor)
         for title, constant, joints, factors in (
-            ("beta of hip and knee", "DAMPING_TIME", LEGS, (0.5, 1.5)),
-            ("beta of ankle and toe", "DAMPING_TIME", FEET, (0.5, 1.5)),
-            ("torque limits", "TORQUE_LIMIT", JOINTS, (0.5, 0.75, 1.5)),
+            ("beta of hip and knee", "DAMPING_TIME", LEGS, (0.0, 0.5, 1.5)),
+            ("beta of ankle and toe", "DAMPING_TIME", FEET, (0.0, 0.5, 1.5)),
+            ("torque limits", "TORQUE_LIMIT", JOINTS, (0.25, 0.5, 1.5)),
             ("armature", "ARMATURE", JOINTS, (0.0, 0.5, 1.5)),
             ("joint damping", "PASSIVE_DAMPING", JOINTS, (0.0, 0.5, 1.5)),
         )

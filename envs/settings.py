@@ -50,7 +50,7 @@ MOST_UNEVENNESS = 0.03
 MOST_SENSOR_NOISE = 0.1
 """Largest standard deviation of sensor noise, in units of the observation [-]; chosen."""
 LONGEST_DELAY = 0.04
-"""Longest delay of a stiffness behind its command [s]: with more the fixed schedule falls (docs/design.md)."""
+"""Longest delay of a stiffness behind its command [s]; chosen, two steps of 20 ms."""
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,

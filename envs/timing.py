@@ -3,10 +3,11 @@
 PHYSICS_STEP = 0.002
 """Physics step [s], the same for every body: half the cost of 1 ms, and the same gait (docs/physics.md)."""
 CONTROL_WINDOW = 0.01
-"""Control window [s]: controls are held and forces averaged over it."""
+"""Control window [s]: controls are held and forces averaged over it; chosen."""
 ACTION_STEP = 0.02
-"""Time between two actions [s] by default: stiffness is decided at 50 Hz, and a delay of 40 ms falls (docs/physics.md).
-Rewards and the discount of training are told for this time, whatever a step lasts (`BipedSettings.step_seconds`)."""
+"""Time between two actions [s] by default: stiffness is decided at 50 Hz; chosen. Reward weights and the discount of
+training are given for this time, whatever a step lasts (`BipedSettings.step_seconds`)."""
 WINDOWS_PER_STEP = round(ACTION_STEP / CONTROL_WINDOW)
 """Control windows in one step of the default 20 ms."""
 PHYSICS_STEPS_PER_WINDOW = round(CONTROL_WINDOW / PHYSICS_STEP)
+"""Physics steps in one control window."""

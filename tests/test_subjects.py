@@ -268,8 +268,8 @@ def test_nothing_jumps_as_the_speed_changes():
     subjects = Subjects(settings, tabulated_speeds(settings), 1)
     legs, task = LegController(table, subjects, incline), Task(settings, table, subjects)
     legs.reset(np.arange(1), phase[:, 0])
-    curves = [np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True)]
-    springs = FootSprings(settings, biped.body, *curves, subjects, incline)
+    rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
+    springs = FootSprings(settings, biped.body, rest, stiffness, subjects, incline)
     rows = []
     for speed in np.linspace(0.8, 1.6, 401):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -56,8 +57,9 @@ def test_help_groups_the_settings_by_theme_and_says_what_a_trained_policy_brings
     monkeypatch.setenv("COLUMNS", "100")
     with pytest.raises(SystemExit):
         flagged("--help")
-    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    groups = dict(part.split(" options ", 1) for part in text.split("╭─ ")[1:] if " options " in part)
+    _, *parts = re.split(r"(\w+) options [-─╮]+", " ".join(capsys.readouterr().out.replace("│", " ").split()))
+    groups = dict(zip(parts[::2], parts[1::2], strict=True))
+    assert list(groups) == list(THEMES)
     for theme, says in THEMES.items():
         assert says in groups[theme]
         for name, its in THEME_OF.items():

@@ -1,4 +1,4 @@
-"""Which actions take effect, and when: at every step, or at gait events only; of ankle, toe or both."""
+"""Which actions take effect, and when: in every step or at gait events only; those of the ankle, the toe or both."""
 
 from math import isfinite
 
@@ -21,25 +21,25 @@ def gait_events(human: HumanGait) -> NDArray:
 
 
 class Decisions:
-    """Which actions take effect, and when, of N bodies.
+    """Decides which actions of N bodies take effect in a step.
 
-    Of `decisions="event"` the leg's phase tells the events: a touchdown starts it anew, so heel strike is the foot's
-    own, and one that bounces or slaps does not decide again; the others lie where people's do.
+    With `decisions="event"` events are read from the leg's phase. A touchdown sets the phase to 0, so the heel strike
+    is that of the foot itself, and a foot that bounces does not decide again. Other events lie at people's phases.
     """
 
     def __init__(self, settings: BipedSettings, human: HumanGait, num: int):
         self._events = gait_events(human) if settings.decisions == "event" else np.empty(0)
         self._decided = np.array([settings.stiffness_joints in ("both", joint) for joint in ("ankle", "toe")])
-        self._stage = np.full((num, 2), -1)  # events since heel strike when each leg's stiffness was decided last
+        self._stage = np.full((num, 2), -1)  # number of events since heel strike when each leg decided last
 
     def reset(self, ids: NDArray) -> None:
-        """Of `ids`, the next actions take effect whatever the phase."""
+        """Let the next actions of bodies `ids` (K,) take effect whatever the phase."""
         self._stage[ids] = -1
 
     def take(self, action: NDArray, last_action: NDArray, leg_phase: NDArray, running: NDArray) -> bool:
-        """Clip `action` (N, 4) to [-1, 1] in place, and hold `last_action` of legs at no event and bodies not running.
+        """Clip `action` (N, 4) to [-1, 1] in place; legs at no event and bodies not running keep `last_action`.
 
-        False, and nothing is sure, where one is not a finite number.
+        Returns False for a number that is not finite; `action` is then undefined.
         """
         sides = (len(action), 2, 2)
         actions = last_action.reshape(sides), action.reshape(sides)

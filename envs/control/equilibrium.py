@@ -1,4 +1,4 @@
-"""Where the ankle and toe springs rest, and how stiff they are when nobody decides: curves over the stride."""
+"""Equilibrium angles of ankle and toe springs, and their stiffness where no action sets it: curves over the stride."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,19 @@ from .phase_table import GRID
 from .reference_walk import ReferenceWalk
 
 PLATEAUS = (0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95)
-"""Start and end of loading, early stance, late stance, push-off, swing; stiffness is linear between these plateaus."""
+"""Stride phases at which loading, early stance, late stance, push-off and swing start and end. On them `plateau_curve`
+is constant, between them linear; chosen."""
 REFERENCE_STIFFNESS = (75.0, 150.0, 450.0, 200.0, 30.0)
 """K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase (Fukuchi et al. 2018
 data, overground 1.1-1.3 m/s, rounded); in swing a powered prosthesis's (Sup et al. 2009, Table III)."""
 FOOT_FLAT, TOE_OFF = (0.06, 0.12), (0.62, 0.70)
-"""Phases over which the planned toe goes flat, and over which it returns to its swing posture."""
+"""Stride phases over which the planned toe goes flat, and over which it returns to its swing posture; chosen."""
 TOE_SWING_DEG = 10.0
-"""Toe posture of people in swing, 8-12 deg up (`human_gait(...).mean("toe", ...)`)."""
+"""Planned toe angle in swing [deg]; people's is 8 to 12 deg up (`human_gait(...).mean("toe", ...)`)."""
 
 
 def plateau_curve(values: tuple[float, ...]) -> NDArray:
-    """Five plateau values on `GRID`, linear between the plateaus and periodic."""
+    """(SAMPLES,) curve on `GRID` that has these five values on the plateaus; periodic, linear between them."""
     return np.interp(GRID, PLATEAUS, np.repeat(values, 2), period=1.0)
 
 
@@ -47,7 +48,7 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
 
 
 def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
-    """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the schedule that was tuned with the legs."""
+    """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the fixed schedule, which was tuned together with the legs."""
     toe = np.full(len(GRID), constants.toe_schedule)
     return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.stiffness_scale
 
@@ -55,8 +56,9 @@ def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
 def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds a moment forward through K_ref.
 
-    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots: on the plan, K = K_ref gives a times the walk's moment M
-    (plantarflexion positive). The toe rests at the tuned angle from foot flat to toe-off and 10 deg up otherwise.
+    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
+    times the moment M of the walk (plantarflexion positive). The toe's equilibrium is the tuned angle from foot flat to
+    toe-off, and `TOE_SWING_DEG` otherwise.
     """
     body, human = walk.body, walk.human
     beta, period = damping_times(body)[ANKLE], constants.period_factor * walk.plan.stride_time

@@ -1,6 +1,6 @@
-"""Actions to stiffness to control, for the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
+"""From actions to stiffness to control of the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
 
-Axes: (N, side, 2), the last one ankle and toe; an action's four numbers are these rows in the order of `ACTIONS`.
+Arrays are (N, side, 2), the last axis being ankle and toe; flattened, they are in the order of `ACTIONS`.
 """
 
 import numpy as np
@@ -16,36 +16,36 @@ from .phase_table import PhaseTable
 from .subjects import Subjects
 
 FEET = slice(ANKLE, None)
-"""Ankle and toe along the joint axis: the joints whose stiffness is the action."""
+"""Ankle and toe along the joint axis: the joints whose stiffness an action sets."""
 
 
 def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
-    """Lowest and highest (ankle, toe) stiffness of this body [N m/rad]."""
+    """Lowest and highest stiffness of this body [N m/rad], each (2,) for ankle and toe."""
     low, high = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
     return low * body.stiffness_scale, high * body.stiffness_scale
 
 
 def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
-    """Absolute mode: actions in [-1, 1], (..., 2) for ankle and toe, on a log scale to N m/rad."""
+    """Stiffness (..., 2) of ankle and toe [N m/rad] that actions in [-1, 1] stand for in absolute mode, on a log scale."""
     middle, factor = _log_scale(settings, body)
     return middle * factor**action
 
 
 def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
-    """Stiffness at action 0 [N m/rad], and by what one action more multiplies it."""
+    """Stiffness at action 0 [N m/rad], and the factor between it and the stiffness at action 1."""
     low, high = stiffness_ranges(settings, body)
     return np.sqrt(low * high), np.sqrt(high / low)
 
 
 def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDArray:
-    """The action in [-1, 1] that gives a stiffness [N m/rad], (..., 2); beyond the range, the nearer end."""
+    """The action in [-1, 1] that gives a stiffness (..., 2) [N m/rad]; beyond the range, that of the nearer end."""
     low, high = stiffness_ranges(settings, body)
     value = np.clip(np.asarray(stiffness, float), low, high)
     return 2.0 * np.log(value / low) / np.log(high / low) - 1.0
 
 
 def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
-    """Control windows between a commanded stiffness and its action in one episode, drawn if the settings say so."""
+    """Control windows from the command of a stiffness until it acts, in one episode; drawn if the settings say so."""
     if settings.stiffness_delay_range_s is None:
         return round(settings.stiffness_delay_s / CONTROL_WINDOW)
     shortest, longest = (round(delay / CONTROL_WINDOW) for delay in settings.stiffness_delay_range_s)
@@ -53,14 +53,15 @@ def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
 
 
 class FootSprings:
-    """The state of N bodies' ankle and toe springs, and the work done on them by changing them.
+    """The state of the ankle and toe springs of N bodies, and the work that is done by changing them.
 
     Args:
-        settings, body: ranges and action mode, for the body of the tables.
-        equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], a row of the subjects' tables each.
-        schedule: (R, SAMPLES, 2) stiffness [N m/rad] that a residual action multiplies.
-        subjects: bodies and speeds.
-        incline: what a slope adds (`envs.control.leg_controller.slope_table`).
+        settings: ranges of stiffness and action mode.
+        body: the body that the tables are for.
+        equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables.
+        schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
+        subjects: bodies and commanded speeds.
+        incline: what a slope adds to the equilibrium (`envs.control.leg_controller.slope_table`).
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class FootSprings:
         incline: PhaseTable,
     ):
         num = len(subjects.place)
-        self._follows = settings.equilibrium in ("planned", "angle")  # a constant stays one on a slope too
+        self._follows = settings.equilibrium in ("planned", "angle")  # a constant equilibrium stays constant on a slope
         self._residual = settings.action_mode == "residual"
         self._fixed = [joint for joint, name in enumerate(("toe", "ankle")) if settings.stiffness_joints == name]
         middle, self._factor = _log_scale(settings, body)
@@ -85,9 +86,9 @@ class FootSprings:
         self.equilibrium = np.zeros((num, 2, 2))
         """(N, side, 2) rest angle [rad]; changed in place."""
         self.work_stiffness = np.zeros((num, 2, 2))
-        """(N, side, 2) work put in by the last change of stiffness [J]; changed in place."""
+        """(N, side, 2) work done by the last change of stiffness [J]; changed in place."""
         self.work_equilibrium = np.zeros((num, 2, 2))
-        """(N, side, 2) work put in by moving the rest angle since then [J]; changed in place."""
+        """(N, side, 2) work done by moving the rest angle since that change [J]; changed in place."""
         self._fresh = np.ones(num, bool)
         self._everyone = np.ones(num, bool)
         self._delay = np.zeros(num, int)
@@ -96,8 +97,11 @@ class FootSprings:
         )  # in the last windows, newest first
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
-        """The next change of springs `ids` (K,) costs no work and acts at once, as if commanded long before; later ones
-        act `delay` (K,) control windows after they were commanded."""
+        """Begin an episode of springs `ids` (K,).
+
+        Their next change does no work and acts at once, as if it had been commanded long before. Later changes act
+        `delay` (K,) control windows after their command.
+        """
         self._fresh[ids] = True
         self._delay[ids] = delay
 
@@ -115,8 +119,9 @@ class FootSprings:
     ) -> None:
         """Command new stiffness by an action (N, 4), to act after the delay.
 
-        Changing K under a deflection x, that of joint angles (N, side, joint), puts 1/2 (K' - K) x^2 into the spring.
-        Without `running` (N,), all change; those `scheduled` (N,) take the fixed stiffness instead.
+        Changing K to K' under a deflection x puts 1/2 (K' - K) x^2 into the spring; x is that of the joint angles
+        `angle` (N, side, joint) [rad]. Springs of bodies not `running` (N,) do not change (None: all are running);
+        those of bodies `scheduled` (N,) take the fixed stiffness in place of the action's.
         """
         action = action.reshape(self.stiffness.shape)
         if self._residual:
@@ -127,9 +132,9 @@ class FootSprings:
                 middle = middle.copy()
                 middle[..., self._fixed] = self._schedule.at(leg_phase, self._subjects.place)[..., self._fixed]
         if scheduled is not None:
-            who = scheduled[:, None, None]
-            middle = np.where(who, self._schedule.at(leg_phase, self._subjects.place), middle)
-            factor = np.where(who, 1.0, factor)
+            fixed = scheduled[:, None, None]
+            middle = np.where(fixed, self._schedule.at(leg_phase, self._subjects.place), middle)
+            factor = np.where(fixed, 1.0, factor)
         running = self._everyone if running is None else running
         state = self._fresh, running, self._delay, self._commands, self.stiffness
         works = self.work_stiffness, self.work_equilibrium
@@ -138,10 +143,10 @@ class FootSprings:
     def move_equilibrium(
         self, leg_phase: NDArray, angle: NDArray, control: NDArray, running: NDArray | None = None
     ) -> None:
-        """Let a control window begin: take the rest angles of the legs' phases, and the stiffness whose delay is over,
-        and put K and K theta_eq into `control` (N, side, joint, 2).
+        """Begin a control window: put K and K theta_eq into `control` (N, side, joint, 2).
 
-        Moving the rest angle from deflection x to x' puts 1/2 K (x'^2 - x^2) into the spring.
+        K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases `leg_phase` (N, side).
+        Moving the rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring.
         """
         equilibrium = self._equilibrium.at(leg_phase, self._subjects.place)
         if self._follows and self._subjects.slope.any():
@@ -150,11 +155,13 @@ class FootSprings:
         state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
         _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)
 
-    def hold(self, control: NDArray, angle: NDArray, who: NDArray) -> None:
-        """Take K and K theta_eq of those of `who` (N,) from `control` (N, side, joint, 2), where another has put them;
-        without delay; the work of both changes is counted as above."""
+    def hold(self, control: NDArray, angle: NDArray, held: NDArray) -> None:
+        """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in `control` (N, side, joint, 2).
+
+        They act without delay, and the work of both changes is counted as above.
+        """
         works = self.work_stiffness, self.work_equilibrium
-        _hold(control, angle, who, self._fresh, self._commands, self.stiffness, self.equilibrium, *works)
+        _hold(control, angle, held, self._fresh, self._commands, self.stiffness, self.equilibrium, *works)
 
 
 @kernel
@@ -211,7 +218,7 @@ def _move(
 
 @kernel
 def _arrive(delay, angle, equilibrium, commands, stiffness, work):
-    """The command of `delay` windows ago acts; then a window passes."""
+    """Let the command of `delay` windows ago act, and shift the past commands by one window."""
     for side in range(2):
         for joint in range(2):
             before, after = stiffness[side, joint], commands[delay, side, joint]
@@ -223,9 +230,9 @@ def _arrive(delay, angle, equilibrium, commands, stiffness, work):
 
 
 @kernel
-def _hold(control, angle, who, fresh, commands, stiffness, equilibrium, work_stiffness, work_equilibrium):
-    for i in range(len(who)):
-        if not who[i]:
+def _hold(control, angle, held, fresh, commands, stiffness, equilibrium, work_stiffness, work_equilibrium):
+    for i in range(len(held)):
+        if not held[i]:
             continue
         for side in range(2):
             for joint in range(2):

@@ -13,18 +13,21 @@ from ..timing import PHYSICS_STEP
 
 CONTACTS = ("heel", "ball", "toe")
 HEEL_RADIUS = 0.04
-"""Radius [m] of the heel's contact sphere at 1.70 m: a rounded heel with a soft pad at most 8 mm deep."""
+"""Radius [m] of the heel's contact sphere at 1.70 m; chosen: a rounded heel with a soft pad at most 8 mm deep."""
 BALL_RADIUS, TOE_RADIUS = 0.02, 0.012
-"""Radius [m] of the contact spheres at 1.70 m: the ball's is the toe joint's height above the sole, and its sphere sits
-on that joint as part of the toe, so that heel-off neither rolls it nor drags the toe along the floor."""
+"""Radius [m] of the contact spheres at 1.70 m; chosen. The ball's is the height of the toe joint above the sole: its
+sphere sits on that joint and belongs to the toe, so that heel-off neither rolls it nor drags the toe over the floor."""
 FRICTION = 1.0
-"""Coefficient of Coulomb friction between foot and ground; rubber soles on dry floors have 0.6 to 1.2."""
+"""Coefficient of Coulomb friction between foot and ground [-]; chosen, as of rubber soles on a dry floor."""
 FRICTION_TIME = 0.004
 """Time constant [s] in which sliding is stopped. MuJoCo leaves the change of the contact's Jacobian out of its
 constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms (docs/design.md)."""
 HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
-"""Time constant [s], damping ratio; impedance at zero and full depth, depth [m] of the heel pad."""
+"""MuJoCo's contact of the heel pad at 1.70 m: time constant [s] and damping ratio [-]; impedance at zero and at full
+depth [-], and that depth [m]. Chosen together with the leg constants, which were tuned on it: another pad needs another
+tuning, or the heel strikes harder."""
 SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}
+"""The same of ball and toe, which are stiffer."""
 
 
 def geom_name(contact: str, side: str) -> str:
@@ -51,7 +54,7 @@ def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
 
 
 def add_sphere(segment: mujoco.MjsBody, name: str, offset: tuple[float, float, float]) -> None:
-    """A sphere that touches the ground of its foot (see `add_touch`) and nothing else."""
+    """Add a sphere to a segment; it touches the ground of its foot (see `add_touch`) and nothing else."""
     forward, up, radius = offset
     segment.add_geom(
         name=name,

@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from ..physics.measurement import Measurement
 
 MAX_PITCH = 0.8
-"""A trunk tilted further than this, forward or backward, is a fall [rad] (design study)."""
+"""A trunk tilted further than this, forward or backward, is a fall [rad]; chosen: walking stays within 0.04 rad."""
 TOO_LOW, TOO_TILTED = "fell: hip too low", "fell: trunk too tilted"
 
 POSE_TOLERANCE = 0.02
-"""Pose error E at which its reward is 1/e [rad^2]: 3.4 deg at every joint (design study)."""
+"""Pose error E at which its reward is 1/e [rad^2]; chosen: 3.4 deg at every joint."""
 MAX_FORCE = 1.2
-"""Vertical force of one foot [body weights] beyond which it costs more; people's peaks are 1.05 and 1.13."""
+"""Vertical force of one foot beyond which it costs more [body weights]; chosen: people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
-"""Weight of that excess against the distance from people's range: a peak is short, and is what hurts."""
+"""Weight of that excess against the distance from people's range [-]; chosen high, as a peak is short."""
 FORCE_TOLERANCE = 0.15
-"""Body weights of force outside people's range, both feet together, at which its reward is 1/e."""
+"""Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen."""
 
 
 TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
@@ -45,12 +45,12 @@ ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TER
 
 
 class Task:
-    """What is seen, what is rewarded and what counts as a fall.
+    """What a policy sees, what it is rewarded for, and what counts as a fall, for N bodies.
 
     Args:
-        settings: the weights.
-        rows: constants and walk of each row of the subjects' tables (`envs.control.reference_walk.rows`).
-        subjects: bodies and speeds.
+        settings: the weights of the reward, and the time of a step.
+        rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
+        subjects: bodies and commanded speeds.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Task:
         self._scales = np.concatenate([body_scales(body) for body in subjects.bodies])
 
     def fit(self, ids: Iterable[int]) -> None:
-        """Take the bodies of environments `ids` as they are now."""
+        """Take over the present bodies of the subjects `ids`."""
         self._observer.fit(ids)
         for index in ids:
             self._scales[index] = body_scales(self._subjects.bodies[index])[0]
@@ -85,7 +85,7 @@ class Task:
         """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
 
         `leg_phase` (N, 2) stride phases [0, 1); `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean
-        over the step; `curves` are `at(leg_phase)`, where known. What is not a number reads as the upper bound.
+        over the step; `curves` are `at(leg_phase)`, if they are known. NaN reads as the upper bound.
         """
         curves = self.at(leg_phase) if curves is None else curves
         error, planned_ankle = self._error(m, leg_phase, curves), curves["pose"][..., ANKLE]
@@ -157,7 +157,7 @@ class Task:
         return error
 
     def at(self, leg_phase: NDArray) -> NDArray:
-        """(N, side) of `REFERENCE`."""
+        """People and plan at the legs' phases, (N, side) of dtype `REFERENCE`."""
         return self._curves.at(leg_phase, self._subjects.place).view(REFERENCE)[..., 0]
 
 
@@ -170,7 +170,7 @@ def _track(ratios, curves, com, com_velocity, ankle, leg_phase, error):
 
 @kernel
 def _error(ratio, curves, com, com_velocity, ankle, leg_phase):
-    """CoM minus plan: x, z, forward speed. The plan counts x from the ankle of the leg whose stance began last."""
+    """CoM minus plan: x, z, forward speed. The x of the plan is from the ankle of the leg whose stance began last."""
     leader = LEFT if leg_phase[LEFT] < 0.5 else RIGHT
     planned = curves[leader]
     planned_x = ankle[leader, 0] + ratio.length * planned.stride_length * leg_phase[leader]
@@ -193,13 +193,13 @@ def _judge(
     action,
     last_action,
     stiffness,
-    windows,
+    force_windows,
     share,
     terms,
 ):
     for i in range(len(base)):
         scale = scales[i]
-        upright = base[i, 1] >= scale.min_hip_height and abs(base[i, 2]) <= MAX_PITCH  # a NaN is not
+        upright = base[i, 1] >= scale.min_hip_height and abs(base[i, 2]) <= MAX_PITCH  # False for NaN
         terms[i, ALIVE] = 1.0 if upright and diverged[i] < 0 else 0.0
         x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
         terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
@@ -209,7 +209,7 @@ def _judge(
         for side in range(2):
             people = curves[i, side]
             pose_error += 0.5 * _pose_error(scale, base[i, 2], angle[i, side], people)
-            force_distance += _force_distance(scale, windows[:, i, side], people)
+            force_distance += _force_distance(scale, force_windows[:, i, side], people)
             for joint in range(2):
                 k = stiffness[i, side, joint] / scale.stiffness_unit[joint]
                 stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
@@ -230,12 +230,12 @@ def _pose_error(scale, pitch, angle, people):
 
 
 @kernel
-def _force_distance(scale, windows, people):
+def _force_distance(scale, force_windows, people):
     """Body weights by which one foot's forces in the windows of a step leave people's range."""
-    count = len(windows)
+    count = len(force_windows)
     forward = up = excess = 0.0
     for window in range(count):
-        contacts = windows[window]
+        contacts = force_windows[window]
         vertical = (contacts[0, 1] + contacts[1, 1] + contacts[2, 1]) / scale.weight
         forward += (contacts[0, 0] + contacts[1, 0] + contacts[2, 0]) / scale.weight / count
         up += vertical / count

@@ -14,17 +14,18 @@ from ..control.phase_table import GRID
 from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
 
 MIN_HIP_HEIGHT = 0.65
-"""A hip lower than this [m at 1.70 m, scaled with height] is a fall (design study)."""
+"""A hip lower than this is a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
 COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.1, 0.03
-"""Error of the CoM at which its reward is 1/e [m at 1.70 m, scaled with height] (design study)."""
+"""Error of the CoM, forward and up, at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 SPEED_TOLERANCE = 0.10
-"""Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]."""
+"""Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen."""
 POSE_WEIGHTS = {HIP: 3.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
-"""Share of each joint in the pose error E; the toe counts little, its curve is of other people."""
+"""Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve is of other
+people than those of thigh, knee and ankle."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
-"""Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height] (design study)."""
+"""Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height]; chosen, as of mid-stance."""
 TOE_SHARE = 0.25
-"""Weight of the toe against the ankle in the cost of stiffness (design study)."""
+"""Weight of the toe against the ankle in the cost of stiffness [-]; chosen."""
 
 REFERENCE = np.dtype(
     [
@@ -36,7 +37,7 @@ REFERENCE = np.dtype(
         ("stride_length", float),  # of the plan [m], the same at every phase
     ]
 )
-"""What people and the plan do at a phase of one leg's stride; `com` and `speed` where its stance began last."""
+"""What people and plan do at a phase of one leg's stride; `com`, `speed` are for the leg whose stance began last."""
 SCALES = np.dtype(
     [
         ("min_hip_height", float),  # [m]
@@ -47,12 +48,12 @@ SCALES = np.dtype(
         ("weight", float),  # of body and load [N]
     ]
 )
-"""What one body is measured by."""
+"""Limits, tolerances and units of one body."""
 
 
 @lru_cache(maxsize=256)
 def body_scales(body: Body) -> NDArray:
-    """(1,) of `SCALES`."""
+    """(1,) of dtype `SCALES`."""
     length = body.length_scale
     scales = np.zeros(1, SCALES)
     scales["min_hip_height"] = MIN_HIP_HEIGHT * length
@@ -65,10 +66,10 @@ def body_scales(body: Body) -> NDArray:
 
 
 def reference_curves(plan: WalkPlan, human: HumanGait, step_seconds: float) -> NDArray:
-    """(SAMPLES,) of `REFERENCE`, for steps of `step_seconds`."""
+    """People and plan over the stride, (SAMPLES,) of dtype `REFERENCE`, for steps of `step_seconds` [s]."""
     curves = np.zeros(len(GRID), REFERENCE)
     curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
-    middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # the mean over a step belongs to its middle
+    middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # a force averaged over a step belongs to its middle
     for axis, name in enumerate(("grf_forward", "grf_vertical")):
         curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
     step = (2 * GRID) % 1.0
