@@ -26,7 +26,7 @@ def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDAr
 
 
 def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
-    """Stiffness (..., 2) of ankle and toe [N m/rad] that actions in [-1, 1] stand for in absolute mode, on a log scale."""
+    """Stiffness (..., 2) of ankle and toe [N m/rad] for actions in [-1, 1] in absolute mode, on a log scale."""
     middle, factor = _log_scale(settings, body)
     return middle * factor**action
 

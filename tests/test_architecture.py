@@ -1,0 +1,37 @@
+"""The house stays easy to see: no file too long, and no public name that means different things in two rooms."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[1]
+ROOMS = ("gait", "envs", "agents", "evaluation", "studies")
+MOST_LINES = 300
+FILES = sorted(path for room in ROOMS for path in (REPOSITORY / room).rglob("*.py"))
+
+
+def names_defined_in(path: Path) -> set[str]:
+    """Names without a leading underscore that a module defines at its top level; imports do not define."""
+    names: set[str] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            names.add(node.name)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)}
+    return {name for name in names if not name.startswith("_")}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(REPOSITORY)))
+def test_no_file_of_the_five_packages_is_too_long(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= MOST_LINES
+
+
+def test_no_public_name_means_different_things_in_two_packages():
+    rooms_of: dict[str, set[str]] = defaultdict(set)
+    for path in FILES:
+        for name in names_defined_in(path):
+            rooms_of[name].add(path.relative_to(REPOSITORY).parts[0])
+    assert {name: sorted(rooms) for name, rooms in rooms_of.items() if len(rooms) > 1} == {}
