@@ -13,7 +13,7 @@ from .errors import SpringfootError
 from .feet import turned
 from .human import ANGLES, HumanGait, human_cop
 from .leg import (
-    FOOT,
+    FOOT_SEGMENT,
     JOINTS,
     FootLoad,
     LegMotion,
@@ -171,7 +171,7 @@ def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[Le
     # People's mean forces do not quite add up to their weight: only what differs from the mean accelerates.
     com_acceleration = GRAVITY * (both_feet - 2 * forces(grid).mean(0))
     swinging = (mass_acceleration(body, leg) + mass_acceleration(body, legs(phase + 0.5))) / body.total_mass
-    pitch = leg.turn[..., FOOT]
+    pitch = leg.turn[..., FOOT_SEGMENT]
     on_heel = _ankle_over(body, pitch, -body.heel_to_ankle, 0.0)
     on_ball = _ankle_over(body, pitch, body.ankle_to_toe_joint, body.toe_joint_height)
     ankle = np.where(pitch[..., None] > 0, on_heel, on_ball)

@@ -22,7 +22,7 @@ from .human import ANGLES
 JOINTS = ("hip", "knee", "ankle", "toe")
 """Joints of a leg from the top; joint i holds segment i of `LEG_SEGMENTS`."""
 LEG_SEGMENTS = ("thigh", "shank", "foot", "toe")
-FOOT, TOE = 2, 3
+FOOT_SEGMENT, TOE_SEGMENT = LEG_SEGMENTS.index("foot"), LEG_SEGMENTS.index("toe")
 
 _MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
 """Internal moment over the turning moment on the segment below, in the order of `JOINTS`."""
@@ -172,7 +172,7 @@ def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[st
     moments = {}
     for index, (name, joint) in enumerate(joint_positions(body, motion.turn, motion.hip).items()):
         turning = -_cross(load.point - joint[..., None, :], load.force)
-        moments[name] = _MOMENT_SIGN[index] * (turning[..., 1] if index == TOE else turning.sum(-1))
+        moments[name] = _MOMENT_SIGN[index] * (turning[..., 1] if index == TOE_SEGMENT else turning.sum(-1))
     return moments
 
 
@@ -192,11 +192,11 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
         below = force, turning
         force = mass * (acceleration - gravity(slope)) + below[0]
         turning = inertia * motion.acceleration[..., index] + below[1]
-        if index >= FOOT:
-            push, point = load.force[..., index - FOOT, :], load.point[..., index - FOOT, :]
+        if index >= FOOT_SEGMENT:
+            push, point = load.force[..., index - FOOT_SEGMENT, :], load.point[..., index - FOOT_SEGMENT, :]
             force = force - push
             turning = turning - _cross(point - com, push)
-        if index < TOE:
+        if index < TOE_SEGMENT:
             turning = turning + _cross(joints[index + 1] - com, below[0])
         turning = turning - _cross(joints[index] - com, force)
         moments[JOINTS[index]], forces[JOINTS[index]] = _MOMENT_SIGN[index] * turning, force

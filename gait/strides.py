@@ -11,7 +11,7 @@ from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .errors import SpringfootError
 from .feet import turned
 from .human import COLUMNS, FORCES
-from .leg import FOOT, joint_positions, segment_turns
+from .leg import FOOT_SEGMENT, joint_positions, segment_turns
 from .motion_files import Series, Trial, refuse_absurd
 
 FEWEST_STRIDES = 2
@@ -165,8 +165,8 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
     thigh, knee, ankle = (_smooth(angle, tick) for angle in (thigh, knee, ankle))
     turn = segment_turns({"thigh": thigh, "knee": knee, "ankle": ankle, "toe": 0.0})
     x = joint_positions(body, turn, np.zeros((len(turn), 2)))["ankle"][:, 0]
-    heel = x + turned(turn[:, FOOT], -body.heel_to_ankle, -body.ankle_height)[0]
-    toe = x + turned(turn[:, FOOT], body.ankle_to_toe_joint + body.toe_length, -body.ankle_height)[0]
+    heel = x + turned(turn[:, FOOT_SEGMENT], -body.heel_to_ankle, -body.ankle_height)[0]
+    toe = x + turned(turn[:, FOOT_SEGMENT], body.ankle_to_toe_joint + body.toe_length, -body.ankle_height)[0]
 
     def peaks(values: NDArray) -> NDArray:
         # Half of the excursion stands out once a stride, whatever the cadence.

@@ -15,8 +15,9 @@ from springfoot.gait.kinetics import (
     planned_moments,
     projection_table,
 )
+from springfoot.gait.quasi_stiffness import ankle_quasi_stiffness
 from springfoot.gait.scores import correlation, force_features, positive_work
-from springfoot.gait.stiffness import ankle_quasi_stiffness, schedule_from_curves
+from springfoot.gait.stiffness import schedule_from_curves
 from springfoot.gait.thesis import ThesisWalk
 
 from .thesis_figures import of_people

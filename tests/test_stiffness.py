@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from springfoot.gait import Body, SpringfootError, human_gait, plan_walk
+from springfoot.gait.quasi_stiffness import FUKUCHI_OVERGROUND, ankle_quasi_stiffness
 from springfoot.gait.stiffness import (
-    FUKUCHI_OVERGROUND,
     LOWEST_STIFFNESS,
     Segment,
     StiffnessSchedule,
     ankle_events,
-    ankle_quasi_stiffness,
     line_spring,
     schedule_from_curves,
     thesis_schedule,

@@ -12,7 +12,7 @@ import numpy as np
 from springfoot.gait.errors import SpringfootError
 
 TUNED_SPEED = 1.2
-"""Speed [m/s] at 1.70 m of the constants whose name tells none."""
+"""Speed [m/s] at 1.70 m of the constants whose name gives no speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ class LegConstants:
     period_factor: float
     """Period of the phase against the plan's stride time."""
     period_speed_gain: float
-    """Phase rate rises by this share for each m/s too fast [s/m]."""
+    """The phase runs faster by this share for each m/s that the body is too fast [s/m]."""
     trunk_pitch_deg: float
     """Held trunk pitch [deg]."""
     trunk_stiffness: float
@@ -42,15 +42,15 @@ class LegConstants:
     trunk_damping: float
     """Stance-hip torque for trunk pitch rate [N m s/rad]."""
     speed_torque: float
-    """Stance-hip torque for each m/s too fast [N s]."""
+    """Stance-hip torque for each m/s that the body is too fast [N s]."""
     trunk_rise: float
-    """Phase over which the stance hip takes the trunk."""
+    """Stride phase in which the stance hip takes over the trunk [-]."""
     swing_speed_gain: float
-    """Swing-hip target for each m/s too fast (foot placement) [rad s/m]."""
+    """Shift of the swing hip's target for each m/s that the body is too fast (foot placement) [rad s/m]."""
     neutral_deg: tuple[float, float]
     """Constant ankle and toe angle of `equilibrium="neutral"` [deg]."""
     toe_flat_deg: float
-    """Angle at which the toe rests from foot flat to toe-off in the planned equilibrium: down, it presses [deg]."""
+    """Equilibrium angle of the toe from foot flat to toe-off when planned [deg]; a negative one presses the toe down."""
     ankle_schedule: tuple[float, float, float, float, float]
     """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
     toe_schedule: float
@@ -59,19 +59,19 @@ class LegConstants:
 
 @dataclass(frozen=True, kw_only=True)
 class SlopeConstants:
-    """What a slope adds to targets of the leg controller, as a part of its angle; the same for every body and speed.
+    """What a slope adds to targets of the leg controller, per radian of slope; the same for every body and speed.
 
-    Of a joint: constant, cosine and sine of the stride phase.
+    A joint has three coefficients: of 1, and of cosine and sine of 2 pi x stride phase.
     """
 
     hip: tuple[float, float, float]
-    """To the hip's target."""
+    """Added to the hip's target."""
     knee: tuple[float, float, float]
-    """To the knee's target."""
+    """Added to the knee's target."""
     ankle: tuple[float, float, float]
-    """To the ankle's rest angle, where that follows the stride."""
+    """Added to the ankle's rest angle where that follows the stride."""
     trunk: float
-    """To the held trunk pitch."""
+    """Added to the held trunk pitch."""
 
 
 def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people") -> str:
@@ -85,9 +85,10 @@ def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, f
 def leg_constants(
     equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people"
 ) -> LegConstants:
-    """The committed constants for a setting at `speed` [m/s at 1.70 m]; `SpringfootError` where none walk.
+    """The committed constants for a setting at `speed` [m/s at 1.70 m].
 
-    Linear between the speeds for which there are some, and those of the nearest beyond.
+    They are linear between the speeds of the committed sets; beyond those speeds the nearest set holds. Raises
+    `SpringfootError` for a setting without a committed set.
     """
     name, table = constants_name(equilibrium, cadence, feedforward=feedforward), _committed()
     if name not in table:
@@ -102,7 +103,7 @@ def leg_constants(
 
 
 def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
-    """Constants at `speed` [m/s], linear between those of `sets` by speed, and the nearest beyond."""
+    """Constants at `speed` [m/s], linear between the `sets` by speed; beyond them, those of the nearest set."""
     speeds = sorted(sets)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
     lower, weight = sets[speeds[int(place)]], place - int(place)

@@ -1,7 +1,7 @@
-"""The gait phase, and the hips and knees: what walks while the policy sets ankle and toe stiffness.
+"""The phase of the gait, and the hips and knees, which no action sets.
 
 Each hip and knee is a spring like the ankle (variable impedance) around people's curves at the walking speed, with
-people's moments fed forward; the stance hip also holds the trunk and the speed, and touchdown resets the phase. The
+people's moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The
 constants of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by
 `springfoot study slope-tuning` (command and seed stand in that file).
 Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
@@ -26,15 +26,15 @@ from .reference_walk import ReferenceWalk
 from .subjects import Subjects
 
 KNOTS = np.arange(10) / 10
-"""Stride phases of the knots that correct people's curves (periodic cubic spline)."""
+"""Stride phases of the knots of the corrections to people's curves, which are periodic cubic splines."""
 STANCE_FALL = (0.5, 0.6)
-"""Phases over which the trunk torque of the leg that ends its stance falls to zero."""
+"""Stride phases over which the trunk torque of the leg that ends its stance falls to zero; chosen, double support."""
 TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
-"""Vertical force of a foot that counts as touchdown [body weights]: 30 N at 63 kg."""
+"""Vertical force of a foot that counts as touchdown [body weights]; chosen: 30 N at 63 kg, as of force plates."""
 TOUCHDOWN_PHASE = 0.80
-"""Touchdown before this phase of the leg is a scuff, not a step."""
+"""A touchdown before this stride phase of the leg is a scuff, not a step; chosen."""
 HOLD = 0.001
-"""A leg's phase waits this far before 1 until its foot touches down."""
+"""A leg's phase waits at 1 minus this until its foot touches down; chosen, small against a window's 0.009."""
 
 
 def knot_curve(knots_deg: Sequence[float]) -> NDArray:
@@ -43,7 +43,7 @@ def knot_curve(knots_deg: Sequence[float]) -> NDArray:
 
 
 def slope_table(constants: SlopeConstants) -> PhaseTable:
-    """What a slope adds over the stride, as a part of its angle: to hip, knee, ankle and held trunk pitch."""
+    """What a slope adds to hip, knee, ankle and held trunk pitch over the stride, per radian of slope: (SAMPLES, 4)."""
     cosine, sine = np.cos(2 * np.pi * GRID), np.sin(2 * np.pi * GRID)
     joints = [a + b * cosine + c * sine for a, b, c in (constants.hip, constants.knee, constants.ankle)]
     return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
@@ -53,8 +53,8 @@ class LegController:
     """Phase and hip-knee controller of N bodies.
 
     Args:
-        rows: constants and walk of each row of the subjects' tables (`envs.control.reference_walk.rows`).
-        subjects: bodies and speeds.
+        rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
+        subjects: bodies and commanded speeds.
         incline: what a slope adds (`slope_table`).
     """
 
@@ -68,21 +68,23 @@ class LegController:
         self.follow()
 
     def follow(self) -> None:
-        """Take the subjects' bodies and speeds as they are now."""
+        """Take over the present bodies and commanded speeds of the subjects."""
         _follow(self._rows, self._subjects.place, self._subjects.scale, self._gains)
 
     def reset(self, ids: NDArray, left_phase: NDArray) -> None:
-        """Put the left legs of `ids` (K,) at phases (K,)."""
+        """Put the left legs of bodies `ids` (K,) at the stride phases `left_phase` (K,)."""
         self.phase[ids] = leg_phases(left_phase)
 
     def advance(self, m: Measurement, running: NDArray) -> None:
-        """Let one window pass for those `running` (N,): the phase runs on, waits for a late foot, and starts anew
-        with the one that lands."""
+        """Let one window pass for the bodies `running` (N,).
+
+        The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
+        """
         _advance(self._gains, self._subjects.speed, m.com_velocity, m.force, running, self.phase)
 
     def command(self, m: Measurement, control: NDArray) -> None:
-        """Put hip and knee stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] into their places in
-        `control` (N, side, joint, 2)."""
+        """Put stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] of hips and knees into `control`,
+        which is (N, side, joint, 2)."""
         subjects = self._subjects
         curves = self._table.at(self.phase, subjects.place)
         state = m.base, m.base_velocity, m.com_velocity
@@ -94,8 +96,8 @@ class LegController:
 GAINS = np.dtype(
     [
         ("touchdown", float),  # vertical force of a foot that has landed [N]
-        ("rate", float),  # phase in one window
-        ("rate_gain", float),  # its rise for each m/s too fast [s/m]
+        ("rate", float),  # advance of the phase in one window
+        ("rate_gain", float),  # share by which it rises for each m/s too fast [s/m]
         ("pitch", float),  # held trunk pitch [rad]
         ("trunk_stiffness", float),  # [N m/rad]
         ("trunk_damping", float),  # [N m s/rad]
@@ -206,7 +208,7 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
         if joint == HIP:
             target = target + body.trunk_lean  # hip = thigh to the vertical + pitch of the trunk
-        feed = -constants.feedforward[joint] * walk.moments[:, joint]  # which count extension positive
+        feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
         drives.append(stiffness * target + feed)
     return np.stack(columns + drives, axis=-1)

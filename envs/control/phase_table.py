@@ -1,4 +1,4 @@
-"""Phases of the stride, and curves over it, tabulated once and read at many: the same bits for any number of bodies."""
+"""Stride phases, and curves over the stride that are tabulated once and read at many phases."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -6,9 +6,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..physics.kernel import kernel
 
 SAMPLES = 1000
-"""Samples of a stride; between them curves are linear."""
+"""Samples of a stride, between which curves are linear; chosen."""
 GRID = np.arange(SAMPLES) / SAMPLES
-"""Their phases, (SAMPLES,)."""
+"""Stride phases of the samples, (SAMPLES,)."""
 
 
 def leg_phases(left: NDArray) -> NDArray:
@@ -17,12 +17,12 @@ def leg_phases(left: NDArray) -> NDArray:
 
 
 PLACE = np.dtype([("row", np.int64), ("weight", float)])
-"""Where an environment reads tables of several rows: between a row and the next, whose weight is in [0, 1)."""
+"""Where an environment reads a table of several rows: between `row` and the next one, which has `weight` in [0, 1)."""
 _FIRST = np.zeros(1, PLACE)
 
 
 class PhaseTable:
-    """Periodic curves on `GRID`.
+    """Periodic curves on `GRID`; a reading has the same bits for any number of bodies.
 
     Args:
         curves: (SAMPLES, C), or (R, SAMPLES, C) for R rows.
@@ -34,7 +34,7 @@ class PhaseTable:
         self._table = np.stack([curves, rise], axis=2).astype(float)  # (R, SAMPLES, value and rise, C)
 
     def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
-        """Curves at `phase` in [0, 1) of any shape, (N, ...) with the (N,) `PLACE` of each: (..., C)."""
+        """Curves (..., C) at phases (...) in [0, 1); with `place` (N,) of dtype `PLACE`, phases are (N, ...)."""
         phase = np.asarray(phase, float, order="C")
         curves = np.empty((*phase.shape, self._table.shape[-1]))
         _read(self._table, place, phase, curves)

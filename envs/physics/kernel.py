@@ -1,10 +1,11 @@
 """Kernels: what a step does besides its physics, as compiled loops over bodies in scalar equations.
 
-NumPy costs more per call than these few numbers are worth, and Python more still. A kernel fills arrays it is given.
-Row i of what it writes depends on row i of what it reads, by the same operations in the same order for any N (no
-fast-math, no threads): a batch of N gives the bits of N batches of one. Code is compiled at first use and kept beside
-the source, where it is found stale only when that file changes: so a kernel calls only functions of its own file, and
-numbers of other files reach it as arguments; of `envs.physics.model` it may know the order of axes.
+For so few numbers a call of NumPy costs more than its arithmetic, and Python more still. A kernel fills the arrays that
+it is given. Row i of what it writes depends on row i of what it reads, by the same operations in the same order for any
+N (no fast-math, no threads), so a batch of N gives the bits of N batches of one. numba compiles a kernel at its first
+call and keeps the code beside the source, until that source file changes. A change in another file goes unnoticed;
+therefore a kernel calls only functions of its own file, and takes numbers of other files as arguments. It may use the
+order of axes in `envs.physics.model`, which never changes.
 """
 
 from collections.abc import Callable

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.leg import JOINTS
 
 from ..timing import PHYSICS_STEP
 from .foot_contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
 
 SIDES = ("left", "right")
-JOINTS = ("hip", "knee", "ankle", "toe")
 BASE = ("x", "z", "pitch")
 LEFT, RIGHT = range(2)
 HIP, KNEE, ANKLE, TOE = range(4)
@@ -29,9 +29,9 @@ ACTIONS = tuple(f"{joint}_{side}" for side in SIDES for joint in ("ankle", "toe"
 DAMPING_TIME = (0.031, 0.0377, 0.02, 0.02)
 """beta [s] of tau = K (theta_eq - theta - beta dtheta/dt), in the order of `JOINTS`; scaled with sqrt(l).
 
-Chosen, of the order of damping over stiffness in ankles of walking people, 14 ms (0.016 over 1.14 to 0.080 over 5.43
-N m s/rad/kg over N m/rad/kg: J. Medical Devices 12 (2018) 011010, abstract), and in the stance of a powered prosthesis,
-8 to 20 ms (Sup et al. 2009, Table III). Like the next three constants, it is varied in docs/physics.md.
+Chosen, of the order of damping over stiffness in people's ankles in stance, 14 ms (0.016/1.14, 0.080/5.43: J. Medical
+Devices 12 (2018) 011010, abstract), and in a powered prosthesis, 8-20 ms (Sup et al. 2009, Table III). Like the next
+three constants it is varied in docs/physics.md.
 """
 TORQUE_LIMIT = (200.0, 200.0, 200.0, 60.0)
 """Largest actuator torque [N m] at 1.70 m and 63 kg, in the order of `JOINTS`.
@@ -41,8 +41,7 @@ Chosen above what walking takes: `pretrained` reaches 67, 43, 159 and 22 N m in 
 ARMATURE = (0.02, 0.01, 0.005, 0.002)
 """Inertia added to each joint's own [kg m^2] at 1.70 m and 63 kg, in the order of `JOINTS`.
 
-Chosen for the numbers' sake, people have none: light segments on stiff springs are fast, and the toe segment with
-0.0003 kg m^2 about its joint is the lightest.
+Chosen, people have none: light segments on stiff springs are fast (the toe has 0.0003 kg m^2 about its joint).
 """
 PASSIVE_DAMPING = (0.5, 0.5, 0.5, 0.1)
 """Damping of each joint beside its spring's [N m s/rad] at 1.70 m and 63 kg, in the order of `JOINTS`.
@@ -95,7 +94,7 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    # Islands of constraints and boxes around few spheres: looking for them costs 11 % of a step and finds nothing.
+    # Looking for islands of constraints, and for boxes around few spheres, costs 11 % of a step and finds nothing.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     spec.compiler.degree = False
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 960, 720
@@ -161,11 +160,7 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
                 objname=ground_name(side),
                 reftype=mujoco.mjtObj.mjOBJ_GEOM,
                 refname=geom_name(contact, side),
-                intprm=(
-                    1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value,
-                    3,
-                    1,
-                ),  # force only; net force; one slot
+                intprm=(1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3, 1),  # force only, net force, one slot
             )
     spec.stat.extent = 2.0 * length
     spec.stat.meanmass = mass
@@ -178,7 +173,7 @@ def build_model(body: Body, friction: float = FRICTION) -> mujoco.MjModel:
 
 
 def _load(trunk, body: Body) -> None:
-    """A box on the back, fixed to the trunk."""
+    """Add a box on the back, fixed to the trunk."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
     load.add_geom(
@@ -191,7 +186,7 @@ def _load(trunk, body: Body) -> None:
 
 
 def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> None:
-    """One leg below the trunk; the lateral offset is for the eye alone (the body is planar)."""
+    """Add one leg below the trunk; its lateral offset is for the eye alone (the body is planar)."""
     rgb = 0.15 if side == "left" else 0.0
     thin = 0.035 * body.length_scale
     thigh = _segment(
@@ -248,7 +243,7 @@ def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> Non
 
 
 def _segment(parent, name, pos, mass, com, inertia, joint: str = "", body: Body | None = None):
-    """A rigid segment with an explicit inertia; the hinge, if any, is named after the joint and the segment's side."""
+    """Add a rigid segment with an explicit inertia; its hinge, if any, is named after the joint and its side."""
     segment = parent.add_body(name=name, pos=pos)
     segment.explicitinertial = True
     segment.mass = mass
@@ -273,7 +268,7 @@ def _segment(parent, name, pos, mass, com, inertia, joint: str = "", body: Body 
 
 
 def _bone(segment, start, end, radius: float, shade: float) -> None:
-    """A capsule to look at: no mass, no contact."""
+    """Add a capsule to look at; it has no mass and no contact."""
     segment.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
         fromto=(start[0], 0, start[1], end[0], 0, end[1]),
@@ -285,10 +280,10 @@ def _bone(segment, start, end, radius: float, shade: float) -> None:
 
 
 def _add_spring(spec: mujoco.MjSpec, joint: str, beta: float) -> None:
-    """Two actuators on one joint that make tau = K (theta_eq - theta - beta dtheta/dt) inside every physics step.
+    """Add two actuators that make tau = K (theta_eq - theta - beta dtheta/dt) at one joint in every physics step.
 
     `stiffness_<joint>`: ctrl = K, gain = -theta - beta dtheta/dt. `drive_<joint>`: ctrl = K theta_eq (+ feed-forward).
-    The torque limit stands on the joint, not on the halves, which are both large when their sum is small.
+    The torque limit is set on the joint, not on the actuators: both may be large where their sum is small.
     """
     spring = spec.add_actuator(
         name=f"stiffness_{joint}",

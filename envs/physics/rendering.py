@@ -1,4 +1,4 @@
-"""Pictures of one body. The only module that needs OpenGL, and only once a frame is asked for."""
+"""Pictures of one body. No other module needs OpenGL, and this one only when a frame is asked for."""
 
 import time
 import warnings
@@ -46,7 +46,7 @@ class Camera:
     def show(self, data: mujoco.MjData, model: mujoco.MjModel | None = None) -> NDArray | None:
         """One frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time.
 
-        `model` is that of `data`, the last one without it; another one opens window or renderer anew.
+        `model` is that of `data`; None stands for the model of the last frame. Another model opens a new window.
         """
         if model is not None and model is not self._model:
             self.close()
@@ -63,7 +63,7 @@ class Camera:
         return None
 
     def close(self) -> None:
-        """Give window and OpenGL context back; may be called again."""
+        """Give back window and OpenGL context; a second call does nothing."""
         for drawing in (self._window, self._renderer):
             if drawing is not None:
                 drawing.close()
