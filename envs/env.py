@@ -31,7 +31,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
 
     ## Action space
     `Box(-1, 1, (4,), float32)`, from -1 to 1 on a log scale over the stiffness range (`action_mode="absolute"`) or as
-    K = K_schedule exp(action) (`"residual"`). What lies outside is clipped; NaN is refused.
+    K = K_schedule exp(action) (`"residual"`). Values outside are clipped; NaN is refused.
 
     | Num | Action      | Stiffness at -1 | Stiffness at +1 | Unit     |
     | --- | ----------- | --------------- | --------------- | -------- |
@@ -231,7 +231,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         return self._camera.show(self.biped.data(0), self.biped.model_of(0))
 
     def close(self) -> None:
-        """Close the window, if any."""
+        """Close the window, if there is one."""
         if self._camera is not None:
             self._camera.close()
 
@@ -243,7 +243,7 @@ def spaces_of(biped: Biped) -> tuple[Box, Box]:
 
 
 def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The options of a reset; refuses unknown ones and a start that is neither a phase nor "random"."""
+    """The options of a reset; raises `SpringfootError` for an unknown one or a bad start."""
     options, allowed = options or {}, ("start", *DRAWN, *more)
     for name in options:
         if name not in allowed:
@@ -254,7 +254,7 @@ def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) ->
 
 
 def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
-    """What the options of a reset say of the N environments' bodies and speeds, (N,) by the names of `DRAWN`."""
+    """Bodies and speeds that the options of a reset set in N environments: (N,) by the names of `DRAWN`."""
     given = {}
     for name in DRAWN:
         if name in options:
@@ -269,14 +269,14 @@ def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
 
 
 def check_render_mode(mode: str | None) -> str | None:
-    """The render mode; refuses an unknown one."""
+    """The render mode; raises `SpringfootError` for an unknown one."""
     if mode is not None and mode not in RENDER_MODES:
         raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {mode!r}")
     return mode
 
 
 def check_can_render(mode: str | None) -> str:
-    """The render mode; refuses to render without one."""
+    """The render mode; raises `SpringfootError` if there is none."""
     if mode is None:
         raise SpringfootError(f"make the environment with render_mode {' or '.join(map(repr, RENDER_MODES))} to render")
     return mode

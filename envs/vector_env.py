@@ -1,4 +1,4 @@
-"""`SegmentedFootBiped` N times over in one batched simulation, as a Gymnasium `VectorEnv`."""
+"""N of `SegmentedFootBiped` in one batched simulation, as a Gymnasium `VectorEnv`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,13 +27,13 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
     Environment i of a vector seeded with s does what `SegmentedFootBiped` seeded with s + i does.
 
     Args:
-        num_envs: N.
+        num_envs: number N of environments.
         autoreset_mode: `AutoresetMode` or its value: "NextStep" (the step after an episode's last one ignores the
             action and resets), "SameStep" (`final_obs`, `final_info` in the info), "Disabled"
             (`reset(options={"reset_mask": mask})` by the caller).
-        num_threads: of the physics; any number gives the same bits.
-        max_episode_steps: truncate after so many steps, where `episode_seconds` is longer.
-        render_mode: "rgb_array" (a frame of each), "human" (a window on the first) or None.
+        num_threads: threads of the physics; any number gives the same bits.
+        max_episode_steps: number of steps after which an episode is truncated, if `episode_seconds` is longer.
+        render_mode: "rgb_array" (a frame of each environment), "human" (a window that shows the first) or None.
         settings: as for `SegmentedFootBiped`.
     """
 
@@ -65,7 +65,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self._over = np.ones(num_envs, bool)
         self._started = False
         everyone = np.ones(num_envs, bool)
-        everyone.flags.writeable = False  # it is handed out at every step at which nobody resets
+        everyone.flags.writeable = False  # it is handed out at every step in which no environment resets
         self._all_true: dict[str, Any] = dict.fromkeys((*_NAMES, *(f"_{name}" for name in _NAMES)), everyone)
 
     @property
@@ -83,8 +83,8 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
     ) -> tuple[NDArray, dict[str, Any]]:
         """Start episodes in all environments, or in those of `options["reset_mask"]`, a bool array (N,).
 
-        `seed` s gives environment i the seed s + i; a list gives each its own. `options` else as in the Env, `height`,
-        `mass` and `speed` also as (N,) arrays.
+        A `seed` s gives environment i the seed s + i; a list gives each environment its own. Other `options` are as in
+        the Env; `height`, `mass` and `speed` may also be (N,) arrays.
         """
         chosen = check_options(options, ("reset_mask",))
         given = bodies_and_speeds(chosen, self.num_envs)
@@ -142,7 +142,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self.biped.reset(ids, [self._generators[index] for index in ids], start, given)
 
     def _check_running(self) -> None:
-        """Refuses a step of environments that someone should have reset before."""
+        """Raise `SpringfootError` if an environment has to be reset before it can step."""
         if self._started and self.autoreset_mode is not AutoresetMode.DISABLED:
             return
         waiting = np.array([generator is None for generator in self._generators])
@@ -174,7 +174,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
 
 
 def _masked(result: StepResult, mask: NDArray) -> dict[str, Any]:
-    """Gymnasium's form of a vector's info: fresh arrays, each with `_name`, the mask of whom it is about."""
+    """Gymnasium's form of a vector's info: fresh arrays by name, and for each a mask `_name` of where it holds."""
     if not np.count_nonzero(mask):
         return {}
     values, reasons = np.where(mask, result.values.T, 0.0), result.termination.copy()
@@ -204,7 +204,7 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> BipedSettings:
-    """Gymnasium puts no TimeLimit around a vector entry point: the limit goes into the settings."""
+    """Settings with the limit in them, as Gymnasium puts no TimeLimit around a vector entry point."""
     if max_episode_steps is None:
         return settings
     limit = require_count("max_episode_steps", max_episode_steps) * settings.step_seconds

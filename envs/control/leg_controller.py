@@ -28,7 +28,7 @@ from .subjects import Subjects
 KNOTS = np.arange(10) / 10
 """Stride phases of the knots of the corrections to people's curves, which are periodic cubic splines."""
 STANCE_FALL = (0.5, 0.6)
-"""Stride phases over which the trunk torque of the leg that ends its stance falls to zero; chosen, double support."""
+"""Stride phases over which the trunk torque of a leg falls to zero as its stance ends; chosen, about double support."""
 TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
 """Vertical force of a foot that counts as touchdown [body weights]; chosen: 30 N at 63 kg, as of force plates."""
 TOUCHDOWN_PHASE = 0.80

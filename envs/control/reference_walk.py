@@ -1,4 +1,4 @@
-"""What a body is asked to do at each speed: people, plan and leg constants, at a few speeds of one body.
+"""What a body is asked to do: people, plan and leg constants, tabulated at a few speeds of one body.
 
 The body is that of the settings. Between two tabulated speeds everything is linear in speed. Since mechanics scale
 exactly (`envs.physics.model`), another body at a Froude-equal speed does the same in its own units
@@ -25,14 +25,14 @@ from .phase_table import GRID
 from .standing import SLOW_SPEED
 
 SPACING = 0.1
-"""Between tabulated speeds [m/s at 1.70 m, scaled with its square root]: half-way, the plan's CoM lies within 1.4 mm of
-the one planned for that speed, most of it where people's measured speeds meet."""
+"""Distance of tabulated speeds [m/s at 1.70 m, scaled with the square root of height]; chosen: half-way between them,
+the interpolated CoM is within 1.4 mm of the one planned for that speed, and farthest where people's data meet."""
 
 
 FED = ("hip", "knee", "ankle")
 """Joints to which a moment is fed forward."""
 FED_HARMONICS = 8
-"""Fourier terms of the plan's moments that are fed forward: its stiff contacts make them jump, people's do not."""
+"""Fourier terms of the plan's moments that are fed forward; chosen: as its contacts are stiff, its moments jump."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,11 +42,11 @@ class ReferenceWalk:
     body: Body
     """The settings' body."""
     speed: float
-    """[m/s]."""
+    """Walking speed [m/s]."""
     human: HumanGait
-    """Whom it is held to."""
+    """The gait that the body is held to."""
     plan: WalkPlan
-    """Its CoM and the time of its strides."""
+    """The planned motion of the CoM, and the time of a stride."""
     constants: tuple[LegConstants, ...]
     """Leg constants: one set, or several variants."""
     moments: NDArray
@@ -56,7 +56,7 @@ class ReferenceWalk:
 def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[ReferenceWalk, ...]:
     """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first.
 
-    `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
+    `legs` are leg constants in place of the committed ones, and the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
     """
     return tuple(reference_walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
@@ -86,7 +86,7 @@ def reference_walk_at(
 
 
 def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
-    """(SAMPLES, 3) of `ReferenceWalk.moments`, as measured."""
+    """(SAMPLES, 3) `ReferenceWalk.moments` as they were measured on people."""
     moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
@@ -106,10 +106,10 @@ def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, Referen
 
 
 def tabulated_speeds(settings: BipedSettings) -> NDArray:
-    """(G,) ascending speeds [m/s] of the settings' body that are Froude-equal to all that the settings may ask for.
+    """(G,) ascending speeds [m/s] of the settings' body, up to the Froude equals of all that the settings can ask for.
 
-    Without ranges it is the settings' speed alone; with them, the multiples of `SPACING` around and the settings'
-    speed among them.
+    Without ranges that is the settings' speed alone. With ranges it is the multiples of `SPACING` that enclose them,
+    and the settings' speed.
     """
     height, speed = settings.height, settings.speed
     lowest, highest = (sqrt(height / other) for other in reversed(settings.height_range or (height, height)))
@@ -121,11 +121,11 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     if slow == fast:
         return np.array([speed])
     first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
-    grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # 1.2, and not 12 x 0.1
+    grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
     return np.array(sorted({*grid, speed}))
 
 
 @lru_cache(maxsize=256)
 def _plan(body: Body, speed: float, cadence: Cadence) -> WalkPlan:
-    """People's, kept: planning takes a tenth of a second."""
+    """The plan with people's steps, cached, as planning takes a tenth of a second."""
     return plan_walk(body, speed, cadence)

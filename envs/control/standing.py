@@ -1,12 +1,14 @@
 """Standing, setting off and stopping: the springs that hold a body while it does not walk.
 
-Before a walk both feet stand side by side, every joint a stiff spring; the ankles' rest angle keeps the CoM at its
-place over the feet, the hips keep the trunk upright. To set off, that place moves ahead until the body falls forward at
-`OFF_SPEED`: then it walks, at first slowly. To stop, it is commanded down to `SLOW_SPEED`, and soon after the next
-touchdown the same springs hold it as it is, one foot ahead of the other. Ankle and toe stiffness are these springs' own
-while it stands, and those of the fixed schedule while it sets off and slows down: a policy acts in the steady walk
-between, which is what it has learnt. Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body
-(see `envs.physics.model`).
+Before a walk both feet stand side by side, and every joint is a stiff spring. The ankles' rest angle keeps the CoM at
+its place over the feet; the hips keep the trunk upright. To set off, that place moves ahead until the body falls
+forward at `OFF_SPEED`; then the body walks, slowly at first. To stop, the commanded speed goes down to `SLOW_SPEED`;
+soon after the next touchdown the same springs hold the body as it is, one foot ahead of the other. Ankle and toe
+stiffness are those of these springs while the body stands, and those of the fixed schedule while it sets off and slows
+down. A policy acts in the steady walk between, which is all it has learnt.
+
+Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`). Unless a
+source is given they were chosen by trial: bodies set off, walk and come to rest with them (`tests/test_standing.py`).
 """
 
 from collections.abc import Sequence
@@ -27,64 +29,66 @@ from ..timing import CONTROL_WINDOW
 from .subjects import Subjects
 
 STIFFNESS = (1200.0, 800.0, 350.0, 60.0)
-"""Of hip, knee, ankle and toe [N m/rad]: two ankles must outdo gravity, body weight x CoM height (600 N m/rad)."""
+"""Stiffness of hip, knee, ankle and toe [N m/rad]: two ankles must outdo gravity, body weight x CoM height (600)."""
 BALANCE = 2.0
 """Plantarflexion of the ankles' rest angle for each metre the CoM is ahead of its place [rad/m]."""
 TRUNK_STIFFNESS, TRUNK_DAMPING = 750.0, 140.0
-"""Torque of each hip for the trunk's pitch and its rate [N m/rad, N m s/rad]."""
+"""Torque of each hip against the pitch of the trunk [N m/rad] and against its rate [N m s/rad]."""
 TRUNK_FREE = 0.8
-"""Share of the trunk's pitch that the hips' rest angle follows: 0 holds the thighs to the trunk, 1 to the vertical."""
+"""Share of the trunk's pitch that the hips' rest angle follows [-]: 0 holds thighs to the trunk, 1 to the vertical."""
 
 STAND_SECONDS = (0.8, 1.2)
-"""Time of standing before it sets off, drawn from this range [s]."""
+"""Time of standing before the body sets off, drawn from this range [s]."""
 STAND_KNEE = (0.05, 0.12)
-"""Flexion of both knees meanwhile, drawn from this range [rad]."""
+"""Flexion of both knees while it stands, drawn from this range [rad]."""
 STAND_COM = 0.04
 """Place of the CoM ahead of the ankles [m]: people's, about the middle of the foot."""
 LEAN, LEAN_SECONDS = 0.30, 0.5
-"""How far the place moves ahead to set off [m], and within what time [s] (design study)."""
+"""How far the place of the CoM moves ahead to set off [m], and within what time [s]."""
 OFF_SPEED, OFF_PHASE = 0.30, 0.16
-"""Forward speed of the CoM at which it walks [m/s], and the stride phase of the stance leg then."""
+"""Forward speed of the CoM at which the body begins to walk [m/s], and the stride phase of its stance leg then [-]."""
 OFF_SECONDS, EARLY_SECONDS = 1.0, 2.0
-"""From the start of the lean to the walk it takes no longer than the first [s]; its fixed stiffness lasts for at least
-the second, and until the commanded speed is reached [s]."""
+"""Longest time from the start of the lean to the start of the walk [s]; least time of walking with the fixed stiffness,
+which lasts until the commanded speed is reached [s]."""
 SLOW_SPEED = 0.9
-"""Commanded as it sets off, and reached before it stops [m/s]."""
+"""Commanded speed as the body sets off, and that to which it slows down before it stops [m/s]."""
 LANDED = (0.015, 0.06)
-"""Stride phases of the leg that landed in which a body stops, some 20 ms after touchdown (design study)."""
+"""Stride phases of the leg that has landed between which a body stops [-], some 20 ms after touchdown."""
 STOP_COM, STOP_PITCH = -0.05, 0.05
-"""Stopped: place of the CoM ahead of mid-way between the ankles [m], trunk pitch [rad]."""
+"""Place of the CoM ahead of mid-way between the ankles [m], and trunk pitch [rad], of a stopped body."""
 STOP_KNEE = 0.12
-"""Stopped: how far both knees give way [rad], as on stiff legs the body would tip over its front foot."""
+"""How far both knees give way when a body stops [rad]: on stiff legs it would tip over its front foot."""
 HIP_HEIGHT, DRAW_SECONDS = 0.8, 0.5
-"""Stopped: height of the hips [m], and the time [s] in which they take over what pushes the feet apart: friction alone
-would let them creep."""
+"""Height of the hips of a stopped body [m], and the time constant [s] with which they take over what pushes its feet
+apart; without that the feet creep, as friction alone holds them."""
 
 WALKING, STANDING, STARTING, STOPPING, STOPPED = range(5)
+
+"""What a body does: see `Standing.mode`."""
 
 GAINS = np.dtype([("stiffness", float, len(JOINTS)), ("balance", float), ("trunk", float), ("trunk_damping", float)])
 HELD = np.dtype(
     [
         ("mode", np.int64),  # one of the five above
-        ("begin", float),  # time at which it leans, and then that at which it walks [s]
-        ("place", float),  # of the CoM ahead of mid-way between the ankles [m]
-        ("pitch", float),  # held by the trunk [rad]
-        ("draw", float),  # of the hips' rest angles, which brings the legs together [rad]
-        ("rest", float, (len(SIDES), len(JOINTS))),  # [rad], the hips' with an upright trunk
-        ("length", float),  # ratios to 1.70 m
-        ("time", float),
-        ("torque", float),  # mass x height, to those of 63 kg and 1.70 m
+        ("begin", float),  # time at which the body begins to lean; once it walks, time at which it began to [s]
+        ("place", float),  # where the CoM is held, ahead of mid-way between the ankles [m]
+        ("pitch", float),  # pitch at which the trunk is held [rad]
+        ("draw", float),  # shift of the hips' rest angles that brings the legs together [rad]
+        ("rest", float, (len(SIDES), len(JOINTS))),  # rest angles [rad], those of the hips for an upright trunk
+        ("length", float),  # ratio of the height to 1.70 m
+        ("time", float),  # square root of that
+        ("torque", float),  # ratio of mass x height to that of 63 kg and 1.70 m
     ]
 )
-"""How one body is held."""
+"""How one body is held; changed in place."""
 
 
 class Standing:
-    """Who of N bodies stands, and how.
+    """Which of N bodies stand, and the springs that hold them.
 
     Args:
-        settings: when they stop.
-        subjects: bodies and speeds, told the commanded speed of setting off and stopping.
+        settings: when the bodies stop.
+        subjects: bodies and commanded speeds; it is told the speeds of setting off and stopping.
     """
 
     def __init__(self, settings: BipedSettings, subjects: Subjects):
@@ -95,15 +99,16 @@ class Standing:
 
     @property
     def mode(self) -> NDArray:
-        """(N,) `WALKING` steadily, `STANDING` before that, `STARTING` or `STOPPING` (walking both), or `STOPPED`."""
+        """(N,) what each body does: `STANDING`, `STARTING`, `WALKING` steadily, `STOPPING`, `STOPPED`, in this order; in
+        the middle three it walks."""
         return self._held["mode"]
 
     def reset(
         self, ids: NDArray, randoms: Sequence[np.random.Generator], slope: NDArray, standing: bool
     ) -> tuple[NDArray, NDArray, NDArray, NDArray] | None:
-        """Let `ids` (K,) stand, or else walk; the posture to stand in (`envs.task.initial_state.place`), None to walk.
+        """Begin episodes of bodies `ids` (K,), all `standing` or all walking, on ground of a slope (K,) [rad].
 
-        `slope` (K,) of the ground [rad], uphill positive.
+        Returns the posture to stand in, as for `envs.task.initial_state.place`; None for bodies that walk.
         """
         held = self._held
         held["mode"][ids] = STANDING if standing else WALKING
@@ -124,9 +129,9 @@ class Standing:
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
     def switch(self, m: Measurement, leg_phase: NDArray, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
-        """Before a step at `time` (N,) [s], let those `running` (N,) set off or stop whose moment it is.
+        """Before a step at `time` (N,) [s], let those `running` (N,) set off or stop whose time has come.
 
-        Returns who of them walks (N,), and who of these on the fixed schedule (N,).
+        Returns (N,) the bodies that run and walk, and (N,) those of them that walk with the fixed schedule.
         """
         mode, before, subjects = self._held["mode"], self._held["mode"].copy(), self._subjects
         state = m.com_velocity, subjects.speed, subjects.target, leg_phase
@@ -136,6 +141,7 @@ class Standing:
         return scheduled | (running & (mode == WALKING)), scheduled
 
     def _told(self, before: NDArray, m: Measurement) -> None:
+        """Do what follows from a change of mode since `before` (N,)."""
         held, subjects = self._held, self._subjects
         new = [np.flatnonzero((before != held["mode"]) & (held["mode"] == mode)) for mode in range(5)]
         for ids, tell in ((new[STARTING], subjects.begin), (new[STOPPING], subjects.end)):
@@ -148,10 +154,10 @@ class Standing:
         held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]
         held["place"][ids] = STOP_COM * held["length"][ids]
 
-    def command(self, m: Measurement, who: NDArray, control: NDArray) -> None:
-        """Put stiffness [N m/rad] and drive torque [N m] of those of `who` (N,) into `control` (N, side, joint, 2)."""
-        _draw(self._gains, who, m.ankle, m.force, self._held)
-        _command(self._gains, who, m.base, m.base_velocity, m.com, m.ankle, self._held, control)
+    def command(self, m: Measurement, standing: NDArray, control: NDArray) -> None:
+        """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into `control`."""
+        _draw(self._gains, standing, m.ankle, m.force, self._held)
+        _command(self._gains, standing, m.base, m.base_velocity, m.com, m.ankle, self._held, control)
 
 
 def steady_walk(settings: BipedSettings) -> tuple[float, float]:
@@ -167,19 +173,19 @@ def steady_walk(settings: BipedSettings) -> tuple[float, float]:
 
 
 def off_phase(drawn: float) -> float:
-    """Stride phase of the left leg to set off with, the leg in stance being that of a `drawn` phase."""
+    """Stride phase of the left leg with which a body sets off; the stance leg is the one of the `drawn` phase."""
     return OFF_PHASE + (0.0 if drawn < 0.5 else 0.5)
 
 
 @lru_cache(maxsize=1024)
 def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
-    """Thigh (to the vertical), knee, ankle and toe angle [rad], feet flat and the CoM `STAND_COM` ahead of the ankles.
+    """Angles of thigh (to the vertical), knee, ankle, toe [rad] of a standing body, its knees bent by `knee` [rad].
 
-    `knee` [rad]: its flexion.
+    The feet are flat, and the CoM is `STAND_COM` ahead of the ankles.
     """
 
     def com(shank: float) -> float:
-        """Ahead of the ankles [m], the shank's front turned up by `shank`."""
+        """CoM ahead of where it is wanted [m] with the shank's front turned up by `shank` [rad]."""
         knee_x = -body.shank_length * sin(shank)
         hip_x = knee_x - body.thigh_length * sin(shank + knee)
         moment = (body.trunk_mass + body.carried_mass) * hip_x  # trunk and load balance over the hip
@@ -194,7 +200,7 @@ def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
 
 @kernel
 def _switch(running, time, stop_at, com_velocity, speed, target, leg_phase, held):
-    """Whether any mode changed; also moves the CoM's place of those about to set off."""
+    """Change modes whose time has come, move the CoM's place of bodies that lean; returns whether a mode changed."""
     changed = False
     for i in range(len(held)):
         body = held[i]
@@ -219,9 +225,9 @@ def _switch(running, time, stop_at, com_velocity, speed, target, leg_phase, held
 
 
 @kernel
-def _command(gains, who, base, base_velocity, com, ankle, held, control):
+def _command(gains, standing, base, base_velocity, com, ankle, held, control):
     for i in range(len(held)):
-        if not who[i]:
+        if not standing[i]:
             continue
         body = held[i]
         ahead = com[i, 0] - 0.5 * (ankle[i, 0, 0] + ankle[i, 1, 0]) - body.place
@@ -239,11 +245,11 @@ def _command(gains, who, base, base_velocity, com, ankle, held, control):
 
 
 @kernel
-def _draw(gains, who, ankle, force, held):
-    """Moves the hips' rest angles for the torque that stands for the feet's push against each other."""
+def _draw(gains, standing, ankle, force, held):
+    """Move the rest angles of the hips until their torque takes over the push of the feet against each other."""
     for i in range(len(held)):
         body = held[i]
-        if not who[i] or body.mode != STOPPED:
+        if not standing[i] or body.mode != STOPPED:
             continue
         front = 0 if ankle[i, 0, 0] > ankle[i, 1, 0] else 1
         push = 0.0

@@ -1,4 +1,4 @@
-"""Who walks and how fast: the body and the commanded speed of each environment of a batch.
+"""Subjects: the body and the commanded speed of each environment of a batch.
 
 Mechanics scale exactly (`envs.physics.model`). So curves are tabulated for one body, that of the settings, at a few
 speeds (`envs.control.reference_walk`). Each environment has the ratios of its body to that one, and a place in the
@@ -20,22 +20,22 @@ from ..settings import BipedSettings, body_of
 from .phase_table import PLACE
 
 SCALE = np.dtype([("length", float), ("time", float), ("mass", float), ("torque", float)])
-"""Ratios of a body to the settings' own: of height, its square root (of times and speeds), of mass, and mass x height
-(of torque and stiffness)."""
+"""Ratios of a body to that of the settings: of heights; its square root, that of times and speeds; of masses; and of
+mass x height, that of torque and stiffness."""
 DRAWN: tuple[str, ...] = ("height", "mass", "speed")
 """What may be drawn for each environment: settings `<name>_range`, and options of a reset."""
 MOST_DRAWS = 1000
-"""Bodies drawn for one reset before it is given up: ranges of height and mass may hardly have one in common."""
+"""Bodies drawn for one reset before it fails; chosen, as few pairs from wide ranges of height and mass make a body."""
 
 
 class Subjects:
     """Bodies and commanded speeds of N environments; arrays are changed in place.
 
     Args:
-        settings: whose body is the tables' own, and the ranges to draw from.
+        settings: the body that the tables are for, and the ranges to draw from.
         speeds: (G,) tabulated speeds [m/s], ascending (`envs.control.reference_walk.tabulated_speeds`).
-        num: N.
-        variant: (N,) which of several tables each environment reads.
+        num: number N of environments.
+        variant: (N,) index of the table that each environment reads, if there are several.
     """
 
     def __init__(self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None):
@@ -44,17 +44,17 @@ class Subjects:
         self._speeds = speeds
         self._first = np.zeros(num, int) if variant is None else np.asarray(variant, int) * len(speeds)
         self.bodies = [self._home] * num
-        """Of each environment."""
+        """Body of each environment."""
         self.speed = np.full(num, settings.speed)
-        """(N,) commanded now [m/s]."""
+        """(N,) speed commanded now [m/s]."""
         self.place = np.zeros(num, PLACE)
-        """(N,) where that is in tables of variants x speeds."""
+        """(N,) place of that speed in tables of variants x speeds."""
         self.scale = np.ones(num, SCALE)
-        """(N,) ratios of the bodies to the settings' own."""
+        """(N,) ratios of the bodies to that of the settings."""
         self.slope = np.full(num, radians(settings.slope_deg))
-        """(N,) of the ground [rad], uphill positive (`envs.task.ground`)."""
+        """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
         self.target = self.speed.copy()
-        """(N,) which it goes to [m/s]."""
+        """(N,) speed to which the commanded speed goes [m/s]."""
         self._change = np.full(num, np.inf)  # time of the next speed drawn [s]
         self._changing = False
         self._everyone = np.arange(num)
@@ -63,10 +63,15 @@ class Subjects:
     def reset(
         self, ids: NDArray, randoms: Sequence[np.random.Generator], given: Mapping[str, NDArray] | None = None
     ) -> list[int]:
-        """Draw bodies and speeds of environments `ids` (K,) from their generators.
+        """Sample a body and a commanded speed for each environment in `ids` (K,).
 
-        `given` holds (K,) values to be taken instead, by the names of `DRAWN`. Returns those whose body is another.
-        Raises `SpringfootError` for a body that cannot be or a speed beyond the tables, and changes nothing.
+        Args:
+            ids: (K,) which.
+            randoms: K generators to sample from.
+            given: values (K,) to take in place of sampled ones, by the names of `DRAWN`.
+
+        Returns: indices whose body changed and whose model must be rebuilt.
+        Raises `SpringfootError`, leaving all state unchanged, for an impossible body or a speed beyond the tables.
         """
         drawn = [
             self._draw(random, {name: float(values[row]) for name, values in (given or {}).items()})
@@ -85,24 +90,24 @@ class Subjects:
         return others
 
     def command(self, ids: NDArray, speed: NDArray) -> None:
-        """From now on go to `speed` (K,) [m/s], at the settings' `speed_rate`."""
+        """Let the commanded speed of environments `ids` (K,) go to `speed` (K,) [m/s], at the setting `speed_rate`."""
         for index, value in zip(ids.tolist(), speed.tolist(), strict=True):
             self._check(self.bodies[index], value)
         self.target[ids] = speed
         self._changing = True
 
     def begin(self, ids: NDArray, speed: NDArray) -> None:
-        """Command `speed` (K,) [m/s] of environments `ids` (K,) now, from where they go on to their own."""
+        """Set the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s]; from there it goes to its target."""
         self.speed[ids] = speed
         self._changing = True
 
     def end(self, ids: NDArray, speed: NDArray) -> None:
-        """From now on go to `speed` (K,) [m/s], and to no other."""
+        """Let the commanded speed of environments `ids` (K,) go to `speed` (K,) [m/s], and then stay there."""
         self.target[ids], self._change[ids] = speed, np.inf
         self._changing = True
 
     def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
-        """Let a step pass for those `running` (N,), after `steps` (N,); whether any commanded speed changed."""
+        """Let a step pass for those `running` (N,), after `steps` (N,); returns whether any commanded speed changed."""
         settings = self._settings
         if settings.speed_interval is not None:
             time = steps * settings.step_seconds
@@ -119,7 +124,7 @@ class Subjects:
         return True
 
     def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, float]:
-        """The speed first, then bodies until one can be."""
+        """Sample a speed, then bodies until one is possible."""
         settings = self._settings
         ranges = {name: getattr(settings, f"{name}_range") for name in DRAWN}
         values = {name: getattr(settings, name) for name in DRAWN}
@@ -139,7 +144,7 @@ class Subjects:
         return body, values["speed"]
 
     def _wait(self, time: float, random: np.random.Generator) -> float:
-        """When the next speed is drawn after `time` [s]."""
+        """Time at which the next speed is sampled after `time` [s]."""
         interval = self._settings.speed_interval
         return np.inf if interval is None else time + interval * random.uniform(0.5, 1.5)
 
@@ -149,7 +154,7 @@ class Subjects:
         if not low - 1e-9 <= speed <= high + 1e-9:
             raise SpringfootError(
                 f"speed of a body of {body.height:.4g} m must be in [{low:.4g}, {high:.4g}] m/s, got {speed:.4g}; "
-                "speed_range and height_range set what is prepared for"
+                "speed_range and height_range say which speeds and bodies the tables are made for"
             )
 
     def _locate(self, ids: NDArray) -> None:
@@ -158,7 +163,7 @@ class Subjects:
 
 @kernel
 def _approach(most, running, target, speed):
-    """Take a step of at most `most` towards the targets; whether there is still a way to go."""
+    """Change speeds by at most `most` towards the targets; returns whether any is still on its way."""
     under_way = False
     for i in range(len(speed)):
         way = target[i] - speed[i]
@@ -173,7 +178,7 @@ def _approach(most, running, target, speed):
 
 @kernel
 def _locate(ids, speed, scale, speeds, first, place):
-    """Places of environments `ids` between the speeds that are Froude-equal to theirs."""
+    """Find the places of environments `ids` among the speeds, at the speed that is Froude-equal to theirs."""
     last = len(speeds) - 1
     for i in ids:
         equal = speed[i] / scale[i].time

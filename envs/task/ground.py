@@ -1,4 +1,4 @@
-"""The ground below each foot: its slope, and how much higher or lower each footfall is."""
+"""The ground below each foot: its slope, and the height of each footfall above or below the mean ground."""
 
 from collections.abc import Sequence
 from math import radians
@@ -13,29 +13,29 @@ from ..physics.simulation import Simulation
 from ..settings import BipedSettings
 
 NEXT_FOOTFALL_PHASE = 0.75
-"""Stride phase, in mid-swing, at which a foot gets the ground of its next footfall: it is then 35 mm or more above the
-old one."""
+"""Stride phase at which a swinging foot gets the ground of its next footfall; chosen: the foot is then in mid-swing, at
+least 35 mm above the ground it left."""
 
 
 class Ground:
-    """The ground of N bodies; each draws from its environment's own generator.
+    """The ground of N bodies, sampled from the generators of their environments.
 
     Args:
-        settings: slope and unevenness; friction is the simulation's.
-        simulation: whose ground this is.
-        subjects: they own the slope.
+        settings: slope and unevenness; friction is that of the simulation's models.
+        simulation: the simulation whose ground this is.
+        subjects: the bodies, which own the slope.
     """
 
     def __init__(self, settings: BipedSettings, simulation: Simulation, subjects: Subjects):
         self._settings, self._simulation = settings, simulation
         self.slope = subjects.slope
-        """(N,) of the ground [rad], uphill positive."""
+        """(N,) slope of the ground [rad], uphill positive."""
         self.height = np.zeros((simulation.num, len(SIDES)))
-        """(N, side) of the ground below a foot above the mean one [m]."""
+        """(N, side) height of the ground below each foot above the mean ground [m]."""
         self._phase = np.zeros((simulation.num, len(SIDES)))
 
     def reset(self, ids: NDArray, randoms: Sequence[np.random.Generator], leg_phase: NDArray) -> None:
-        """Start episodes of environments `ids` (K,), their legs at phases `leg_phase` (N, side), on even ground."""
+        """Begin episodes of environments `ids` (K,) on even ground, with legs at the phases `leg_phase` (N, side)."""
         if self._settings.slope_range_deg is not None:
             for index, random in zip(ids.tolist(), randoms, strict=True):
                 self.slope[index] = radians(random.uniform(*self._settings.slope_range_deg))
@@ -43,9 +43,9 @@ class Ground:
         self._simulation.lay(ids, self.slope[ids], self.height[ids])
 
     def advance(self, m: Measurement, leg_phase: NDArray, randoms: Sequence[np.random.Generator | None]) -> None:
-        """After a control window: every foot that came to mid-swing gets the ground of its next footfall.
+        """After a control window, give every foot that came to mid-swing in it the ground of its next footfall.
 
-        It is no higher than the foot has room for. `leg_phase` (N, side) is the present one.
+        That ground stays below the foot. `leg_phase` (N, side) are the stride phases after the window.
         """
         if self._settings.unevenness_m == 0.0:
             return

@@ -1,4 +1,4 @@
-"""How an episode starts: at people's posture in single support, or standing, the lowest point just in the floor."""
+"""How an episode starts: in people's posture in single support, or standing, with the lowest point on the floor."""
 
 from collections.abc import Iterable
 
@@ -15,26 +15,29 @@ from ..physics.model import HIP
 from ..physics.simulation import Simulation
 
 START_PHASES = (0.08, 0.38)
-"""A random start lies in this part of either leg's stance: near double support a planned state falls."""
+"""A random start lies between these stride phases of either leg; chosen: near double support bodies fall."""
 START_DEPTH = 0.001
-"""The lowest contact point starts this far in the floor [m at 1.70 m]: about its rest under body weight."""
+"""How deep the lowest contact point starts in the floor [m at 1.70 m]; chosen, about as deep as under body weight."""
 
 
 def start_table(rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> PhaseTable:
-    """People's posture over the stride for each row of the subjects' tables (`envs.control.reference_walk.rows`)."""
+    """People's posture over the stride, for each row of the tables (`envs.control.reference_walk.rows`)."""
     return PhaseTable(np.stack([_start_curves(walk) for _, walk in rows]))
 
 
 def random_phase(random: np.random.Generator) -> float:
-    """A stride phase of the left leg in either leg's single support."""
+    """Sample a stride phase of the left leg that lies in the single support of either leg."""
     return (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
 
 
 def walking_posture(
     table: PhaseTable, subjects: Subjects, ids: NDArray, left_phase: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """People's joint angles and rates (K, side, joint) at `left_phase` (K,) of `table`, the hips' angles against the
-    vertical, trunk pitch (K,) [rad] and the commanded speed (K,) [m/s] of `ids` (K,)."""
+    """People's posture at `left_phase` (K,) of `table`, and the commanded speed, of environments `ids` (K,).
+
+    Returns joint angles, the hips' to the vertical, and rates (K, side, joint) [rad, rad/s]; trunk pitch (K,) [rad];
+    speed (K,) [m/s].
+    """
     curves = table.at(leg_phases(left_phase), subjects.place[ids])
     angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
     return angle, velocity / subjects.scale[ids]["time"][:, None, None], curves[:, 0, -1], subjects.speed[ids]
@@ -47,7 +50,7 @@ def place(
     posture: tuple[NDArray, NDArray, NDArray, NDArray],
     noise: NDArray,
 ) -> None:
-    """Put `ids` (K,) into a `posture` as of `walking_posture`.
+    """Put simulations `ids` (K,) into a `posture` as `walking_posture` returns it.
 
     `noise` (K, 2, side, joint) is the relative error of its angles and rates.
     """
@@ -63,9 +66,9 @@ def place(
 
 
 def _start_curves(walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 9) people's joint angles, hip as thigh to the vertical [rad], their rates [rad/s], trunk pitch [rad].
+    """(SAMPLES, 9): people's joint angles, the thigh's to the vertical [rad], their rates [rad/s], trunk pitch [rad].
 
-    Variants of the leg constants start alike, as the first.
+    All variants of the leg constants start like the first one.
     """
     first = walk.constants[0]
     period = first.period_factor * walk.plan.stride_time

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 class Entry(NamedTuple):
-    """One entry of the observation: name, unit it is divided by, bounds it is clipped to, its meaning, and whether it
-    is measured (else the body knows it of itself)."""
+    """One entry of the observation: its name, the unit that divides it, the bounds that clip it, its meaning, and
+    whether it is measured. What is not measured needs no sensor: the controller has set it itself."""
 
     name: str
     unit: str
@@ -72,8 +72,8 @@ def _entries() -> tuple[Entry, ...]:
 
 
 OBSERVATION = _entries()
-"""Every entry of the observation, in order; l is the leg length (hip to floor when standing), weight that of body and
-load. Nothing tells the body's mass: mechanics scale it away (`envs.physics.model`)."""
+"""Every entry of the observation, in order. l is the leg length (hip to floor when standing); the weight is that of
+body and load. No entry tells the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
 
 
 SEEN = np.dtype(
@@ -98,8 +98,8 @@ class SensorNoise:
     """Gaussian noise on the measured entries of N observations, new at every step.
 
     Args:
-        standard_deviation: in the observation's own dimensionless units.
-        num: N.
+        standard_deviation: of the noise, in the dimensionless units of the observation.
+        num: number N of observations.
     """
 
     def __init__(self, standard_deviation: float, num: int) -> None:
@@ -125,7 +125,7 @@ class SensorNoise:
 
 
 class Observer:
-    """Sees N bodies, commanded a speed each."""
+    """Makes the observations of N bodies."""
 
     def __init__(self, subjects: Subjects) -> None:
         self._subjects = subjects
@@ -133,12 +133,12 @@ class Observer:
         self.high = np.array([entry.high for entry in OBSERVATION], np.float32)
         self._units = np.empty((len(subjects.bodies), len(OBSERVATION)))
         self._ratios = np.empty(len(subjects.bodies))
-        self._row = np.zeros(1, SEEN)  # the body that is being looked at
+        self._row = np.zeros(1, SEEN)  # the body whose observation is being made
         self._entries = self._row.view(float)
         self.fit(range(len(subjects.bodies)))
 
     def fit(self, ids: Iterable[int]) -> None:
-        """Take the bodies of environments `ids` as they are now."""
+        """Take over the present bodies of environments `ids`."""
         for index in ids:
             body = self._subjects.bodies[index]
             self._units[index] = _units(body)
@@ -153,15 +153,15 @@ class Observer:
         last_action: NDArray,
         force: NDArray,
     ) -> NDArray:
-        """The observation, float32 (N, D); what is not a number reads as the upper bound.
+        """The observation, float32 (N, D); NaN reads as the upper bound.
 
         `leg_phase` (N, 2); `error` (N, 3) of the CoM and its speed against the plan [m, m, m/s]; `planned_ankle`
         (N, 2) [rad]; `last_action` (N, 4); `force` (N, 2, 3, 2) on the body [N], mean over the step.
         """
         observation = np.empty((len(leg_phase), len(OBSERVATION)), np.float32)
         state = m.base, m.base_velocity, m.angle, m.velocity, leg_phase, error, planned_ankle, last_action, force
-        who = self._subjects.speed, self._ratios, self._units
-        _observe(*state, *who, self._row, self._entries, self.low, self.high, observation)
+        subject = self._subjects.speed, self._ratios, self._units
+        _observe(*state, *subject, self._row, self._entries, self.low, self.high, observation)
         return observation
 
 
@@ -199,7 +199,7 @@ def _observe(
     high,
     observation,
 ):
-    """`entries` are the numbers of the one body `seen`, in order."""
+    """Fill `observation` row by row; `entries` is `seen`, the record of one body, as plain numbers."""
     row = seen[0]
     for i in range(len(observation)):
         left = leg_phase[i, LEFT]

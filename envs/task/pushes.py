@@ -1,4 +1,4 @@
-"""Pushes on the trunk, as hard on every body: their force goes with its mass, as its weight does."""
+"""Pushes on the trunk. Their force is in proportion to the mass of the body, as its weight is."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from ..settings import BipedSettings
 
 
 class Pushes:
-    """When each environment is pushed: once at a random time in each interval, forward or backward at random."""
+    """Pushes each environment once in each interval, at a random time, forward or backward at random."""
 
     def __init__(self, settings: BipedSettings, subjects: Subjects):
         num, self._scale = len(subjects.bodies), subjects.scale
@@ -25,12 +25,12 @@ class Pushes:
         self._force = np.zeros(num)
 
     def reset(self, index: int, random: np.random.Generator) -> None:
-        """Start an episode of environment `index`."""
+        """Begin an episode of environment `index`."""
         self._ends[index] = 0.0
         self._draw(index, random)
 
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
-        """(N,) push [N] at these step counts; only those running draw their next one."""
+        """(N,) push [N] after `steps` (N,); only environments that are `running` (N,) sample their next push."""
         time = steps * self._step
         for index in np.flatnonzero(running & (time >= self._ends)).tolist():
             generator = random[index]
