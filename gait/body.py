@@ -22,23 +22,23 @@ REFERENCE_MASS = 63.0
 """Mass [kg] of the thesis's body; `mass_scale` is 1 here."""
 
 HEIGHT_RANGE = (1.0, 2.3)
-"""Heights accepted [m]."""
+"""Accepted heights [m]; chosen."""
 MASS_RANGE = (20.0, 250.0)
-"""Body masses accepted [kg]."""
+"""Accepted body masses [kg]; chosen."""
 BMI_RANGE = (10.0, 80.0)
-"""Body-mass indices accepted [kg/m^2]."""
+"""Accepted body-mass indices [kg/m^2]; chosen, wider than people's."""
 LEG_RATIO_RANGE = (0.94, 1.06)
-"""Leg ratios accepted: +-2 SD of adults of one height. SD 3 %: that of sitting height over height is about 0.014, and
-thigh and shank are 0.49 of height (ANSUR II, Gordon et al. 2014, Natick/TR-15/007; remembered, not read)."""
+"""Accepted leg ratios [-]: +-2 SD of adults of one height. SD 3 %: that of sitting height over height is about 0.014,
+and thigh and shank are 0.49 of height (ANSUR II, Gordon et al. 2014, Natick/TR-15/007; remembered, not read)."""
 FOOT_RATIO_RANGE = (0.93, 1.07)
-"""Foot ratios accepted: +-2 SD of adults of one height. SD 3.5 %: about 9 mm of 271 mm (ANSUR II; remembered)."""
+"""Accepted foot ratios [-]: +-2 SD of adults of one height. SD 3.5 %: about 9 mm of 271 mm (ANSUR II; remembered)."""
 CARRIED_RATIO_RANGE = (0.0, 0.4)
-"""Loads accepted [body masses]."""
+"""Accepted loads [body masses]; chosen."""
 CARRIED_BEHIND = 0.2
-"""Centre of a load behind the trunk's CoM, at its height [m at 1.70 m]: half the depth of the chest and of a backpack
-0.15 m thick (design choice)."""
+"""Distance of a load's centre behind the trunk's CoM, at the same height [m at 1.70 m]; chosen: half the depth of the
+chest and half of a backpack 0.15 m thick."""
 CARRIED_GYRATION = 0.15
-"""Radius of gyration of a load [m at 1.70 m]: a uniform box 0.5 m high and 0.15 m thick (design choice)."""
+"""Radius of gyration of a load [m at 1.70 m]; chosen: that of a uniform box 0.5 m high and 0.15 m thick."""
 
 
 def gravity(slope: float) -> NDArray:
@@ -87,12 +87,12 @@ class Body:
 
     @property
     def strength_scale(self) -> float:
-        """Of what the body itself is made of, such as torque limits and damping: mass scale x length scale."""
+        """Mass scale x length scale: how torque limits and joint damping, the body's own strength, scale."""
         return self.mass_scale * self.length_scale
 
     @property
     def stiffness_scale(self) -> float:
-        """Of stiffness and torque that carry all of it, at equal strain: total mass / 63 kg x length scale."""
+        """Total mass / 63 kg x length scale: how stiffness and torque that carry body and load scale."""
         return self.total_mass / REFERENCE_MASS * self.length_scale
 
     # Lengths ------------------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ class Body:
 
     @property
     def toe_joint_height(self) -> float:
-        """Toe joint above the sole: 2 cm at 1.70 m (half the thickness of the ball of the foot; design choice)."""
+        """Toe joint above the sole: 2 cm at 1.70 m (chosen, half the thickness of the ball of the foot)."""
         return 0.02 * self.length_scale
 
     @property
@@ -146,7 +146,7 @@ class Body:
     def trunk_length(self) -> float:
         """Greater trochanter to glenohumeral joint, Winter's HAT (head, arms, trunk) segment (Figure 4.1).
 
-        What longer legs have more it has less, so that all add up to the height.
+        Longer legs make it shorter by as much as they gain, so that all lengths add up to the height.
         """
         return (0.288 - 0.49 * (self.leg_ratio - 1.0)) * self.height
 
@@ -154,7 +154,7 @@ class Body:
 
     @property
     def total_mass(self) -> float:
-        """Body and load: what the legs carry."""
+        """Mass of body and load."""
         return self.mass + self.carried_mass
 
     @property
@@ -174,7 +174,7 @@ class Body:
 
     @property
     def foot_mass(self) -> float:
-        """One foot without its toe: 80 % of Winter's foot (0.0145); the split is a design choice."""
+        """One foot without its toe: 80 % of Winter's foot (0.0145); the split is chosen."""
         return 0.8 * 0.0145 * self.mass
 
     @property
@@ -244,7 +244,7 @@ class Body:
 
     @property
     def carried_mass(self) -> float:
-        """The load's."""
+        """Mass of the load."""
         return self.carried_ratio * self.mass
 
     @property

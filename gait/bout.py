@@ -2,9 +2,9 @@
 
 Its middle is the periodic walk of `plan_walk`; the first and last steps are shorter, at the same cadence. The ZMP runs
 straight between knots, as in the walk. Before the first step it goes back by a shift (people's anticipatory postural
-adjustment), which lets the CoM fall forward; after the last it stays ahead by another, which catches it. The cart-table
-x'' = (g + z'') / z (x - p) is linear in x and p at moving height too, so that the CoM is the one over the knots plus
-each shift times the response to its unit; the shifts are the two with which it starts and ends at rest.
+adjustment), which lets the CoM fall forward; after the last it stays ahead by another shift, which catches the CoM.
+The cart-table x'' = (g + z'') / z (x - p) is linear in x and p at moving height too. So the CoM is the one over the
+knots plus each shift times the response to a unit of it, and the two shifts make it start and end at rest.
 """
 
 from dataclasses import dataclass, field
@@ -27,15 +27,16 @@ from .posture import POSTURE_SAMPLES, full_reach
 Side = Literal["left", "right"]
 
 MOST_STEPS = 200
-"""Steps planned at most."""
+"""Largest number of steps planned; chosen."""
 STRAIGHTEST = 0.03
-"""Least knee flexion [rad] of a bout; half of the walk's, as its first steps are not quite those of the walk."""
+"""Least knee flexion of a bout [rad]; chosen, half of the walk's: its first steps are not quite those of the walk."""
 DEEPEST_DIP = 0.06
-"""The CoM may come down by this part of the leg length for the legs' sake, and no more; it is 0.013 at 1.2 m/s."""
+"""How far the CoM may come down for legs that do not reach [leg lengths]; chosen: at 1.2 m/s it is 0.013."""
 BESIDE = 0.03
-"""A ZMP knot this part of a sample's interval from a sample counts as on it: shorter pieces lose digits."""
+"""A ZMP knot nearer to a sample than this counts as on it [sample intervals]: shorter pieces lose digits."""
 MOST_TRIES, CLOSE = 12, 2e-5
-"""Of how far the CoM has to come down; to this [m], a fifth of what `STRAIGHTEST` leaves."""
+"""Most iterations for how far the CoM has to come down, and the accuracy [m] at which they end, a fifth of the reach
+that `STRAIGHTEST` leaves."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,7 +54,7 @@ class Bout:
     step_lengths: NDArray
     """(steps,) [m]; the closing foot comes beside the last one."""
     zmp_shifts: tuple[float, float]
-    """ZMP before the first step and after the last [m], forward of where it is in standing: the first is negative."""
+    """Shifts of the ZMP before the first step, negative, and after the last [m], forward of its place in standing."""
     path: PPoly = field(repr=False)
     """CoM (x, z) [m] over time."""
     feet: dict[Side, BoutFoot] = field(repr=False)
@@ -64,12 +65,12 @@ class Bout:
 
     @property
     def duration(self) -> float:
-        """Standing to standing [s]."""
+        """Time from standing to standing [s]."""
         return float(self.path.x[-1])
 
     @property
     def heel_strikes(self) -> NDArray:
-        """(steps + 1,) landings [s], the closing foot's the last; the first is by foot `first`, then they alternate."""
+        """(steps + 1,) landings [s]: that of foot `first`, then alternating; the last is the closing foot's."""
         return self.plan.step_time * np.arange(BEFORE, BEFORE + len(self.step_lengths) + 1)
 
     def com(self, time: ArrayLike) -> Point:

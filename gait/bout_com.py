@@ -13,21 +13,21 @@ from .body import GRAVITY
 from .plan import WalkPlan
 
 BEFORE, AFTER = 2, 2
-"""Step times from the start to the first heel strike, and from the closing foot's landing to the end."""
+"""Step times from the start to the first heel strike, and from the closing foot's landing to the end; chosen."""
 RAMP_STEPS = 3
 """First steps, and last ones, that are shorter than the walk's: people are at speed after one (Breniere & Do, J Biomech
 19 (1986) 1035) to three steps (Mann et al., Acta Orthop Scand 50 (1979) 761)."""
 FIRST_STEP = 0.55
-"""What the first step, and the last, are longer than the ZMP's travel along the foot, over the same of the walk's: of
-those tried, the one with which the body has to come down least."""
+"""Length of the first and of the last step beyond the ZMP's travel along the foot, over that of a step of the walk;
+chosen: of the values tried, the body has to come down least with this one."""
 STANDING_COM = 0.03
-"""CoM and ZMP forward of the ankles in standing [m, at 1.70 m]; people's is 0.03 to 0.06."""
+"""Distance of CoM and ZMP ahead of the ankles in standing [m at 1.70 m]; chosen: people's is 0.03 to 0.06."""
 EASE = 1.5
-"""Step times in which the CoM comes down from standing to the height of the walk, and up again."""
+"""Step times in which the CoM comes down from standing to the height of the walk, and goes up again; chosen."""
 
 
 def step_lengths_of(plan: WalkPlan, steps: int) -> NDArray:
-    """Lengths (steps,) [m]: what the first ones lack shrinks from step to step as a cart-table's lack of speed does."""
+    """Lengths (steps,) [m]. What the first ones lack shrinks from step to step as a cart-table's lack of speed does."""
     shrinks = 1 / np.cosh(plan.step_time * np.sqrt(GRAVITY / plan.motion.height))
     from_end = np.minimum(np.arange(steps), np.arange(steps)[::-1])
     _, (_, zmp_from, zmp_to) = zmp_of_walk(plan)
@@ -82,7 +82,7 @@ def _eased(time: NDArray, start: float, end: float) -> NDArray:
 
 
 def _product(a: NDArray, b: NDArray) -> NDArray:
-    """Of two functions (3, T) given by value and two derivatives, likewise."""
+    """Product (3, T) of two functions (3, T), all given by value and two derivatives."""
     return np.stack([a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2 * a[1] * b[1] + a[0] * b[2]])
 
 
@@ -123,7 +123,7 @@ def com_from_rest_to_rest(
 
 
 def quintics(time: NDArray, motion: NDArray) -> PPoly:
-    """Twice continuously differentiable through `motion` (3, T, n): values and two derivatives at `time` (T,)."""
+    """Twice continuously differentiable curves through `motion` (3, T, n): values, two derivatives at `time` (T,)."""
     h = np.diff(time)[:, None]
     (x, v, a), (x1, v1, a1) = motion[:, :-1], motion[:, 1:]
     dx, dv, da = x1 - x - v * h - a * h**2 / 2, (v1 - v - a * h) * h, (a1 - a) * h**2

@@ -16,16 +16,16 @@ from .posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoutFoot:
-    """One foot through the bout: strides, each from flat foot to flat foot, and where and when they are."""
+    """One foot through the bout: its strides, each from foot flat to foot flat, with their places and times."""
 
     strides: tuple[FootPath, ...]
     """Toe rocker and swing of one stride, and the heel rocker after it."""
     start: NDArray
-    """(strides,) ankle x [m] before each."""
+    """(strides,) x of the ankle before each stride [m]."""
     landing: NDArray
-    """(strides,) heel strike that ends its swing [s]."""
+    """(strides,) time of the heel strike that ends the swing of each stride [s]."""
     stride_time: float
-    """Unit of the strides' phases [s]."""
+    """Time of a stride whose phase is 0 to 1 [s]."""
 
     @property
     def events(self) -> NDArray:
@@ -34,7 +34,7 @@ class BoutFoot:
         return (self.landing[:, None] + self.stride_time * np.array(after_landing)).ravel()
 
     def at(self, time: NDArray) -> Iterator[tuple[NDArray, FootPath, NDArray, NDArray]]:
-        """(mask of the times, stride, its phases, x [m] of its frame at each) for each stride that the times meet."""
+        """For each stride that the times meet: mask of its times, the stride, phases and x [m] of its frame at each."""
         flat = self.landing + self.stride_time * np.array([stride.foot_flat for stride in self.strides])
         which = np.searchsorted(flat[:-1], time)
         for i in np.unique(which):
@@ -84,7 +84,7 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
     strides = []
     for k, travel in enumerate(holds[2:] - holds[:-2]):
         leaves, lands = walks[max(k - 1, 0)], walks[min(k, len(walks) - 1)]
-        # From beside the other foot, and to there, it rolls as in a walk whose swing travels as far.
+        # A step that starts or ends beside the other foot rolls as in a walk whose swing travels as far.
         ratio = travel / 2 / body.leg_length
         stride = replace(
             leaves,
@@ -105,7 +105,7 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
 
 
 def _out_of_ground(stride: FootPath) -> FootPath:
-    """Its swing raised to where it is no deeper in the ground than `FLOOR_TOLERANCE`, if it is."""
+    """The stride with its swing raised, if need be, until it is no deeper in the ground than `FLOOR_TOLERANCE`."""
     before_landing = 0.005, 0.9
     heights = stride.swing_heights(before_landing)
     # The swing is linear in its via points: what each of its points gains by a lift of 1 m.

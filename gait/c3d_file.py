@@ -1,7 +1,7 @@
 """C3D files of a motion laboratory -> curves in the names, signs and units of `HumanGait`; needs ezc3d, an extra.
 
-The x components of Plug-in Gait's angles and moments count as ours; its pelvis is positive forward, so thigh = hip -
-pelvis. Should the ankle moment be negative on average, the moments are external ones, and all are turned.
+The x components of Plug-in Gait's angles and moments have our signs; its pelvis is positive forward, so thigh = hip -
+pelvis. If the ankle moment is negative on average, the moments are external ones, and the signs of all are turned.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,7 +18,7 @@ from .human import FORCES
 from .motion_files import FILE_SIDES, Series, Trial, existing, not_empty
 
 PLATE_LOAD = 20.0
-"""A plate bears a foot above this force [N]."""
+"""A force plate bears a foot above this force [N]; chosen, as usual in gait laboratories."""
 _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles", "toe": "HXFFA"} | {
     f"{joint}_moment": f"{joint.capitalize()}Moment" for joint in ("hip", "knee", "ankle")
 }
@@ -27,7 +27,7 @@ _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles
 def c3d_trial(path: Path) -> Trial:
     """A C3D file with Plug-in Gait output; needs ezc3d (the extra `c3d`).
 
-    Read are the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
+    It reads the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
     Model's `LHXFFA` (toe) [deg] and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg]; right with R;
     the events Foot Strike and Foot Off; and the force plates, where the markers LHEE, LTOE, RHEE and RTOE tell which
     foot stands on them and which way is forward.
@@ -40,7 +40,7 @@ def c3d_trial(path: Path) -> Trial:
     try:
         try:
             file = ezc3d.c3d(str(path), extract_forceplat_data=True)
-        except ValueError:  # plates it cannot make sense of; angles may still be read
+        except ValueError:  # ezc3d cannot make sense of the plates; it may still read angles
             file = ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError, IndexError, MemoryError) as error:
         raise SpringfootError(f"{path.name} is not a C3D file that ezc3d can read: {error}") from None
@@ -120,7 +120,7 @@ def _refuse_broken(path: Path) -> None:
 
 
 def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
-    """Foot strikes and foot offs that were marked in the laboratory."""
+    """Foot strikes and foot offs that the laboratory has marked."""
     contexts, labels = (event.get(key, {}).get("value", []) for key in ("CONTEXTS", "LABELS"))
     times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")
     seconds = 60 * times[0] + times[1]
@@ -163,7 +163,7 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
     ahead = np.mean([np.nanmean(toe - heel, axis=1) for heel, toe in feet.values()], axis=0)
     ahead[up] = 0.0
     forward = int(np.abs(ahead).argmax())
-    # A plate reports the foot's push on it or its own on the foot: the reaction is the one that points up.
+    # A plate reports the force of the foot on it, or its own force on the foot: the latter points up.
     sign = np.sign(whole.sum(axis=1)[up])
     return {
         side: (sign * force[up], sign * np.sign(ahead[forward]) * force[forward])

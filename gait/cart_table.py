@@ -17,7 +17,7 @@ from scipy.interpolate import BPoly, PPoly
 from .body import gravity
 
 STEP_SAMPLES = 240
-"""Knots a step of the tabulated CoM path; quintics between them, so that its error stays that of the integration."""
+"""Knots of the tabulated CoM path in a step; with quintics between them its error stays that of the integration."""
 
 
 def zmp(
@@ -35,8 +35,8 @@ def zmp(
 class HyperbolicPath:
     """x(t) of a CoM at constant height over a piecewise polynomial ZMP, in closed form; made by `closed_form`.
 
-    In each piece a polynomial and a cosh and sinh, the latter two as exp(-rate (t - start)), exp(rate (t - end)), which
-    lose no digits in a long piece.
+    In each piece x is a polynomial plus a cosh and a sinh. These two are kept as exp(-rate (t - start)) and
+    exp(rate (t - end)), which lose no digits in a long piece.
     """
 
     polynomial: PPoly
@@ -44,9 +44,9 @@ class HyperbolicPath:
     rate: float
     """sqrt(g cos a / z) [1/s]."""
     fading: NDArray
-    """(pieces,) of exp(-rate (t - start)) [m]."""
+    """(pieces,) coefficients of exp(-rate (t - start)) [m]."""
     growing: NDArray
-    """(pieces,) of exp(rate (t - end)) [m]."""
+    """(pieces,) coefficients of exp(rate (t - end)) [m]."""
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
         """Position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
@@ -66,11 +66,11 @@ class ComMotion:
     height: float
     """Mean height above the floor [m]."""
     amplitude: float
-    """Half of rise and fall [m]."""
+    """Half of the CoM's rise and fall [m]."""
     lowest_at: float
     """Time of the lowest point [s]."""
     slope: float = 0.0
-    """Of the ground [rad], uphill positive: x is along it, z at right angles to it."""
+    """Slope of the ground [rad], uphill positive: x is along it, z at right angles to it."""
     path: PPoly | HyperbolicPath = field(repr=False)
     """Forward position x [m] over time [s]; `path(time, n)` is its n-th derivative."""
 
@@ -142,7 +142,7 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, lasts)
     jump[-1] += step_length
     kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, lasts)) / rate
-    # Their sum concerns the growing exponentials alone, their difference the fading ones.
+    # Their sum determines the growing exponentials alone, their difference the fading ones.
     decay, this = np.exp(-rate * lasts), np.eye(len(lasts))
     following = np.roll(this, 1, axis=1)
     return HyperbolicPath(
@@ -162,7 +162,7 @@ def _integrated(
     lowest_at: float,
     slope: float,
 ) -> PPoly:
-    """`periodic_com` by superposing one particular and two homogeneous solutions: periodic at the cost of 2 x 2."""
+    """The path of `periodic_com` as the sum of one particular and two homogeneous solutions that is periodic."""
     step_time = zmp_times[-1]
     back, down = -gravity(slope)
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 CONTACT_THRESHOLD_BW = 0.05
-"""A foot is on the ground above this vertical force [body weights]: 31 N at 63 kg (force plates: 20 to 30 N)."""
+"""A foot is on the ground above this vertical force [body weights]; chosen: 31 N at 63 kg (plates: 20 to 30 N)."""
 SHORTEST_CONTACT = 0.10
-"""Contacts shorter than this [s] are scuffs of the swinging foot, not stance (people's is 0.5 s and more)."""
+"""Contacts shorter than this [s] are scuffs of the swinging foot; chosen: people's stance takes 0.5 s and more."""
 SHORTEST_FLIGHT = 0.06
-"""Gaps shorter than this [s] are bounces within stance, not swing (people's is 0.35 s and more)."""
+"""Gaps shorter than this [s] are bounces within stance, not swing; chosen: people's swing takes 0.35 s and more."""
 PERCENT = np.arange(101)
 """Percent of the stride (or step) at which curves are given: 0, 1, ..., 100."""
 
@@ -95,7 +95,7 @@ def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first
 
 
 def _without_short_runs(flags: NDArray, value: bool, shortest: float) -> NDArray:
-    """`flags` with inner runs of `value` shorter than `shortest` samples turned over; runs at the ends stay."""
+    """`flags` with inner runs of `value` that are shorter than `shortest` samples inverted; runs at the ends stay."""
     edges = np.flatnonzero(flags[:-1] != flags[1:]) + 1
     bounds = np.concatenate([[0], edges, [len(flags)]])
     result = flags.copy()

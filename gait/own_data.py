@@ -26,7 +26,7 @@ ACCEPTED = {
     "step_length": (0.05, 2.0, "m"),
     "toe_off": (0.3, 0.9, "of the stride"),
 }
-"""Least and largest of what is known beside the curves."""
+"""Least and largest accepted value, and unit, of each parameter beside the curves; chosen."""
 _PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
 _MOST_COEFFICIENTS, _LARGEST = 64, 1e3
 
@@ -55,8 +55,8 @@ class OwnGait:
     def gait(self, speed: float, height: float) -> HumanGait:
         """These curves as a `HumanGait`; what is missing is people's of `height` [m] at `speed` [m/s].
 
-        They are taken as they are, whatever `height` and `speed`. A step length that is not known is what the stride
-        time gives at the own speed, or else at `speed`. `HumanGait.borrowed` names what is people's.
+        They are taken as they are, whatever `height` and `speed`. An unknown step length follows from the stride time
+        and the file's speed, or else `speed`. `HumanGait.borrowed` names what is taken from people.
         """
         people = human_gait(speed, height)
         own: dict[str, float] = {}
@@ -132,7 +132,7 @@ def read_gait(
 
 
 def _from_percent(table: Table, condition: str | None) -> OwnGait:
-    """Mean curves over percent, as they stand in the file."""
+    """Mean curves over percent, as the file has them."""
     table = _one_condition(table, condition)
     mean, sd = our_columns(table), our_columns(table, "_sd")
     if not mean:
@@ -172,15 +172,15 @@ def _one_condition(table: Table, condition: str | None) -> Table:
         raise SpringfootError(f"{table.name} holds {len(blocks)} gaits and no column condition to tell them apart")
     names = [block[0][1][table.columns.index("condition")] for block in blocks]
     if condition not in names:
-        asked = "name one" if condition is None else f"not {condition!r}"
         raise SpringfootError(
-            f"{table.name} holds the conditions {', '.join(names)}; {asked}, as {table.name}:{names[0]}"
+            f"{table.name} holds the conditions {', '.join(names)}; condition must be one of them (on the command "
+            f"line {table.name}:{names[0]}), got {condition!r}"
         )
     return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
 
 
 def _from_walk(walk: MeasuredWalk, side: str, mass: float | None) -> OwnGait:
-    """Strides averaged."""
+    """The mean of the strides of a walk."""
     strides, curves = cut_strides(walk, side, mass)
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
     for name in ("thigh", "hip"):

@@ -26,23 +26,25 @@ Cadence = Literal["people", "thesis"]
 Point = tuple[NDArray, NDArray]
 
 PLAN_SPEED_RANGE = (0.4, 2.0)
-"""Speeds planned [m/s]."""
+"""Accepted speeds [m/s]; chosen: people's data reach from 0.85 to 1.96."""
 SLOPE_RANGE = (radians(-5.0), radians(5.0))
-"""Slopes planned [rad], uphill positive."""
+"""Accepted slopes [rad], uphill positive; chosen."""
 STEP_TIME_RANGE = (0.25, 1.2)
-"""Step times planned [s]; people take 0.4 to 0.7."""
+"""Accepted step times [s]; chosen: people take 0.4 to 0.7."""
 THESIS_STEP_TIME = 0.5
 """Step time of the thesis (T_c) [s], at 1.70 m."""
 DOUBLE_SUPPORT = 0.12
-"""Double support per step: the thesis's 0.06 s of 0.5 s. People take 0.26 at 1.2 m/s, but roll over their toe tips."""
+"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. People's is 0.26 at 1.2 m/s, but they roll over
+their toe tips."""
 ZMP_FROM, ZMP_TO = -0.020, 0.140
-"""ZMP forward of the stance ankle at the start and end of single support [m], at 1.70 m: of those tried, the travel
-that brings the knee nearest to people's at 1.2 m/s."""
+"""ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m]; chosen: of the travels tried,
+this one brings the knee nearest to people's at 1.2 m/s."""
 RISE = 0.65
-"""CoM rise and fall over that of the stiff-legged compass gait, step_length^2 / (8 leg_length): 39 mm at 1.2 m/s, where
-people rise 36 to 39 mm."""
+"""Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]; chosen: 39
+mm at 1.2 m/s, where people's is 36 to 39 mm."""
 MOST_UNLOADING = 0.75
-"""The rise is held down at high speeds, so that the feet never lose more than this part of the weight."""
+"""Largest part of the weight that the rise and fall may take from the feet [-]; chosen; it limits the rise at high
+speeds."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +59,7 @@ class WalkPlan:
     """
 
     body: Body
-    """Whose walk."""
+    """The body that walks."""
     speed: float
     """Mean forward speed along the ground [m/s] = step_length / step_time."""
     step_time: float
@@ -79,12 +81,12 @@ class WalkPlan:
 
     @property
     def slope(self) -> float:
-        """Of the ground [rad], uphill positive."""
+        """Slope of the ground [rad], uphill positive."""
         return self.motion.slope
 
     @property
     def stride_time(self) -> float:
-        """Two steps [s]."""
+        """Time of two steps [s]."""
         return 2 * self.step_time
 
     def com(self, step_phase: ArrayLike) -> Point:
@@ -164,7 +166,7 @@ def plan_walk(
     `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
     (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
     rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
-    `human` stands in people's place (`human_gait`): its step length and time, and its toe in swing.
+    `human` takes the place of people (`human_gait`): its step length and time, and its toe in swing.
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
     is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's.
     Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
@@ -257,7 +259,7 @@ def _refuse_zmp_outside(plan: WalkPlan) -> None:
 
 
 def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolator:
-    """Table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic: what is constant stays constant, nothing overshoots."""
+    """Table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic, which does not overshoot."""
     edge = 4
     padded = np.concatenate([values[-edge:] - shift, values, values[: edge + 1] + shift])
     return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)

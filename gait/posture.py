@@ -14,15 +14,15 @@ from .feet import FootPath, turned
 from .human import HumanGait
 
 POSTURE_SAMPLES = 600
-"""Samples a stride."""
+"""Samples of a stride; chosen."""
 STRAIGHTEST_KNEE = 0.06
-"""Least knee flexion of the stride [rad], which sets the height of the CoM; people's is 0.085 at 1.2 m/s."""
+"""Least knee flexion of the stride [rad], which sets the height of the CoM; chosen: people's is 0.085 at 1.2 m/s."""
 LOWEST_HIP = 0.12
-"""The hip may be planned this part of the leg length below standing, on average, and no lower."""
+"""Largest mean depth of the hip below standing [leg lengths]; chosen."""
 LOWEST_COM = 0.8
-"""No CoM is looked for below this part of the leg length."""
+"""Lowest CoM that is tried [leg lengths]; chosen."""
 DEEPEST_KNEE_DEG = 135.0
-"""Knees bend no further [deg]: the range of motion of the American Academy of Orthopaedic Surgeons (1965)."""
+"""Largest knee flexion [deg]: the range of motion of the American Academy of Orthopaedic Surgeons (1965)."""
 
 
 def leg_angles(
@@ -130,7 +130,7 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     # The toe is back in people's posture a third of swing after toe-off.
     left = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
     swinging = people + left**2 * (feet.toe_off_pitch - human.mean("toe", feet.toe_off))
-    # Its tip no deeper than the floor: early in swing people's posture would be under it.
+    # The tip stays above the floor, under which people's posture would take it early in swing.
     level = np.arcsin(np.clip(feet.ball_clearance(phase) / feet.body.toe_length, 0.0, 1.0))
     swinging = np.maximum(swinging, -feet.pitch(phase) - level)
     return np.select(

@@ -17,18 +17,18 @@ from .body import GRAVITY
 from .errors import SpringfootError, require_number, require_within
 
 HORIZON = 2.4
-"""Seconds of the reference known ahead. With Kajita's 1.6 s the CoM of a walk at 1.2 m/s stays 4.6 mm behind, as what
-lies beyond the horizon counts as standing still; with 2.4 s 0.4 mm."""
+"""How much of the reference is known ahead [s]; chosen. With Kajita's 1.6 s the CoM of a walk at 1.2 m/s stays 4.6 mm
+behind, as the reference counts as constant beyond the horizon; with 2.4 s it stays 0.4 mm behind."""
 ERROR_WEIGHT = 1.0
 """Q_e, of the squared sum of ZMP errors [1/m^2] (Kajita et al. 2003, caption of the preview gains)."""
 JERK_WEIGHT = 1e-6
 """R, of the squared change of jerk from tick to tick [s^6/m^2] (as above; the state has no weight there either)."""
 TICK_RANGE = (1e-4, 0.1)
-"""Ticks accepted [s]."""
+"""Accepted ticks [s]; chosen."""
 HEIGHT_RANGE = (0.05, 10.0)
-"""CoM heights accepted [m]."""
+"""Accepted CoM heights [m]; chosen."""
 FEWEST_SAMPLES = 2
-"""Of a reference."""
+"""Fewest samples of a reference."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

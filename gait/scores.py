@@ -1,8 +1,8 @@
-"""What a gait is worth in numbers: one statistic, one function.
+"""Statistics of a gait, each in a function of its own.
 
-Curves are arrays (101,) over percent 0..100 of the stride (`cycle.PERCENT`) unless said otherwise. What cannot be
-computed (no data, no spread) is None, never NaN. Windows are those in which people's two force peaks and the valley
-between them lie at every walking speed.
+Curves are arrays (101,) over percent 0..100 of the stride (`cycle.PERCENT`) unless said otherwise. A statistic that
+cannot be computed (no data, no spread) is None, never NaN. The windows are those in which people's two force peaks and
+the valley between them lie at every walking speed.
 """
 
 from collections.abc import Mapping
@@ -19,15 +19,15 @@ from .errors import SpringfootError
 FIRST_PEAK_PERCENT = (3, 25)
 """Window of the vertical force's first peak (weight acceptance) [percent of stride]."""
 VALLEY_PERCENT = (15, 45)
-"""Window of its valley (mid-stance)."""
+"""Window of the valley between the peaks (mid-stance) [percent of stride]."""
 SECOND_PEAK_PERCENT = (35, 60)
-"""Window of its second peak (push-off)."""
+"""Window of the second peak (push-off) [percent of stride]."""
 LOADING_END_PERCENT = 10
-"""Loading response: 0 to 10 % of the stride."""
+"""End of the loading response, which begins at 0 [percent of stride]; chosen."""
 PUSH_OFF_BEGIN_PERCENT = 45
-"""Push-off: 45 % to toe-off; mid-stance lies between loading and push-off."""
+"""Begin of push-off, which ends at toe-off [percent of stride]; chosen. Mid-stance ends where push-off begins."""
 REST_SECONDS, REST_TRAVEL = 1.0, 0.01
-"""A body is at rest whose points stay within so many metres, forward and up, for so long [s] at the end."""
+"""A body is at rest if its points stay for this time at the end [s] within this distance in x and z [m]; chosen."""
 
 
 def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
@@ -107,7 +107,7 @@ def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
 
 @dataclass(frozen=True, kw_only=True)
 class ForceTiming:
-    """When the landmarks of `ForceFeatures` stand [percent of stride]; the first sample where several are equal."""
+    """Where the landmarks of `ForceFeatures` lie [percent of stride]; the first of several equal samples."""
 
     vertical_peak1: int | None
     vertical_valley: int | None

@@ -17,20 +17,21 @@ from .human import human_gait
 SPRINGS = ("ankle", "toe")
 """The joints of a schedule, in the order of the last axis of its arrays."""
 TOE_STIFFNESS = 28.0
-"""Toe joint under load [N m/rad] for 1.70 m and 63 kg: near the low end of barefoot estimates, 25-60; the thesis has no
-number of its own."""
+"""Stiffness of the toe joint under load [N m/rad] for 1.70 m and 63 kg; chosen, near the low end of barefoot estimates,
+25 to 60, as the thesis has no number of its own."""
 LOWEST_STIFFNESS = (20.0, 5.0)
-"""Ankle and toe in swing [N m/rad] for 1.70 m and 63 kg: the least a walk with springs can set; the thesis says 0."""
+"""Stiffness of ankle and toe in swing [N m/rad] for 1.70 m and 63 kg; chosen, the least that an action sets by default;
+the thesis says 0."""
 STIFFNESS_RANGE = (0.0, 1e5)
-"""Stiffnesses accepted in a schedule [N m/rad]."""
+"""Accepted stiffnesses of a schedule [N m/rad]; chosen."""
 ANGLE_RANGE = (-np.pi, np.pi)
-"""Equilibrium angles accepted in a schedule [rad]."""
+"""Accepted equilibrium angles of a schedule [rad]."""
 HEEL_OFF_RISE = 0.05
-"""The heel is off when the toe has made this part of its rise from its lowest angle in stance to its largest."""
+"""Part of the toe's rise, from its lowest angle in stance to its largest, at which the heel is off [-]; chosen."""
 
 
 class Segment(NamedTuple):
-    """A spring from one stride phase to the next segment's."""
+    """A spring that holds from one stride phase to that of the next segment."""
 
     start: float
     """Stride phase [0, 1) of this leg at which it begins."""
@@ -44,7 +45,7 @@ class Segment(NamedTuple):
 class StiffnessSchedule:
     """Piecewise constant springs over the stride: tau = K (theta_eq - theta), positive as the angle.
 
-    Each joint's segments ascend in phase; before the first one the last one of the stride before still holds. Raises
+    Each joint's segments ascend in phase; before the first one, the last one of the previous stride still holds. Raises
     `SpringfootError` for segments out of order, of bad numbers, or missing.
     """
 
@@ -65,7 +66,7 @@ class StiffnessSchedule:
         stiffness, equilibrium = np.empty((2, *phase.shape, len(SPRINGS)))
         for column, joint in enumerate(SPRINGS):
             starts, springs, rests = np.array(getattr(self, joint)).T
-            # Index -1 before the first start: the last segment of the stride before.
+            # Before the first start the index is -1: the last segment of the previous stride.
             index = np.searchsorted(starts, phase, side="right") - 1
             stiffness[..., column], equilibrium[..., column] = springs[index], rests[index]
         return stiffness, equilibrium
@@ -179,8 +180,8 @@ def thesis_schedule(
 ) -> StiffnessSchedule:
     """The thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
 
-    Torques scale with mass x height from people's at `speed` [m/s]. Of the toe people's moment is not known: it has
-    `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. In swing both springs rest at 0 with
+    Torques scale with mass x height from people's at `speed` [m/s]. People's moment of the toe is not known: the
+    toe has `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. In swing both springs rest at 0 with
     `swing_stiffness` (ankle, toe) [N m/rad, for 1.70 m and 63 kg]; no line of the ankle falls below it.
     """
     human = human_gait(speed, body.height)

@@ -15,22 +15,22 @@ from .leg import FOOT_SEGMENT, joint_positions, segment_turns
 from .motion_files import Series, Trial, refuse_absurd
 
 FEWEST_STRIDES = 2
-"""Strides, of both feet together, that a mean and its spread need."""
+"""Fewest strides, of both feet together, for a mean and its spread."""
 LONGEST_TICK = 1 / 30
-"""Time between samples [s] that still shows when a foot lands."""
+"""Longest time between samples [s]; chosen: with a longer one the time of a landing is lost."""
 SHORTEST_TICK = 1e-3
-"""Finer sampling is thinned out to this [s]."""
+"""Shortest time between samples [s]; chosen: finer sampling is thinned out to it."""
 LONGEST_GAP = 0.1
-"""Time without samples [s] that is bridged in a straight line."""
+"""Longest time without samples that is bridged by a straight line [s]; chosen."""
 UNEVEN_STRIDE = 0.25
-"""A stride longer or shorter than the median one by more than this share is a missed event or a turn, and left out."""
+"""A stride longer or shorter than the median by more than this share is left out, as a missed event or turn; chosen."""
 HEEL_STRIKE_AFTER, TOE_OFF_AFTER = 0.032, 0.006
-"""From the farthest heel to heel strike and from the hindmost toe to toe-off, in people's curves [stride]: 0.030 to
-0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
+"""Time from the farthest heel to heel strike, and from the hindmost toe to toe-off, in people's curves [strides]: 0.030
+to 0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
 CUTOFF = 6.0
-"""Low-pass of angles before events and rates are taken from them [Hz]: usual for walking (Winter 2009, chapter 3)."""
+"""Low-pass frequency for angles that events and rates are taken from [Hz]: usual for walking (Winter 2009, ch. 3)."""
 WEIGHT_BEARING = (15, 45)
-"""Percent of the stride in which a foot whose force was measured bears weight: no plate lay where it does not."""
+"""Percent of the stride between which a foot bears weight; chosen. One that bears none there was not on a plate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,15 +38,15 @@ class MeasuredWalk:
     """Trials of one walk on common, even samples."""
 
     name: str
-    """Of the files."""
+    """Names of the files."""
     first: float
     """Time of the first sample [s]."""
     tick: float
-    """Between samples [s]."""
+    """Time between samples [s]."""
     legs: dict[str, Series]
     """Side -> curve -> (T,)."""
     unscaled: set[tuple[str, str]]
-    """(side, curve) in N, N m or W."""
+    """(side, curve) of the curves that are in N, N m or W."""
     contacts: dict[str, Contacts]
     """Side -> events that a file names."""
     speed: float | None
@@ -180,7 +180,7 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
 
 
 def _smooth(angle: NDArray, tick: float) -> NDArray:
-    """Low-passed without delay (fourth order in all)."""
+    """The angle after a low-pass without delay (fourth order in all)."""
     from scipy.signal import butter, sosfiltfilt  # half a second to import, and only files need it
 
     return sosfiltfilt(
@@ -189,12 +189,12 @@ def _smooth(angle: NDArray, tick: float) -> NDArray:
 
 
 def _bearing(force: NDArray) -> float:
-    """About body weight: the median force while more than half of the largest bears."""
+    """About the body weight: the median of the forces beyond half of the largest."""
     return float(np.median(force[force > 0.5 * force.max()])) if force.max() > 0 else 1.0
 
 
 def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> None:
-    """Keeps a leg's forces of those strides in which it stood on a plate."""
+    """Keep the forces of a leg in those strides in which it stood on a plate."""
     vertical = cut.get((side, "grf_vertical"))
     if vertical is not None:
         low, high = WEIGHT_BEARING
@@ -205,7 +205,7 @@ def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> N
 
 
 def _scale(cut: dict[tuple[str, str], NDArray], unscaled: set[tuple[str, str]], mass: float | None) -> None:
-    """Brings forces to body weights, moments and powers to kg of body mass."""
+    """Divide forces by the body weight, moments and powers by the body mass, in place."""
     weight = None if mass is None else mass * GRAVITY
     borne = [cut[key][:, :-1].mean(axis=1) for key in unscaled if key[1] == "grf_vertical" and key in cut]
     if weight is None and sum(map(len, borne)):

@@ -32,7 +32,7 @@ Division = Literal["elementwise", "matrix"]
 Joint = Literal["ankle", "toe"]
 
 INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
-"""All of them, the default first."""
+"""All interpolations, the default first."""
 
 GRAVITY = 9.8
 """The thesis's acceleration of gravity g [m/s^2]; `springfoot.gait.GRAVITY` is 9.81."""
@@ -47,7 +47,7 @@ READINGS = {
     "l_ff (section 2.3, toe joint)": "the appendix's l_ft; in Table 1 it is ankle to toe tip, 0.1717 m",
     "l_ab (section 2.3)": "l_bf; where x at heel strike differs (no l_an sin q_f there), the appendix holds",
 }
-"""Name in the thesis -> how it is read here."""
+"""A name in the thesis -> what it is read as here."""
 
 
 def table_1(body: Body | None = None) -> dict[str, float]:
@@ -75,7 +75,7 @@ class ThesisWalk:
     """
 
     k: int = 1
-    """Which step; the appendix runs k = 1."""
+    """Number of the step; the appendix computes k = 1."""
     interpolation: Interpolation = "line and sine"
     """What joins the CoM's knots in x: Figure 6's line and sine, MATLAB's cubic spline, or a cubic polynomial."""
     division: Division = "elementwise"
@@ -87,17 +87,17 @@ class ThesisWalk:
     double_support: float = 0.06
     """T_d [s]. With it stance is 56 % of the stride, against the thesis's own 62 %."""
     highest_ankle_time: float = 0.25
-    """T_m [s]."""
+    """T_m [s]: time of the highest ankle."""
     step_length: float = 0.6
-    """D_s [m]."""
+    """D_s [m]: length of a step."""
     com_ahead_at_end: float = 0.25
     """x_ed [m]: CoM ahead of the support ankle as single support ends."""
     com_behind_at_start: float = 0.25
     """x_sd [m]: CoM behind the support ankle as single support starts. Huang et al. 2001 search for both."""
     highest_ankle_forward: float = 0.4654
-    """L_a0 [m] from the ankle's last place."""
+    """L_a0 [m]: how far the highest ankle is ahead of the ankle's last place."""
     highest_ankle_height: float = 0.14
-    """H_a0 [m]."""
+    """H_a0 [m]: height of the highest ankle."""
     toe_off_pitch: float = 0.4
     """q_b [rad]: foot to ground at toe-off, heel up."""
     heel_strike_pitch: float = 0.13
@@ -166,7 +166,7 @@ class ThesisWalk:
     def com_height(self, time: ArrayLike, derivative: int = 0) -> NDArray:
         """z = 0.89 - 0.012 sin(4 pi (t - 2.62)) [m] or a time derivative. Fault: highest as double support begins."""
         rate = 4 * pi
-        # Each derivative of a sine is a quarter turn ahead.
+        # Each derivative of a sine leads it by a quarter turn.
         wave = -0.012 * rate**derivative * np.sin(rate * (np.asarray(time) - 2.62) + derivative * pi / 2)
         return wave + 0.89 if derivative == 0 else wave
 

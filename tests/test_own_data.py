@@ -206,7 +206,9 @@ def test_of_several_conditions_one_is_named(tmp_path):
     path = gait_csv(tmp_path / "mean.csv", repeat=("slow", "fast"))
     assert read_gait(path, condition="fast").name == "mean.csv:fast"
     for condition in (None, "medium"):
-        with pytest.raises(SpringfootError, match=r"mean\.csv holds the conditions slow, fast; .* as mean\.csv:slow"):
+        with pytest.raises(
+            SpringfootError, match=r"mean\.csv holds the conditions slow, fast; condition must .* mean\.csv:slow\), got"
+        ):
             read_gait(path, condition=condition)
 
 

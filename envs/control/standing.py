@@ -99,8 +99,10 @@ class Standing:
 
     @property
     def mode(self) -> NDArray:
-        """(N,) what each body does: `STANDING`, `STARTING`, `WALKING` steadily, `STOPPING`, `STOPPED`, in this order; in
-        the middle three it walks."""
+        """(N,) what each body does: `STANDING`, `STARTING`, `WALKING` steadily, `STOPPING`, `STOPPED`, in this order.
+
+        A body walks in the middle three.
+        """
         return self._held["mode"]
 
     def reset(
@@ -179,7 +181,7 @@ def off_phase(drawn: float) -> float:
 
 @lru_cache(maxsize=1024)
 def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
-    """Angles of thigh (to the vertical), knee, ankle, toe [rad] of a standing body, its knees bent by `knee` [rad].
+    """Angles of thigh (to the vertical), knee, ankle and toe [rad] of a standing body with knees bent by `knee` [rad].
 
     The feet are flat, and the CoM is `STAND_COM` ahead of the ankles.
     """

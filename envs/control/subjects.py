@@ -97,7 +97,7 @@ class Subjects:
         self._changing = True
 
     def begin(self, ids: NDArray, speed: NDArray) -> None:
-        """Set the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s]; from there it goes to its target."""
+        """Set the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s]; it then goes to its target."""
         self.speed[ids] = speed
         self._changing = True
 
