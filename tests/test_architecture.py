@@ -21,12 +21,13 @@ def names_defined_in(path: Path) -> set[str]:
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             names |= {part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)}
-    return {name for name in names if not name.startswith("_")}
+    return {name for name in names if not name.startswith("_")} - {"main"}  # what a module does as a command
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(REPOSITORY)))
 def test_no_file_of_the_five_packages_is_too_long(path):
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= MOST_LINES
+    lines = path.read_text(encoding="utf-8").count("\n")
+    assert lines <= MOST_LINES
 
 
 def test_no_public_name_means_different_things_in_two_packages():
