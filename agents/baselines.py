@@ -1,7 +1,8 @@
-"""Policies that nobody trained: what a learned one has to beat.
+"""Baselines: policies that need no learning, against which a learned one is judged.
 
-Each is, like a trained policy, a function of observations (N, D) giving actions (N, 4) in [-1, 1]. They set stiffness
-in N m/rad through the inverse of the environment's own log scale, hence need `action_mode="absolute"`.
+Each is, like a trained policy, a function of observations (N, D) that returns actions (N, 4) in [-1, 1]. They turn a
+stiffness in N m/rad into an action by the inverse of the environment's log scale, so they need
+`action_mode="absolute"`.
 """
 
 from collections.abc import Callable
@@ -24,9 +25,11 @@ from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import StiffnessSchedule, thesis_schedule
 
 PolicyFunction = Callable[[NDArray], NDArray]
+"""Observations (N, D) -> actions (N, 4) in [-1, 1]."""
 
 CONSTANT_STIFFNESS = (300.0, 40.0)
-"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg."""
+"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg: round numbers that walk, not the best ones, which
+`springfoot study best-constant` finds."""
 
 _SIN, _COS, _SPEED = (
     [entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos", "command_speed")
@@ -40,7 +43,7 @@ def leg_phase(observation: NDArray) -> NDArray:
 
 
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
-    """The same ankle and toe stiffness always: (ankle, toe) [N m/rad], for 1.70 m and 63 kg, scaled with the body."""
+    """Hold one `stiffness` (ankle, toe) [N m/rad], given for 1.70 m and 63 kg and scaled with the body."""
     body = body_of(settings)
     _require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
@@ -49,20 +52,20 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
 
 
 def untrained(settings: BipedSettings) -> PolicyFunction:
-    """What training starts from: mean action 0, the middle of the (log) stiffness range."""
+    """Always action 0: the middle of the stiffness range on its log scale."""
     return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
 
 
 def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
-    """Every action anew from the whole range; the generator starts from `seed` and goes on from call to call."""
+    """Draw every action from the whole range; one generator, seeded with `seed`, serves all calls."""
     generator = np.random.default_rng(seed)
     return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
 
 
 def schedule(settings: BipedSettings) -> PolicyFunction:
-    """A fixed stiffness over the stride: that of `settings.schedule`, or else the one of the leg tuning.
+    """Follow a fixed stiffness over the stride: that of `settings.schedule`, or else the one tuned with the legs.
 
-    The latter is that of the commanded speed, whatever it is at present; both scale with the body.
+    The tuned one goes with the speed that is commanded at each moment. Both scale with the body.
     """
     body, speeds = body_of(settings), tabulated_speeds(settings)
     if settings.schedule is not None:
@@ -74,9 +77,9 @@ def schedule(settings: BipedSettings) -> PolicyFunction:
 
 
 def _follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
-    """The policy that sets (speeds, samples, (ankle, toe)) [N m/rad] over the stride at each leg's phase.
+    """The policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
 
-    It reads phase and Froude speed; between two of `speeds` [m/s] of `body` stiffness is linear.
+    It reads phase and Froude speed from the observation; between two of `speeds` [m/s, of `body`] it is linear.
     """
     _require_absolute(settings)
     table, froude = PhaseTable(stiffness), np.array([body.froude_speed(speed) for speed in speeds])
@@ -115,9 +118,9 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
 
 
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
-    """The environment settings that a baseline brings with it, for the body and speed of `settings`.
+    """The environment settings that a baseline needs, for the body and speed of `settings`.
 
-    Baselines are stiffness in N m/rad, so their actions are absolute. `thesis` brings the thesis's straight lines
+    Baselines set stiffness in N m/rad, so their actions are absolute. `thesis` brings the thesis's straight lines
     between gait events, and their equilibrium angles.
     """
     absolute = {"action_mode": "absolute"}

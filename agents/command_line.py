@@ -1,4 +1,4 @@
-"""What every command line does around its work: one line for bad input, an exit code, names of results."""
+"""What every command does around its work: tell bad input in one line, return an exit code, name its results."""
 
 import sys
 from collections.abc import Callable
@@ -8,10 +8,10 @@ from springfoot.gait.errors import SpringfootError
 
 
 def exit_code(name: str, work: Callable[[], int | None]) -> int:
-    """Does the `work` of the command `name`; returns its exit code.
+    """Run the `work` of the command `name` and return its exit code.
 
-    What `work` returns, 0 for None; 2 after one line on standard error for bad input, a file that cannot be read or
-    written, or too little memory; 130 after Ctrl-C.
+    That is what `work` returns (0 for None); 2 after one line on standard error for bad input, a file that cannot be
+    read or written, or too little memory; 130 after Ctrl-C.
     """
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
@@ -25,7 +25,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
 
 
 def policy_label(name: str) -> str:
-    """What a policy is called in results: its name, its run's, or its file's; without folders."""
+    """What results call a policy: its own name, that of its run or that of its file, without folders."""
     path = Path(name)
     if path.suffix != ".safetensors":
         return path.resolve().name.replace(":", "-").replace(",", "-")

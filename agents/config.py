@@ -1,4 +1,4 @@
-"""What a training is told: its configuration, the presets, and the command-line flags made from them."""
+"""The configuration of a training, and presets of it."""
 
 import dataclasses
 from dataclasses import dataclass, field, replace
@@ -9,7 +9,7 @@ from springfoot.envs.settings import BipedSettings, settings_from, settings_to_j
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
 TRAINED_ON = BipedSettings(action_mode="residual", episode_seconds=10.0, push_newton=150.0)
-"""The task that is trained on unless flags say otherwise: the fixed schedule's stiffness times the policy's factor."""
+"""The default task: pushes of 150 N, and an action that multiplies the stiffness of the fixed schedule."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class TrainingConfig:
     update_steps: int = 8192
     """Environment steps collected for each update of the policy, all environments together."""
     minibatches: int = 8
-    """Parts of an update's samples, each good for one gradient step."""
+    """Parts into which the samples of an update are split, one gradient step each."""
     epochs: int = 8
     """Passes over the samples in each update."""
     learning_rate: float = 3e-4

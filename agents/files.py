@@ -15,7 +15,7 @@ from springfoot.gait.errors import SpringfootError
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Writes a whole file or nothing: readers see the old content or the new, never a part."""
+    """Write a whole file or nothing: readers see the old content or the new, never a part of it."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -56,15 +56,15 @@ def _cell(value: Any) -> Any:
 
 
 def require_new(out: str | Path) -> Path:
-    """`out`, or `SpringfootError` if it exists and is not an empty folder."""
+    """Return `out` as a path; raise `SpringfootError` if it exists and is not an empty folder."""
     out = Path(out)
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise SpringfootError(f"{out} already exists; give another --out, or go on with a run by --resume {out}")
+        raise SpringfootError(f"{out} already exists; out must be a new or an empty folder")
     return out
 
 
 def make_folder(out: Path) -> None:
-    """Makes the folder and those above it; `SpringfootError` if it cannot be."""
+    """Make the folder and those above it; raise `SpringfootError` where that is impossible."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

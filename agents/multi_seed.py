@@ -30,20 +30,20 @@ from .training import RUN, processors, train
 SEEDS = "seeds.json"
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
-"""Of what `seeds.json` holds mean and standard deviation (n - 1)."""
+"""Results whose mean and standard deviation (n - 1) over the seeds stand in `seeds.json`."""
 
 
 def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str, Any]:
-    """Trains from the seeds `config.seed`, `config.seed` + 1, …, into new folders in `out`; returns `seeds.json`.
+    """Train from the seeds `config.seed`, `config.seed` + 1, …, each into a new folder in `out`; return `seeds.json`.
 
-    As many processes run at a time as there are processors, each on one thread. The first SIGINT or SIGTERM ends
-    those that run in good order, with usable policies, and begins no more. Raises `SpringfootError`, with nothing
+    As many processes run at a time as there are processors, each on one thread. The first SIGINT or SIGTERM lets the
+    running ones save a usable policy and stop, and no more are started. Raises `SpringfootError`, with nothing
     written, if `out` exists and is not an empty folder.
     """
     require_count("seeds", seeds)
     require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)
     out = require_new(out)
-    Biped(config.environment, 1)  # refuses what cannot be walked, before anything is written
+    Biped(config.environment, 1)  # raises for settings that nobody can walk in, before anything is written
     make_folder(out)
     configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
     rows, status = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
@@ -53,9 +53,9 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
 
 
 def train_all(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> tuple[list[dict[str, Any]], str]:
-    """Trains each configuration into its new folder, its messages marked with its name, as `train_seeds` does.
+    """Train each configuration into its new folder, as `train_seeds` does; its messages begin with its name.
 
-    Returns what each came to, and `finished`, `failed` or `interrupted`.
+    Returns a row of results for each, and `finished`, `failed` or `interrupted` for all together.
     """
     at_once = min(max(len(jobs), 1), processors())
     with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
@@ -66,17 +66,17 @@ def train_all(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> tuple[list[di
 
 
 def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
-    """As `train_all`, of those that are not finished; what was begun and not finished begins anew.
+    """Train the configurations whose folders hold no finished run, as `train_all` does.
 
-    Returns `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing changed, for a finished one of
-    other settings.
+    A run that was started and not finished is deleted and started again. Returns `finished`, `failed` or
+    `interrupted`. Raises `SpringfootError`, with nothing changed, for a finished run of another configuration.
     """
     missing = [job for job in jobs if not is_finished(job[1])]
     for config, folder, _ in jobs:
         if is_finished(folder):
             done = config_from_json(json.loads((folder / RUN).read_text(encoding="utf-8"))["config"])
             if replace(done, threads=config.threads) != config:
-                raise SpringfootError(f"{folder} was trained with other settings; give another --out")
+                raise SpringfootError(f"{folder} was trained with other settings; choose another folder")
     for _, folder, _ in missing:
         if (folder / RUN).is_file():
             shutil.rmtree(folder)
@@ -84,7 +84,7 @@ def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
 
 
 def is_finished(folder: Path) -> bool:
-    """Whether a run folder holds a training that came to its end."""
+    """Whether the folder holds a training that ran to its end."""
     run = folder / RUN
     return run.is_file() and json.loads(run.read_text(encoding="utf-8")).get("status") == "finished"
 
@@ -118,14 +118,14 @@ class _Trainings:
         self._before: dict[int, Any] = {}
 
     def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
-        """Trains in a process of its own, whose messages appear here with `name` before them; a row of the report."""
+        """Train in a process of its own, print its messages after its `name`, and return its row of results."""
         config = replace(config, threads=1)
         command = [sys.executable, "-m", __name__, str(folder), json.dumps(config_to_json(config))]
-        _block(True)  # also in the process, until it has its imports behind it; this thread waits only
+        _block(True)  # the new process inherits this, and unblocks after its imports; this thread only waits for it
         with self._lock:
             if self.stopping:
                 return _row(config, folder, "not begun")
-            # A session of its own: Ctrl-C in a terminal reaches this process alone, which passes it on once.
+            # In a session of its own it does not get the terminal's Ctrl-C; this process passes it on, once.
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
@@ -150,7 +150,7 @@ class _Trainings:
                 process.send_signal(number)
 
     def __enter__(self) -> "_Trainings":
-        """Takes SIGINT and SIGTERM; in another than the main thread nobody can."""
+        """Handle SIGINT and SIGTERM, which Python allows in the main thread only."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 self._before[number] = signal.signal(number, self._stop)
@@ -159,7 +159,7 @@ class _Trainings:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Gives the signals back; ends what still runs, which only an error leaves."""
+        """Restore the signal handlers; terminate processes that still run, as they do only after an error."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
         for process in self._running:
@@ -167,13 +167,13 @@ class _Trainings:
 
 
 def _block(blocked: bool) -> None:
-    """Lets SIGINT and SIGTERM wait, or come again, in this thread and in processes begun by it."""
+    """Block or unblock SIGINT and SIGTERM in this thread and in the processes it starts."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, SIGNALS)
 
 
 def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
-    """What a seed came to, from its run.json; `without` is its status if it left none that is complete."""
+    """The row of results of one seed, from its run.json; its status is `without` where that file is not complete."""
     row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
     record = json.loads((folder / RUN).read_text(encoding="utf-8")) if (folder / RUN).is_file() else {}
     best = record.get("best") or {}
@@ -190,13 +190,13 @@ def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
 
 
 def _main() -> int:
-    """One seed, in a process of its own: a folder, and a configuration as JSON text."""
+    """Train one seed in this process; its arguments are a folder and a configuration as JSON text."""
     folder, config = sys.argv[1:]
     return exit_code("train.py", lambda: _train(config_from_json(json.loads(config)), folder))
 
 
 def _train(config: TrainingConfig, folder: str) -> int:
-    _block(False)  # a signal that waited strikes here, where `exit_code` catches it
+    _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
     return 130 if train(config, folder)["status"] == "interrupted" else 0
 
 

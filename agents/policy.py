@@ -36,7 +36,7 @@ VARIANCE_FLOOR = 1e-8
 
 
 BEST, LAST = "best.safetensors", "last.safetensors"
-"""Names of a run folder's policies: highest mean return in periodic evaluation, and the newest."""
+"""Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
 RUN = "run.json"
 """Name of a run folder's record: configuration, evaluations, status."""
 
@@ -52,7 +52,7 @@ _MODEL_NUMBERS = (
 class Policy:
     """A deterministic policy: normalised observation -> tanh layers -> mean action, clipped to [-1, 1].
 
-    Calling it maps observations (N, D), or one (D,), to actions (N, 4) or (4,), float32. A row's result
+    Calling it maps observations (N, D), or one (D,), to actions (N, 4) or (4,), float32. The result of a row
     does not depend on the other rows. Raises `SpringfootError` for another width or for an observation that
     is not finite.
     """
@@ -111,9 +111,8 @@ class Policy:
 def fingerprint(biped: Biped) -> dict[str, str]:
     """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
 
-    The legs are the constants of hips, knees and foot springs and the curves they follow, at every speed there is.
-    Numbers count to six
-    significant digits, so that compilers and processors agree.
+    The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed.
+    Numbers count to six significant digits, so that compilers and processors agree.
     """
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
     numbers: list[Any] = []
@@ -135,7 +134,7 @@ def _digest(names: Iterable[str], *numbers: Any) -> str:
 
 
 def save_policy(path: str | Path, policy: Policy) -> None:
-    """Writes a policy as one .safetensors file, whole or not at all; equal policies give equal bytes."""
+    """Write a policy as one .safetensors file, whole or not at all; equal policies give equal bytes."""
     tensors = {
         "observation.mean": policy.observation_mean,
         "observation.variance": policy.observation_variance,
@@ -148,7 +147,7 @@ def save_policy(path: str | Path, policy: Policy) -> None:
 
 
 def find_policy(name: str | Path) -> Path:
-    """The file meant by a path, a run folder (its best) or `pretrained`; `SpringfootError` if there is none."""
+    """The file that a path, a run folder (its best) or `pretrained` means; `SpringfootError` if there is none."""
     path = Path(name)
     if str(name) == "pretrained":
         path = Path(str(resources.files("springfoot.agents") / "pretrained" / "walk.safetensors"))
@@ -230,7 +229,7 @@ def read_tensors(path: Path, key: str, what: str) -> tuple[dict[str, Any], dict[
 
 
 def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list[int]) -> None:
-    """Refuses a policy whose tensors are not those of its layer sizes."""
+    """Raise `SpringfootError` for tensors that are not those of the layer sizes."""
     expected = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
         expected |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}

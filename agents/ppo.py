@@ -20,9 +20,10 @@ from .config import TrainingConfig
 from .policy import Policy
 
 NEVER_VARIED = 1e-6
-"""An observation whose variance in training stayed below this told the policy nothing (real ones: above 1e-5)."""
+"""Variance below which an observation told the policy nothing in training [unit squared]; one that varies has more than
+1e-5."""
 IGNORED = 1e12
-"""Variance by which such an observation is divided in the policy, so that another value does not reach it."""
+"""Variance that such an observation gets in the policy, so that no value of it reaches the network."""
 
 
 class Learner:
@@ -33,14 +34,14 @@ class Learner:
     """
 
     def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
-        torch.set_num_threads(1)  # more of them fight with the physics' own (up to 200 times slower)
+        torch.set_num_threads(1)  # more compete with the threads of the physics, and are up to 200 times slower
         self._environment = config.environment
         share = config.environment.step_seconds / ACTION_STEP
         gamma, gae_lambda = config.gamma**share, config.gae_lambda**share
         self.normalized = VecNormalize(environments, gamma=gamma)
         self.rollout_steps = config.update_steps // config.num_envs
         samples = self.rollout_steps * config.num_envs
-        with warnings.catch_warnings():  # a last minibatch smaller by a few samples does no harm
+        with warnings.catch_warnings():  # a last minibatch that is a few samples smaller does no harm
             warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
             self.ppo = PPO(
                 "MlpPolicy",
@@ -66,7 +67,7 @@ class Learner:
         network = self.ppo.policy
         hidden = [layer for layer in network.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
         layers = [*hidden, network.action_net]
-        # Weights on what never varied (body, commanded speed) are still the random ones they began with.
+        # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         seen = self._statistics()["observation"]
         variance = np.where(seen.var < NEVER_VARIED, IGNORED, seen.var)
         return Policy(
@@ -91,7 +92,7 @@ class Learner:
         return arrays
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Takes up what `state` gave; `SpringfootError` if it does not fit this learner."""
+        """Continue from what `state` returned; raise `SpringfootError` if it does not fit this learner."""
         try:
             network = {name: value for name, value in arrays.items() if name.startswith("network.")}
             self.ppo.policy.load_state_dict(

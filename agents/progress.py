@@ -1,4 +1,4 @@
-"""How far a training is, for a person who waits: a bar with the time left; without a terminal, plain lines."""
+"""How far a training is, for a person who waits: a bar with the time left, or plain lines without a terminal."""
 
 import sys
 from time import monotonic
@@ -11,7 +11,7 @@ LINE_SECONDS = 20.0
 
 
 class Progress:
-    """Progress of `total` environment steps, `done` of which are behind us; a context manager."""
+    """Progress of `total` environment steps, of which `done` were done earlier; a context manager."""
 
     def __init__(self, total: int, done: int = 0) -> None:
         self._bar = tqdm(
@@ -26,14 +26,14 @@ class Progress:
         self._began = self._last_line = monotonic()
 
     def advance(self, steps: int) -> None:
-        """`steps` more steps are done."""
+        """Count `steps` more steps."""
         self._done += steps
         self._bar.update(steps)
         if monotonic() - self._last_line > LINE_SECONDS:
             self._print_line()
 
     def report(self, state: str) -> None:
-        """Shows how good the policy now is, in a few words, beside the bar or in a line."""
+        """Show `state`, a few words on how good the policy is now, beside the bar or in a line."""
         self._state = state
         self._bar.set_postfix_str(state)
         self._print_line()
@@ -48,12 +48,12 @@ class Progress:
             print(" · ".join(part for part in parts if part), file=sys.stderr, flush=True)
 
     def __enter__(self) -> "Progress":
-        """Starts the clock."""
+        """Start the clock."""
         self._began = self._last_line = monotonic()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leaves the bar as it stands."""
+        """Leave the bar as it is."""
         self._bar.close()

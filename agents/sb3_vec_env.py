@@ -1,4 +1,4 @@
-"""stable-baselines3's face of the batched environment: the same bits as the Gymnasium VectorEnv under it."""
+"""The batched environment for stable-baselines3: the same bits as the Gymnasium VectorEnv under it."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -42,11 +42,11 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return observation
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keeps the actions (N, 4) for `step_wait`."""
+        """Keep the actions (N, 4) for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Observations (N, D), rewards (N,), dones (N,) and infos; ended episodes have begun anew."""
+        """Observations (N, D), rewards (N,), dones (N,) and infos; an episode that ended is followed by a new one."""
         observation, reward, terminated, truncated, info = self.env.step(self._actions)
         done = terminated | truncated
         self._returns += reward
@@ -66,7 +66,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return observation, reward.copy(), done, infos  # PPO adds bootstrapped values to the rewards in place
 
     def close(self) -> None:
-        """Frees the simulation and any window."""
+        """Free the simulation and any window."""
         self.env.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
@@ -79,14 +79,14 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return [value for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Sets an attribute of the whole batch; `SpringfootError` for a part of it."""
+        """Set an attribute of the whole batch; raise `SpringfootError` for a part of it."""
         self._require_all(indices, f"set {attr_name}")
         setattr(self.env, attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls a method of the whole batch once, its result given for each environment."""
+        """Call a method of the whole batch once, and return its result for each environment."""
         self._require_all(indices, f"call {method_name}")
         return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * self.num_envs
 
@@ -100,10 +100,10 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
 
 def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The options of one reset from those of every environment, whose bodies and speeds may differ."""
+    """The options of one reset, from those of each environment; only bodies and speeds may differ between them."""
     options, *others = ({name: value for name, value in own.items() if name not in DRAWN} for own in each)
     if any(other != options for other in others):
-        raise SpringfootError(f"reset options but {', '.join(DRAWN)} must be the same for all environments")
+        raise SpringfootError(f"reset options other than {', '.join(DRAWN)} must be the same for all environments")
     for name in DRAWN:
         given = [own[name] for own in each if name in own]
         if 0 < len(given) < len(each):

@@ -13,6 +13,7 @@ from springfoot.gait.errors import SpringfootError, require_count
 
 from .command_line import exit_code
 from .config import PRESETS, TrainingConfig
+from .files import require_new
 from .flags import given, optional_flags
 
 PRESET = PRESETS["walk"]
@@ -32,7 +33,7 @@ class TrainFlags:
     out: Annotated[Path | None, FOLDER] = None
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
-    """Folder of a run to go on with, with its saved settings; --timesteps is then how many more."""
+    """Folder of a run to continue, with its saved settings; --timesteps is then how many more."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""
@@ -55,20 +56,25 @@ def train_main(arguments: Sequence[str] | None = None, program: str = "train.py"
 
 
 def run_training(flags: TrainFlags) -> int:
-    """Trains, or goes on, and says where the results lie."""
+    """Train or continue a run, then print where the results are."""
     settings = given(flags.training) | given(flags.environment)
     if (flags.out is None) == (flags.resume is None):
         raise SpringfootError("give either --out NEW_FOLDER or --resume FOLDER")
+    if flags.out is not None:
+        try:
+            require_new(flags.out)
+        except SpringfootError as error:
+            raise SpringfootError(f"{error}; to continue a run, give --resume {flags.out}") from None
     if flags.seeds is not None:
         if flags.resume:
-            raise SpringfootError("--seeds begins anew; go on with each seed's own folder by --resume FOLDER/seed-N")
+            raise SpringfootError("--seeds begins anew; continue each seed's own by --resume FOLDER/seed-N")
         if "threads" in settings:
             raise SpringfootError("--seeds gives each seed one thread; drop --threads")
         require_count("seeds", flags.seeds)
     if flags.resume and (fixed := sorted(set(settings) - {"timesteps"})):
-        raise SpringfootError(f"--resume goes on with the saved settings; drop --{fixed[0].replace('_', '-')}")
+        raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
-        from . import training  # torch takes seconds; bad flags are told without waiting for it
+        from . import training  # not above: torch takes seconds, and bad flags need not wait for it
 
         folder, record = flags.resume, training.resume(flags.resume, settings.get("timesteps"))
     else:
@@ -92,14 +98,13 @@ def run_training(flags: TrainFlags) -> int:
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
-    """Trains from several seeds and says how far they agree and where the results lie."""
+    """Train from several seeds, then print how far they agree and where the results are."""
     from . import multi_seed
 
     record = multi_seed.train_seeds(config, out, count)
     print(f"\n{multi_seed.training_table(record)}\n")
-    print(
-        f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: best.safetensors, last.safetensors, run.json, TensorBoard)"
-    )
+    files = "best.safetensors, last.safetensors, run.json, TensorBoard"
+    print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
     print(f"Next:    springfoot study seeds {out}/seed-*")
     if record["status"] == "interrupted":
         print(f"Or:      springfoot train --resume {out}/seed-N, for each N that was interrupted")
@@ -107,6 +112,6 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
-    """The preset with what was given on the command line in its place."""
+    """The preset, with the values given on the command line in place of its own."""
     settings = settings_from(**settings_to_json(preset.environment) | environment)
     return dataclasses.replace(preset, **training, environment=settings)

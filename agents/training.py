@@ -1,7 +1,8 @@
-"""A training run: a folder that holds its policies, its state and what it came to; begun anew or gone on with.
+"""A training run, new or resumed: a folder that holds its policies, its state and its results.
 
-`best.safetensors` and `last.safetensors` are policies, `state.safetensors` is what `resume` needs, `run.json` what is
-needed to repeat the run, and its results; beside them TensorBoard's event files. Each is written whole or not at all.
+`best.safetensors` and `last.safetensors` are policies, `state.safetensors` is what `resume` needs, `run.json` holds
+what is needed to repeat the run, and its results; beside them are TensorBoard's event files. Each file is written whole
+or not at all.
 """
 
 import dataclasses
@@ -38,13 +39,13 @@ STATE = "state.safetensors"
 EVALUATION_SEED = 2**30
 """Seed of the first episode of every periodic evaluation, the next ones following."""
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
-"""Whose versions decide what a training comes to."""
+"""Packages whose versions decide the result of a training."""
 
 
 def train(config: TrainingConfig, out: str | Path) -> dict[str, Any]:
-    """Trains a policy from scratch into the new folder `out`; returns what `run.json` holds.
+    """Train a new policy into the new folder `out`; return what `run.json` holds.
 
-    Ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM. Raises
+    The training ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM. Raises
     `SpringfootError`, with nothing written, if `out` exists and is not an empty folder.
     """
     out = require_new(out)
@@ -54,16 +55,20 @@ def train(config: TrainingConfig, out: str | Path) -> dict[str, Any]:
 
 
 def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
-    """Goes on with the run in `out` with its saved settings; returns what `run.json` holds.
+    """Continue the run in `out` with its saved settings; return what `run.json` holds.
 
-    An interrupted run is finished; with `timesteps`, so many more are trained after those already done, and the step
-    size falls linearly to the new end. Environments start anew and noise is drawn anew, from the run's seed and the
-    steps done. Raises `SpringfootError` for a folder without a run, or one this version cannot go on with.
+    Args:
+        out: the run's folder.
+        timesteps: how many more to train after those already done, the step size falling linearly to the new end;
+            None finishes an interrupted run.
+
+    Environments start new episodes and noise is drawn again, both seeded by the run's seed and the steps done. Raises
+    `SpringfootError` for a folder without a run, and for a run that this version cannot continue.
     """
     out = Path(out)
     for name in (RUN, STATE, LAST):
         if not (out / name).is_file():
-            raise SpringfootError(f"{out} holds no run to go on with: no {name} in it")
+            raise SpringfootError(f"{out} holds no run to continue: no {name} in it")
     try:
         record = json.loads((out / RUN).read_text(encoding="utf-8"))
         config = config_from_json(record["config"])
@@ -74,11 +79,11 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     header, arrays = read_tensors(out / STATE, "springfoot-training", "training state")
     done = header.get("timesteps")
     if type(done) is not int or done < 0:
-        raise SpringfootError(f"{out / STATE} does not say how many timesteps it has behind it")
-    load_policy(out / LAST)  # refuses what was trained on another version of the environment
+        raise SpringfootError(f"{out / STATE} does not say how many timesteps it has done")
+    load_policy(out / LAST)  # raises for a policy of another version of the environment
     total = config.timesteps if timesteps is None else done + timesteps
     if total <= done:
-        raise SpringfootError(f"{out} has done its {done:,} timesteps; give --timesteps N to train N more")
+        raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
     run = _Run(dataclasses.replace(config, timesteps=total), out, record, done)
     run.learner.restore(arrays)
     return run.learn()
@@ -87,7 +92,10 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
 def evaluate_returns(
     biped: Biped, policy: Callable[[np.ndarray], np.ndarray], seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One episode of each environment of `biped`, seeded `seed`, `seed` + 1, …: returns, seconds, whether it fell."""
+    """Run one episode in each environment of `biped`, seeded `seed`, `seed` + 1, …
+
+    Returns: (N,) return [-], length [s], and whether the episode ended in a fall.
+    """
     episodes = biped.num_envs
     returns, seconds, fell = np.zeros(episodes), np.zeros(episodes), np.zeros(episodes, bool)
     active = np.ones(episodes, bool)
@@ -104,7 +112,7 @@ def evaluate_returns(
 
 
 class _Run(BaseCallback):
-    """One sitting at a run: PPO's callback, which measures, evaluates and saves between the updates."""
+    """One session of a run: PPO's callback, which logs, evaluates and saves between the updates."""
 
     def __init__(self, config: TrainingConfig, out: Path, record: dict[str, Any], done: int = 0) -> None:
         super().__init__()
@@ -122,7 +130,7 @@ class _Run(BaseCallback):
         self._ended: list[dict[str, Any]] = []
 
     def learn(self) -> dict[str, Any]:
-        """Trains until the configured timesteps are done or a signal stops it; returns the record."""
+        """Train until the configured timesteps are done or a signal stops it; return the record."""
         ppo, status = self.learner.ppo, "failed"
         self._progress = Progress(self._config.timesteps, self._first)
         self._record |= {"config": config_to_json(self._config), "status": "running"}
@@ -142,7 +150,7 @@ class _Run(BaseCallback):
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
-        """The first SIGINT or SIGTERM ends the training in good order, the second at once."""
+        """Let the first SIGINT or SIGTERM end the training after saving a usable policy, and the second at once."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -192,7 +200,7 @@ class _Run(BaseCallback):
             self._evaluate()
 
     def _evaluate(self) -> None:
-        """Evaluates the policy on the fixed seeds, keeps it if it is the best so far, and saves."""
+        """Evaluate the policy on the fixed seeds, keep it if it is the best so far, and save."""
         policy = self.learner.policy(self._fingerprint)
         returns, seconds, fell = evaluate_returns(self._evaluation, policy, EVALUATION_SEED)
         entry = {
@@ -215,11 +223,11 @@ class _Run(BaseCallback):
         self._save()
 
     def _seconds(self) -> float:
-        """Wall time of this sitting and those before it [s]."""
+        """Wall time of this session and the earlier ones [s]."""
         return self._seconds_before + monotonic() - self._began
 
     def _save(self, policies: bool = True) -> None:
-        """Writes the newest policy, the state and the record; without `policies` the record only."""
+        """Write the newest policy, the state and the record; without `policies` only the record."""
         best = max(self._record["evaluations"], key=lambda entry: entry["return_mean"], default=None)
         self._record |= {"timesteps": self._trained, "seconds": round(self._seconds(), 1), "best": best}
         if policies:

@@ -19,9 +19,9 @@ from .stride_tally import WARM_UP
 SIZE = (460, 420)
 """Width and height of a frame [px]."""
 OVERSAMPLING = 3
-"""Drawn larger by this, then reduced: smooth edges."""
+"""Frames are drawn larger by this factor and then reduced, for smooth edges."""
 TICKS_PER_FRAME = 3
-"""30 ms a frame: GIF delays are whole hundredths of a second."""
+"""Ticks of 10 ms in a frame; GIF delays are whole hundredths of a second."""
 STRIDES = 2
 LONGEST = 3.0
 """Longest clip [s], for gaits without strides."""
@@ -62,7 +62,7 @@ def _clip(recording: Recording, body: Body) -> tuple[int, int, int]:
 
 
 class _Canvas:
-    """Draws one frame after another; world metres to pixels with a camera that moves evenly."""
+    """Draws one frame after another, world metres to pixels, by a camera that moves at the walk's mean speed."""
 
     def __init__(self, body: Body, series: dict[str, NDArray], recording: Recording):
         self._body, self._series = body, series
@@ -212,7 +212,7 @@ class _Canvas:
 
 
 def _palette() -> Image.Image:
-    """Every colour drawn, and its blends with the paper where edges are smoothed: one palette for all frames."""
+    """One palette for all frames: every colour drawn, and its blends with the paper where edges are smoothed."""
     drawn = np.array([INK, FAINT, TRUNK, NEAR, FAR, FORCE, FAR_FORCE, PLAN], float)
     drawn = np.concatenate([drawn, SOFT + np.linspace(0, 1, 24)[:, None] * (STIFF - SOFT)])
     share = np.linspace(0, 1, 7)[:-1, None, None]  # the last blend is the paper itself

@@ -41,7 +41,7 @@ class Criterion:
         return value is not None and self.low <= value <= self.high
 
     def loosened(self) -> "Criterion":
-        """With either end farther out by `LOOSENED_BY` of itself, or by `LOOSENED_R_BY`, as `loosen` says."""
+        """With a wider range: by `LOOSENED_BY` of each end, by `LOOSENED_R_BY`, or unchanged, as `loosen` says."""
         if self.loosen == "share":
             return replace(
                 self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)
@@ -58,7 +58,7 @@ class Criterion:
 
 
 def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
-    """metrics.json and what criteria compare: `off`, distances from command and plan, and `double_support_percent`."""
+    """metrics.json with two more keys: `off`, distances from command and plan, and `double_support_percent`."""
     settings = settings_from(**metrics["environment"])
     plan = reference_walk_at(settings, settings.speed).plan
     cadence, support = metrics["cadence_steps_min"], metrics["double_support_s"]
@@ -77,7 +77,7 @@ def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
 
 
 def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
-    """Which criteria an evaluation misses, as words with the number; none if it meets all."""
+    """The criteria that an evaluation misses, each in words with its number; empty if it meets all."""
     values = numbers(metrics)
     return [f"{each.name} {number_text(each, values)}" for each in criteria if not each.holds(values)]
 

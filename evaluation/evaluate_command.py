@@ -37,7 +37,8 @@ class EvaluateFlags:
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What to walk in. A trained policy brings its own settings, height, mass, speed, pushes and start noise aside."""
+    """What to walk in. A trained policy brings its own springs and reward. Who walks where (body, speed, start, ground,
+    disturbances) has the defaults shown unless a flag says otherwise, whatever the policy was trained on."""
 
 
 def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evaluate.py") -> int:
@@ -50,14 +51,14 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
 
 
 def run_evaluation(flags: EvaluateFlags) -> None:
-    """Evaluates, prints the table and says where the results lie."""
+    """Evaluate, write the results, then print the table and where the results are."""
     for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
         require_count(name, getattr(flags, name), least)
     label = policy_label(flags.policy)
     out = flags.out or next_free(Path("runs"), f"eval-{label}")
     if out.exists():
         raise SpringfootError(f"{out} exists already; give --out a new folder")
-    from . import metrics, recording, report  # bad flags are told without waiting for imports
+    from . import metrics, recording, report  # not above: Matplotlib takes a while, and bad flags need not wait for it
 
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     policy, environment = recording.prepare(flags.policy, settings, flags.seed)

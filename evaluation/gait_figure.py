@@ -105,7 +105,7 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
         error = numbers[f"{name}_rmse_m"]
         _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", numbers["z_r"] if name == "z" else None)
     low, high = axes[1].get_ylim()
-    middle, half = (low + high) / 2, max(0.04, (high - low) / 2)  # a flat CoM shall look flat
+    middle, half = (low + high) / 2, max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
     axes[1].set_ylim(middle - half, middle + half)
 
 

@@ -64,7 +64,7 @@ def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) 
 
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
-    """The evaluation in a readable table, people beside the model; plain text where the output is no terminal."""
+    """Print the evaluation as a table, people beside the model; plain text where the output is no terminal."""
     console = console or Console(highlight=False)
     environment, people = metrics["environment"], metrics["reference"]
     pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
@@ -179,7 +179,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
 
 
 def people_metrics(human: HumanGait) -> dict[str, Any]:
-    """People's own values, or those of own data, from their mean curves; keys as in metrics."""
+    """The numbers of people, or of own data, from their mean curves; keys as in metrics.json."""
     phase = PERCENT / 100
     features = score.force_features(human.mean("grf_vertical", phase), human.mean("grf_forward", phase))
     positive, negative = score.stride_work(human.mean("ankle_power", phase)[None], np.array([human.stride_time]))

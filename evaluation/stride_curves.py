@@ -10,7 +10,7 @@ from springfoot.gait.cycle import PERCENT
 
 @dataclass(kw_only=True, eq=False)
 class StrideCurves:
-    """Mean and spread over strides of C curves, gathered block by block; NaN before the first stride."""
+    """Mean and spread over strides of C curves, added block by block; NaN before the first stride."""
 
     names: tuple[str, ...]
     count: int = 0
@@ -18,7 +18,7 @@ class StrideCurves:
     squares: NDArray | float = 0.0
 
     def add(self, curves: NDArray) -> None:
-        """Take in strides (S, 101, C)."""
+        """Add strides (S, 101, C)."""
         self.count += len(curves)
         self.total = self.total + curves.sum(axis=0)
         self.squares = self.squares + np.square(curves).sum(axis=0)

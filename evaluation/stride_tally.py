@@ -22,9 +22,9 @@ from .stride_curves import StrideCurves
 WARM_UP = 3.0
 """Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
 SHORTEST_SPEED = 1.0
-"""An episode that ends earlier than this after the warm-up [s] tells nothing about speed."""
+"""An episode that ends earlier than this after the warm-up [s] does not count for the speed."""
 CLEARANCE_SWING = (0.25, 0.75)
-"""Part of the swing in which toe clearance is taken."""
+"""Part of the swing over which toe clearance is measured [share of the swing]."""
 
 GAIT_CYCLE_COLUMNS = (
     "hip_flexion_deg",
@@ -171,12 +171,12 @@ def _add_steps(
             [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
         )
         tally.com.add(on_percent(relative, begin, end, TICK, first=TICK))
-        # The foot that lands at the step's end, against where this one landed.
+        # Step length: where the other foot lands at the step's end, less where this one landed at its start.
         at = np.floor(np.stack([begin, end]) / TICK).astype(int)
         ankle = series["ankle"][..., 0]
         tally.step_length += list(ankle[at[1], 1 - side] - ankle[at[0], side])
         tally.step_time += list(end - begin)
-        # The trailing foot leaves the ground within this step; without such a toe-off the body flew.
+        # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
         support = next_after(contacts[1 - side].toe_offs, begin) - begin
         tally.double_support += list(np.where(support < end - begin, support, 0.0))
 

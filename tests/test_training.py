@@ -183,7 +183,7 @@ def test_same_seed_same_policy_with_any_number_of_threads(run, tmp_path):
 def test_an_existing_run_is_refused_and_untouched(run):
     folder, _ = run
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(SpringfootError, match=r"already exists"):
+    with pytest.raises(SpringfootError, match=r"already exists; out must be a new or an empty folder"):
         training.train(SHORT, folder)
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
