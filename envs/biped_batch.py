@@ -22,19 +22,18 @@ from .control.leg_controller import LegController, slope_table
 from .control.reference_walk import reference_walks, rows
 from .control.standing import WALKING, Standing, off_phase
 from .control.subjects import Subjects
-from .physics.energy import WindowWork
 from .physics.foot_contact import CONTACTS
-from .physics.kernel import kernel
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, JOINTS, SIDES, passive_damping
 from .physics.simulation import Simulation
 from .settings import BipedSettings
 from .step_result import StepResult, Tick, report
+from .task.episode_end import end_step
 from .task.ground import Ground
 from .task.initial_state import place, random_phase, start_table, walking_posture
 from .task.observation import SensorNoise
 from .task.pushes import Pushes
-from .task.reward import ALIVE, Task
+from .task.reward import Task
 from .timing import CONTROL_WINDOW
 
 
@@ -228,9 +227,8 @@ class Biped:
         springs.set_stiffness(action, phase, self._now.angle, walking, scheduled)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        rests = (
-            phase.copy() if self.settings.equilibrium == "phase" else phase
-        )  # the equilibrium of a phase goes with its K
+        # The rest angle of a phase of the schedule goes with its K; any other follows the leg.
+        rests = phase.copy() if self.settings.equilibrium == "phase" else phase
         for window in range(self.windows_per_step):
             self._window(running, walking, ids, rests)
             self._window_forces[window] = self._now.force
@@ -258,19 +256,10 @@ class Biped:
 
         Returns: (N,) the episodes that are terminated, those that are truncated, and why the former are terminated.
         """
-        terminated, truncated = np.empty(self.num_envs, bool), np.empty(self.num_envs, bool)
-        limit = self.settings.episode_seconds / self.dt - 0.5  # times are sums of steps
         state = terms, self._window_forces, self._steps, self._force, reward
-        falls = _end(limit, running, *state, terminated, truncated)
-        return terminated, truncated, self._reasons(terminated) if falls else self._no_reason
-
-    def _reasons(self, terminated: NDArray) -> NDArray:
-        """(N,) why an episode is `terminated`, "" where it is not."""
-        reasons = np.where(terminated, self._task.fallen(self._now), "").astype(object)
-        for index in np.flatnonzero(terminated & (self._now.diverged >= 0)):
-            warning = mujoco.mjtWarning(int(self._now.diverged[index]))
-            reasons[index] = f"diverged: {warning.name.removeprefix('mjWARN_')}"
-        return reasons
+        terminated, truncated = end_step(self.settings.episode_seconds / self.dt, running, *state)
+        reasons = self._task.reasons(self._now, terminated) if terminated.any() else self._no_reason
+        return terminated, truncated, reasons
 
     def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
         """The actions that take effect, in [-1, 1]; an environment that is not `running` keeps its last one."""
@@ -291,17 +280,14 @@ class Biped:
             standing = running & ~walking
             self._standing.command(m, standing, control)
             self._springs.hold(control, m.angle, standing)
-        work = None
-        if phase is None:
-            self._now = self._simulation.advance(ids)
-        else:
-            self._now, work = self._simulation.advance_watched(ids)
+        advance = self._simulation.advance_watched if self.on_tick else self._simulation.advance
+        self._now = advance(ids)
         legs.advance(self._now, walking)
         self._ground.advance(self._now, legs.phase, self._random)
-        if self.on_tick is not None and phase is not None and work is not None:
-            self.on_tick(self._tick(phase, work, running))
+        if self.on_tick is not None and phase is not None:
+            self.on_tick(self._tick(phase, running))
 
-    def _tick(self, phase: NDArray, work: WindowWork, running: NDArray) -> Tick:
+    def _tick(self, phase: NDArray, running: NDArray) -> Tick:
         m, (stiffness, drive) = self._now, np.moveaxis(self._simulation.control, -1, 0)
         return Tick(
             measurement=m,
@@ -309,33 +295,7 @@ class Biped:
             stiffness=stiffness.copy(),
             equilibrium=drive / stiffness,
             passive_torque=-self._passive_damping * m.velocity,
-            work=work,
+            work=self._simulation.work,
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),
         )
-
-
-@kernel
-def _end(limit, running, terms, window_forces, steps, force, reward, terminated, truncated):
-    falls = 0
-    for i in range(len(running)):
-        terminated[i] = running[i] and terms[i, ALIVE] == 0.0
-        falls += terminated[i]
-        truncated[i] = running[i] and not terminated[i] and steps[i] + 1 >= limit
-        if running[i]:
-            steps[i] += 1
-            _average(window_forces[:, i], force[i])
-        else:
-            reward[i] = 0.0
-    return falls
-
-
-@kernel
-def _average(window_forces, force):
-    for side in range(2):
-        for contact in range(3):
-            for axis in range(2):
-                total = 0.0
-                for window in range(len(window_forces)):
-                    total += window_forces[window, side, contact, axis]
-                force[side, contact, axis] = total / len(window_forces)

@@ -56,7 +56,10 @@ SERIES: dict[str, Callable[[Tick], NDArray]] = {
     "stiffness": lambda tick: tick.stiffness[..., FEET],  # (side, (ankle, toe)) [N m/rad]
     "equilibrium": lambda tick: tick.equilibrium[..., FEET],  # (side, (ankle, toe)) [rad]
 }
-"""Name -> what is taken of a tick. Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.physics.model`."""
+"""Name -> what is taken of a tick.
+
+Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.physics.model`.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""Torque, work and energy of N bodies over every physics step of a control window; recorded only where someone reads it.
+"""Torque, work and energy of N bodies over every physics step of a window; recorded only where someone reads it.
 
 MuJoCo computes each force at the beginning of a physics step. The work of a force in a step is that force times the
 mean of the velocities before and after it, times the step: with this rule the energies of a walk close to 0.003 J/kg a

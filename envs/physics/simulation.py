@@ -65,6 +65,8 @@ class Simulation:
         self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._segments, self._parts = np.repeat(segments_of(body), num), np.repeat(parts_of(body), num)
         self._held = np.full(self.control.shape, np.nan)  # in the last window that was watched
+        self.work: WindowWork
+        """Torque, work and energy in the last window that was watched."""
         self._no_control = np.zeros_like(self.control)
 
     def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
@@ -125,8 +127,8 @@ class Simulation:
         self._roll(ids, self._record)
         return self._measure(self.control)
 
-    def advance_watched(self, ids: NDArray | None = None) -> tuple[Measurement, WindowWork]:
-        """As `advance`, the same bits, and what each physics step of the window did; those not in `ids` did nothing."""
+    def advance_watched(self, ids: NDArray | None = None) -> Measurement:
+        """As `advance`, the same bits; `work` then holds what the physics steps did, 0 for those not in `ids`."""
         shape = self.num, self._substeps, self.model.nv
         steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), *(np.zeros(shape) for _ in RECORDED))
         angle = self._qpos[:, 3:].reshape(self.control.shape[:3]).copy()
@@ -137,9 +139,9 @@ class Simulation:
         if ids is not None:
             still = np.setdiff1d(np.arange(self.num), ids)
             held[still], steps.before[still], push[still] = np.nan, 0.0, 0.0
-        work = window_work(self._parts, steps, self.control, held, angle, push, state, timestep)
+        self.work = window_work(self._parts, steps, self.control, held, angle, push, state, timestep)
         self._held[:] = self.control
-        return self._measure(self.control), work
+        return self._measure(self.control)
 
     def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
         """Run the physics steps of a window and record what `out` names, 0 for those that do not run."""
@@ -149,8 +151,9 @@ class Simulation:
         for values in out.values():
             values[:] = 0.0
         if len(ids):
-            for name, values in self._batch.rollout(self._substeps, record=list(out), ids=ids).items():
-                out[name][ids] = values
+            found = self._batch.rollout(self._substeps, record=list(out), ids=ids)
+            for name, values in out.items():
+                values[ids] = found[name]
 
     def measure(self) -> Measurement:
         """The measurement right after a reset: the state as it stands, with torques and contact forces of zero."""

@@ -19,6 +19,7 @@ from ..physics.kernel import kernel
 from ..physics.model import ANKLE, HIP, LEFT, RIGHT
 from ..settings import DEFAULT_WEIGHTS, BipedSettings
 from ..timing import ACTION_STEP
+from .episode_end import divergence
 from .observation import OBSERVATION, Observer
 from .reward_reference import REFERENCE, body_scales, reference_curves
 
@@ -145,6 +146,13 @@ class Task:
         total = np.empty(len(terms))
         _sum(self._weights, self._share, terms, total)
         return total
+
+    def reasons(self, m: "Measurement", terminated: NDArray) -> NDArray:
+        """(N,) why an episode is `terminated` (N,), "" where it is not."""
+        reasons = np.where(terminated, self.fallen(m), "").astype(object)
+        for index in np.flatnonzero(terminated & (m.diverged >= 0)).tolist():
+            reasons[index] = divergence(m, index)
+        return reasons
 
     def fallen(self, m: "Measurement") -> NDArray:
         """Why each environment has fallen, a string array (N,): empty while it has not."""
