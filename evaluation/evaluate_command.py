@@ -37,8 +37,8 @@ class EvaluateFlags:
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What to walk in. Each group says which of its settings a trained policy brings; all others have the defaults shown
-    unless a flag says otherwise, whatever the policy was trained on."""
+    """What to walk in. Each group says which of its settings a trained policy brings; all others have the defaults
+    shown unless a flag says otherwise, whatever the policy was trained on."""
 
 
 def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evaluate.py") -> int:
