@@ -227,8 +227,7 @@ class Biped:
         springs.set_stiffness(action, phase, self._now.angle, walking, scheduled)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        # The rest angle of a phase of the schedule goes with its K; any other follows the leg.
-        rests = phase.copy() if self.settings.equilibrium == "phase" else phase
+        rests = phase.copy() if self.settings.equilibrium == "phase" else phase  # a phase's rest angle goes with its K
         for window in range(self.windows_per_step):
             self._window(running, walking, ids, rests)
             self._window_forces[window] = self._now.force
@@ -256,8 +255,8 @@ class Biped:
 
         Returns: (N,) the episodes that are terminated, those that are truncated, and why the former are terminated.
         """
-        state = terms, self._window_forces, self._steps, self._force, reward
-        terminated, truncated = end_step(self.settings.episode_seconds / self.dt, running, *state)
+        counts = self._window_forces, self._steps, self._force
+        terminated, truncated = end_step(self.settings.episode_seconds / self.dt, running, terms, *counts, reward)
         reasons = self._task.reasons(self._now, terminated) if terminated.any() else self._no_reason
         return terminated, truncated, reasons
 

@@ -100,7 +100,7 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[PolicyFunc
     """A policy by name and the environment it is evaluated in.
 
     Args:
-        name: a .safetensors file, a run folder (its best policy), `pretrained`, or a baseline (`springfoot.agents.baselines`).
+        name: a .safetensors file, a run folder (its best policy), `pretrained`, or a baseline of `agents.baselines`.
         given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
         seed: of the baseline `random`.
 

@@ -33,8 +33,8 @@ from springfoot.gait.scores import mean_sd
 from springfoot.gait.stiffness import SPRINGS, Segment, StiffnessSchedule
 
 from .protocol import Protocol, measured
-from .quantities import JOINTS, Quantity
-from .study import Answer, Progress
+from .quantities import COMPARED_JOINTS, Quantity
+from .study import Answer, OnProgress
 from .trainings import TrainingStudy
 
 ABLATIONS: dict[str, dict[str, Any]] = {
@@ -84,7 +84,7 @@ QUANTITIES = (
     Quantity("pushed", ".1f", ("pushed", "falls")),
     Quantity("return", ".0f", ("undisturbed", "return", "mean")),
     Quantity("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
-    *(Quantity(f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in JOINTS),
+    *(Quantity(f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
     *(Quantity(f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
     Quantity("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
     Quantity("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
@@ -244,7 +244,7 @@ class Ablations(TrainingStudy):
             if name not in ABLATIONS:
                 raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Train what is missing, and measure."""
         how = Protocol(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
         failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))

@@ -27,8 +27,8 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import BATCH, Recording, prepare, record_each
 from springfoot.gait.errors import require_count
 
-from .quantities import JOINTS
-from .study import Answer, Progress, Study
+from .quantities import COMPARED_JOINTS
+from .study import Answer, OnProgress, Study
 
 RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
 """What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
@@ -39,7 +39,7 @@ WORST_FALLS = 10
 
 QUANTITIES = (
     ("speed error %", "speed_error_percent", ".1f", abs),
-    *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in JOINTS),
+    *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
     ("vertical force r", "grf_vertical_r", ".3f", lambda r: -r),
 )
 """Label, column, format, and how bad a value is."""
@@ -62,7 +62,7 @@ def walk_pairs(
     seed: int = 0,
     threads: int = 2,
     block: int = BATCH,
-    progress: Progress = lambda seconds: None,
+    progress: OnProgress = lambda seconds: None,
 ) -> list[dict[str, Any]]:
     """One episode of each pair, and its numbers as in pairs.csv (docs/metrics.md); None where there is none.
 
@@ -91,7 +91,7 @@ def _row(recording: Recording) -> dict[str, Any]:
         "fall": str(recording.fall_reason[0]),
         "measured_speed_m_s": speed,
         "speed_error_percent": None if speed is None else 100 * (speed / settings.speed - 1),
-        **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in JOINTS},
+        **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS},
         "grf_vertical_r": metrics["grf"]["vertical_r"],
     }
 
@@ -146,7 +146,7 @@ class Bodies(Study):
         """Simulated seconds without falls."""
         return self.pairs * self.seconds
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk every pair."""
         conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
         policy, settings = prepare(self.policy, conditions, self.seed)

@@ -22,8 +22,8 @@ from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 
-from .quantities import JOINTS, falls_text, rmse_text, walks_csv
-from .study import Answer, Progress, WalkingStudy
+from .quantities import COMPARED_JOINTS, falls_text, rmse_text, walks_csv
+from .study import Answer, OnProgress, WalkingStudy
 
 PUSHED = BipedSettings(push_newton=150.0)
 """Pushes [N] of `best-constant` and `compare` unless flagged otherwise."""
@@ -86,7 +86,7 @@ def compare(
     episodes: int = 100,
     seed: int = 0,
     threads: int = 2,
-    progress: Progress = lambda seconds: None,
+    progress: OnProgress = lambda seconds: None,
 ) -> list[Row]:
     """The policy `name` and every baseline on the same episodes, in the policy's own environment and reward.
 
@@ -129,7 +129,7 @@ def verdict(rows: Sequence[Row]) -> str:
     first, *others = rows
     apart = sum(_against(row, first).startswith("lower") for row in others)
     closer = []
-    for row, joint in product(others, JOINTS):
+    for row, joint in product(others, COMPARED_JOINTS):
         rmse, own = (each.metrics["joints"][joint]["rmse_deg"] for each in (row, first))
         if rmse is not None and own is not None and rmse < own:
             closer.append(f"{row.name} {joint} by {own - rmse:.2f}°")
@@ -160,7 +160,7 @@ class Compare(WalkingStudy):
     environment: tyro.conf.OmitArgPrefixes[PushedFlags]  # type: ignore[valid-type]
     """What to walk in; a trained policy brings its own settings, standard conditions aside."""
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk every row."""
         conditions = pushed(self.seconds, self.environment)
         rows = compare(self.policy, conditions, self.constant, **self.how, progress=progress)

@@ -17,7 +17,7 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 
 from .quantities import falls_text, rmse_text, walks_csv
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 WORLD = (
     "",
@@ -38,7 +38,7 @@ WORLD = (
 """Flags of one policy's rows. Proportions are ± 2 SD of adults; loads are 10 and 20 kg for 63 kg."""
 LONG = "--episodes 10 --seconds 600"
 """Flags of one more row: hours of walking in all."""
-SPRINGS = (
+UNTRAINED_ROWS = (
     "constant --equilibrium neutral",
     "schedule",
     "schedule --feedforward plan",
@@ -77,7 +77,7 @@ class Conditions(WalkingStudy):
 
     QUICK: ClassVar[dict[str, Any]] = WalkingStudy.QUICK | {"long": False}  # type: ignore[operator]
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk every row."""
         sections, lines = {}, []
         if self.rows != "springs":
@@ -86,7 +86,7 @@ class Conditions(WalkingStudy):
             sections["WORLD"] = conditions_table(f"`{self.policy}` with", found)
             lines += [({"policy": self.policy, "flags": words}, metrics) for words, metrics in found]
         if self.rows != "world":
-            found = [(words, self._walk(shlex.split(words), progress)) for words in SPRINGS]
+            found = [(words, self._walk(shlex.split(words), progress)) for words in UNTRAINED_ROWS]
             sections["SPRINGS-UNTRAINED"] = conditions_table("", found)
             split = [(*words.partition(" "), metrics) for words, metrics in found]
             lines += [({"policy": name, "flags": words}, metrics) for name, _, words, metrics in split]
@@ -95,7 +95,7 @@ class Conditions(WalkingStudy):
         text = "\n\n".join(sections.values())
         return Answer(text=text, files={"conditions.csv": walks_csv(lines)}, sections=sections)
 
-    def _walk(self, words: Sequence[str], progress: Progress) -> dict[str, Any]:
+    def _walk(self, words: Sequence[str], progress: OnProgress) -> dict[str, Any]:
         """The metrics of evaluate.py with these words, this study's counts in place of evaluate's own."""
         counts = {"episodes": self.episodes, "seconds": self.seconds, "seed": self.seed, "threads": self.threads}
         ours = [str(word) for name, count in counts.items() for word in (f"--{name}", count)]

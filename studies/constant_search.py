@@ -17,7 +17,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.recording import prepare, record
 
 from .comparison import INTERVALS, PushedFlags, mean_interval, pushed
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 COARSE = (8, 5)
 """First grid of the search for a constant, ankle by toe stiffness: evenly on a log scale over their ranges."""
@@ -35,7 +35,7 @@ def best_constant(
     episodes: int = 16,
     seed: int = SEARCH_SEED,
     threads: int = 2,
-    progress: Progress = lambda candidates: None,
+    progress: OnProgress = lambda candidates: None,
 ) -> tuple[tuple[float, float], dict[tuple[float, float], NDArray]]:
     """The constant ankle and toe stiffness of the highest mean return in `settings`, and the returns of all tried.
 
@@ -84,7 +84,7 @@ class BestConstant(WalkingStudy):
         """Candidates."""
         return COARSE[0] * COARSE[1] + 9 * REFINEMENTS
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Search."""
         _, settings = prepare(self.policy, pushed(self.seconds, self.environment))
         (ankle, toe), tried = best_constant(settings, **self.how, progress=progress)

@@ -17,7 +17,7 @@ from springfoot.evaluation.criteria import FOLLOWS_THE_PLAN, HUMAN_LIKE, Criteri
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 CRITERIA = (*HUMAN_LIKE, *FOLLOWS_THE_PLAN)
 """Of the table, in its order: down the left half, then down the right."""
@@ -54,7 +54,7 @@ class CriteriaMet(WalkingStudy):
         """Simulated seconds without falls."""
         return self.episodes * self.seconds
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk, and judge."""
         label = policy_label(self.policy)
         policy, settings = prepare(self.policy, {"episode_seconds": self.seconds} | given(self.environment), self.seed)

@@ -35,7 +35,7 @@ from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import SPRINGS, TOE_STIFFNESS, Segment, StiffnessSchedule
 
 from .quantities import falls_text, rmse_text, walks_csv
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 SECTION = "ANY-K"
 """Of the results page."""
@@ -160,7 +160,7 @@ def any_stiffness(
     stiffnesses: Sequence[str] = STIFFNESSES,
     disturbances: dict[str, dict[str, Any]] | None = None,
     *,
-    progress: Progress = lambda seconds: None,
+    progress: OnProgress = lambda seconds: None,
     **how: Any,
 ) -> tuple[list[Row], dict[str, StiffnessSchedule]]:
     """The policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
@@ -260,7 +260,7 @@ class AnyStiffness(WalkingStudy):
     unevenness_m: float = 0.01
     """Unevenness of the ground [m]."""
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk every row."""
         disturbances = {
             f"±{self.push_newton:g} N": {"push_newton": self.push_newton},

@@ -24,7 +24,7 @@ from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.errors import SpringfootError
 
 from .quantities import walks_csv
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 KEYS = ("timesteps", "seconds", "return_mean", "falls")
 """Of a periodic evaluation: what is drawn and kept."""
@@ -73,7 +73,7 @@ class LearningCurves(WalkingStudy):
         if not self.runs:
             raise SpringfootError("give one run folder of train.py or more")
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Judge every run."""
         runs = {folder.name: _read(folder) for folder in self.runs}
         lines, walks = [], []

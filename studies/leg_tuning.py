@@ -25,7 +25,7 @@ from springfoot.gait.plan import Cadence
 
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .leg_cost import SECONDS, cost
-from .study import Answer, Progress, Study
+from .study import Answer, OnProgress, Study
 
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
 """One unit of the search: degrees of a knot, relative change of a gain."""
@@ -107,7 +107,7 @@ class LegTuning(Study):
         """Generations."""
         return self.generations
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Search.
 
         Raises `SpringfootError`, with nothing written, for constants to start from that are not in the file, and

@@ -10,7 +10,7 @@ from springfoot.agents.files import write_atomically
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 
-from .study import Progress
+from .study import OnProgress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Protocol:
     """Episode i is seeded with seed + i."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
-    progress: Progress = lambda seconds: None
+    progress: OnProgress = lambda seconds: None
 
     def of(self, policy: str, given: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
         """The policy's metrics `undisturbed` and `pushed`, with the default reward."""

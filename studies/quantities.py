@@ -9,7 +9,7 @@ from typing import Any
 from springfoot.agents.files import csv_text
 from springfoot.agents.markdown import text_of
 
-JOINTS = ("thigh", "knee", "ankle")
+COMPARED_JOINTS = ("thigh", "knee", "ankle")
 """Whose angles are compared; people's toe is that of other people."""
 
 
@@ -35,7 +35,7 @@ OF_A_WALK = (
     Quantity("falls", "d", ("falls",)),
     Quantity("return", ".1f", ("return", "mean")),
     Quantity("speed m/s", ".3f", ("speed_m_s", "mean")),
-    *(Quantity(f"RMSE {joint} °", ".2f", ("joints", joint, "rmse_deg")) for joint in (*JOINTS, "toe")),
+    *(Quantity(f"RMSE {joint} °", ".2f", ("joints", joint, "rmse_deg")) for joint in (*COMPARED_JOINTS, "toe")),
     *(Quantity(f"vertical peak {peak} BW", ".2f", ("grf", f"vertical_peak{peak}_bw")) for peak in (1, 2)),
     Quantity("vertical force r", ".3f", ("grf", "vertical_r")),
     *(
@@ -60,5 +60,5 @@ def falls_text(metrics: Mapping[str, Any]) -> str:
 
 
 def rmse_text(metrics: Mapping[str, Any]) -> str:
-    """RMSE of `JOINTS` to people's mean [deg], in words."""
-    return " / ".join(text_of(metrics["joints"][joint]["rmse_deg"], ".1f") for joint in JOINTS)
+    """RMSE of `COMPARED_JOINTS` to people's mean [deg], in words."""
+    return " / ".join(text_of(metrics["joints"][joint]["rmse_deg"], ".1f") for joint in COMPARED_JOINTS)

@@ -31,7 +31,7 @@ from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 
 from .quantities import walks_csv
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 SECTION = "AGREEMENT"
 """Of the results page."""
@@ -210,7 +210,7 @@ class SeedAgreement(WalkingStudy):
         super().check()
         _require_two(len(self.policies))
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk every policy."""
         prepared = [(name, *prepare(name, {"episode_seconds": self.seconds}, self.seed)) for name in self.policies]
         gaits = [

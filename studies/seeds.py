@@ -17,7 +17,7 @@ from springfoot.gait.scores import mean_sd
 
 from .comparison import Row, run_row, what_ran
 from .quantities import OF_A_WALK, walks_csv
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 SECTION = "SEEDS"
 """Of the results page."""
@@ -51,7 +51,7 @@ class Seeds(WalkingStudy):
         if not self.policies:
             raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Walk every policy."""
         conditions = {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)
         prepared = [(name, *prepare(name, conditions, self.seed)) for name in self.policies]

@@ -28,7 +28,7 @@ from springfoot.gait.body import GRAVITY
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
 from .constants_file import CONSTANTS, read_constants, write_constants
-from .study import Answer, Progress, Study
+from .study import Answer, OnProgress, Study
 
 SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
 """Walked on by every candidate."""
@@ -140,7 +140,7 @@ class SlopeTuning(Study):
         """Generations."""
         return self.generations
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Search, judge what was found, and write it if it is better; with --quick never.
 
         Raises `SpringfootError`, with nothing written, for another kind of file.

@@ -33,9 +33,9 @@ from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 
-from .quantities import JOINTS
+from .quantities import COMPARED_JOINTS
 from .seed_agreement import agreements
-from .study import Answer, Progress
+from .study import Answer, OnProgress
 from .trainings import TrainingStudy
 
 SECTION = "TRADE-OFF"
@@ -70,8 +70,8 @@ class WeightResult:
 
     @property
     def rmse(self) -> list[float | None]:
-        """Of each seed, mean over `JOINTS` [deg]; None where it does not walk."""
-        values = [[gait.metrics["joints"][joint]["rmse_deg"] for joint in JOINTS] for gait in self.gaits]
+        """Of each seed, mean over `COMPARED_JOINTS` [deg]; None where it does not walk."""
+        values = [[gait.metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS] for gait in self.gaits]
         return [None if None in each else float(np.mean(each)) for each in values]
 
     @property
@@ -101,7 +101,7 @@ def measure_point(
     folders: Sequence[Path],
     pushes: Sequence[float] = PUSHES,
     seconds: float = 20.0,
-    progress: Progress = lambda simulated: None,
+    progress: OnProgress = lambda simulated: None,
     **how: Any,
 ) -> WeightResult:
     """Walk the best policy of each run folder, undisturbed and under each push; `how` as for `recording.record`."""
@@ -242,7 +242,7 @@ class StiffnessCost(TrainingStudy):
         if not self.weights or not self.pushes:
             raise SpringfootError("give one weight and one push or more")
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Train what is missing, walk and be pushed."""
         weights = sorted(set(self.weights))
         folders = {

@@ -17,7 +17,7 @@ from springfoot.agents.files import next_free, whole_folder
 from springfoot.agents.markdown import write_section
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
-Progress = Callable[[float], object]
+OnProgress = Callable[[float], object]
 """Told how much more is done: simulated seconds, or whatever a study counts."""
 QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
 
@@ -62,7 +62,7 @@ class Study:
         """How much progress there will be, where that is known."""
         return None
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """The answer."""
         raise NotImplementedError
 

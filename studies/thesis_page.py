@@ -16,7 +16,7 @@ from springfoot.agents.markdown import table
 from springfoot.gait import thesis_schedule
 from springfoot.gait.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
 
-from .study import Answer, Progress, Study
+from .study import Answer, OnProgress, Study
 from .thesis_figures import FIGURES, PHASE, DrawnWalk, as_planned, as_printed, of_people, save_figure
 from .thesis_tables import BODY, STRIDE, THESIS_SPEED, cart_table, claims, corrected, moments, people_work, springs
 
@@ -180,7 +180,7 @@ class Thesis(Study):
     `--page docs/thesis.md` writes the whole page, not a section of one, and its pictures into a folder beside it.
     """
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Compute the page."""
         drawn, text = walks(), page()
         files = {f"thesis/figure-{number}.png": partial(save_figure, number, drawn) for number in FIGURES}

@@ -13,7 +13,7 @@ from springfoot.evaluation.recording import prepare, record
 from springfoot.gait.errors import SpringfootError
 from springfoot.studies import body_sweep as bodies
 from springfoot.studies.command import study_main
-from springfoot.studies.quantities import JOINTS
+from springfoot.studies.quantities import COMPARED_JOINTS
 
 SOME: dict[str, Any] = {"height_range": (1.6, 1.75), "mass_range": (40.0, 120.0), "speed_range": (1.15, 1.25)}
 
@@ -44,7 +44,7 @@ def test_a_pair_is_measured_as_if_alone_in_blocks_of_any_size():
 
 def row(speed_error: float | None = 1.0, fall: str = "", **values: Any) -> dict[str, Any]:
     plain = {"height_m": 1.7, "mass_kg": 63.0, "speed_m_s": 1.2, "froude_speed": 0.4, "people_clamped": 0}
-    measured = {f"{joint}_rmse_deg": 2.0 for joint in JOINTS} | {"grf_vertical_r": 0.99}
+    measured = {f"{joint}_rmse_deg": 2.0 for joint in COMPARED_JOINTS} | {"grf_vertical_r": 0.99}
     fell = {"seconds": 20.0, "fall": fall, "measured_speed_m_s": 1.2, "speed_error_percent": speed_error}
     return plain | fell | measured | values
 

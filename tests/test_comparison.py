@@ -78,7 +78,7 @@ def row_of(name, returns, rmse=2.0):
         "falls": 1,
         "episodes": len(returns),
         "speed_m_s": {"mean": 1.2},
-        "joints": {joint: {"rmse_deg": rmse} for joint in quantities.JOINTS},
+        "joints": {joint: {"rmse_deg": rmse} for joint in quantities.COMPARED_JOINTS},
         "grf": {"vertical_peak1_bw": 1.05, "vertical_peak2_bw": None},
     }
     return comparison.Row(name=name, metrics=metrics, returns=np.array(returns, float))
