@@ -106,6 +106,6 @@ def study_help() -> str:
             "",
             *lines,
             "",
-            "Each takes --help; with --quick it runs within seconds, only to be seen to run.",
+            "Each takes --help; with --quick it runs a minute at most, only to be seen to run.",
         ]
     )

@@ -41,7 +41,7 @@ class Study:
     """A question, with the flags that every study has."""
 
     quick: tyro.conf.FlagCreatePairsOff[bool] = False
-    """See that it runs, within seconds: tiny counts in place of what is flagged; its figures then mean nothing."""
+    """See that it runs, in a minute at most: tiny counts in place of what is flagged; its figures then mean nothing."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/STUDY-N)")] = None
     """New folder for its CSV files and pictures."""
     page: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
