@@ -238,7 +238,7 @@ class Ablations(TrainingStudy):
     }
 
     def check(self) -> None:
-        """Refuse rows that are not there as well."""
+        """Refuse unknown rows as well."""
         super().check()
         for name in self.only:
             if name not in ABLATIONS:
@@ -256,8 +256,7 @@ class Ablations(TrainingStudy):
         tables = {"SPRINGS": springs, "ABLATIONS": explained, "INPUTS": inputs(self.runs, how)}
         heads = {"SPRINGS": "spring", "ABLATIONS": "training", "INPUTS": "fixed schedule"}
         ran = f"{how.sentence} Mean ± SD over training seeds."
-        sections = {
-            name: f"{rows_table(each, heads[name], people=name == 'SPRINGS')}\n\n{ran}" for name, each in tables.items()
-        }
-        text = "\n\n".join(sections.values())
+        texts = {name: rows_table(each, heads[name], people=name == "SPRINGS") for name, each in tables.items()}
+        sections = {name: text if name == "INPUTS" else f"{text}\n\n{ran}" for name, text in texts.items()}
+        text = "\n\n".join([*texts.values(), ran])
         return Answer(text=text, files={"ablations.csv": _numbers(tables)}, sections=sections, failed=failed)

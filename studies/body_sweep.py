@@ -137,7 +137,7 @@ class Bodies(Study):
     QUICK: ClassVar[dict[str, Any]] = {"pairs": 2, "seconds": 5.0}
 
     def check(self) -> None:
-        """Refuse counts that cannot be."""
+        """Refuse counts out of range."""
         for name, least in (("pairs", 1), ("seed", 0), ("threads", 1)):
             require_count(name, getattr(self, name), least)
 

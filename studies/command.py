@@ -58,6 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             case [] | ["-h" | "--help"]:
                 print(HELP)
                 return 0
+    except KeyboardInterrupt:  # while it imports; the commands themselves end in good order
+        return 130
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith("springfoot"):
             raise

@@ -68,7 +68,7 @@ class LearningCurves(WalkingStudy):
     """Run folders of train.py."""
 
     def check(self) -> None:
-        """Refuse no runs as well."""
+        """Refuse an empty list of runs as well."""
         super().check()
         if not self.runs:
             raise SpringfootError("give one run folder of train.py or more")

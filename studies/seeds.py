@@ -46,7 +46,7 @@ class Seeds(WalkingStudy):
     """What to walk in; a trained policy brings its own settings, standard conditions aside."""
 
     def check(self) -> None:
-        """Refuse no policies as well."""
+        """Refuse an empty list of policies as well."""
         super().check()
         if not self.policies:
             raise SpringfootError("give one policy or more: run folders, .safetensors files or names")

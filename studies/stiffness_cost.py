@@ -237,7 +237,7 @@ class StiffnessCost(TrainingStudy):
     }
 
     def check(self) -> None:
-        """Refuse no weights and no pushes as well."""
+        """Refuse an empty list of weights or pushes as well."""
         super().check()
         if not self.weights or not self.pushes:
             raise SpringfootError("give one weight and one push or more")

@@ -18,7 +18,7 @@ from springfoot.agents.markdown import write_section
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
 OnProgress = Callable[[float], object]
-"""Told how much more is done: simulated seconds, or whatever a study counts."""
+"""Called with how much more is done: simulated seconds, or what `Study.UNIT` names."""
 QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
 
 
@@ -27,13 +27,13 @@ class Answer:
     """What a study found."""
 
     text: str
-    """Markdown, to be printed."""
+    """Markdown that the command prints."""
     files: Mapping[str, str | Callable[[Path], object]] = field(default_factory=dict)
-    """Name -> text of a file of the study's folder, or what draws the picture of that path."""
+    """Name of a file in the study's folder -> its text, or a function that writes it at a path."""
     sections: Mapping[str, str] = field(default_factory=dict)
-    """Name -> markdown of a section of a page."""
+    """Name of a section of a page -> its markdown."""
     failed: bool = False
-    """Whether a part of it could not be had; the exit code is then 1."""
+    """Whether a part of the study failed; the exit code is then 1."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,23 +47,23 @@ class Study:
     page: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """Also write its tables into this page, between the markers of its sections, and its pictures beside it."""
     command: tyro.conf.Suppress[tyro.conf.Fixed[str]] = ""
-    """How it was asked, told with what it found."""
+    """The command line that runs it; pages and files name it beside what it found."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {}
-    """Flags of `--quick`."""
+    """Name of a flag -> its value with `--quick`."""
     UNIT: ClassVar[str] = "s"
     """What its progress counts."""
 
     def check(self) -> None:
-        """Raise `SpringfootError` for flags that cannot be, before anything is done."""
+        """Raise `SpringfootError` for a bad flag; called before anything else."""
 
     @property
     def total(self) -> float | None:
-        """How much progress there will be, where that is known."""
+        """OnProgress at the end; None where it is not known."""
         return None
 
     def ask(self, progress: OnProgress) -> Answer:
-        """The answer."""
+        """Do the study and return its answer; call `progress` on the way."""
         raise NotImplementedError
 
     def write_page(self, page: Path, answer: Answer) -> None:
@@ -72,9 +72,10 @@ class Study:
             write_section(page, name, f"{text}\n\nMade by `{self.command}`.")
 
     def run(self, name: str) -> int:
-        """Ask, print and write what was found; the exit code: 0, or 1 where a part of it failed.
+        """Do the study, print its answer, write its files and its page; `name` is that of its command.
 
-        Raises `SpringfootError`, with nothing written, for bad flags, a folder that exists, and a page that cannot be.
+        Returns the exit code: 0, or 1 where a part of the study failed. Raises `SpringfootError`, with nothing written,
+        for a bad flag, an `out` that exists, and a page in a folder that does not.
         """
         study = replace(self, **self.QUICK) if self.quick else self
         study.check()
@@ -127,7 +128,7 @@ class WalkingStudy(Study):
     QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
 
     def check(self) -> None:
-        """Refuse counts and lengths that cannot be."""
+        """Refuse counts and lengths out of range."""
         for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
             require_count(name, getattr(self, name), least)
         require_number("seconds", self.seconds, 0, above=True, unit="s")
@@ -139,5 +140,5 @@ class WalkingStudy(Study):
 
     @property
     def what_ran(self) -> str:
-        """The episodes of a row in words."""
+        """The episodes of each row, in words."""
         return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"

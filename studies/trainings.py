@@ -30,7 +30,7 @@ class TrainingStudy(WalkingStudy):
     QUICK: ClassVar[dict[str, Any]] = {**WalkingStudy.QUICK, "seeds": 1, "timesteps": 8192}
 
     def check(self) -> None:
-        """Refuse counts that cannot be."""
+        """Refuse counts out of range."""
         super().check()
         require_count("seeds", self.seeds)
         if self.timesteps is not None:
