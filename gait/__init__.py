@@ -9,6 +9,7 @@ from .identification import PhaseSpring, identify
 from .kinetics import foot_force, ground_reaction, planned_moments, projection_table
 from .leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
 from .own_data import OwnGait, read_gait
+from .perturbation import PushedSpring, identify_pushed
 from .plan import WalkPlan, plan_walk
 from .preview import preview_com
 from .stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
@@ -23,6 +24,7 @@ __all__ = [
     "LegMotion",
     "OwnGait",
     "PhaseSpring",
+    "PushedSpring",
     "SpringfootError",
     "StiffnessSchedule",
     "WalkPlan",
@@ -30,6 +32,7 @@ __all__ = [
     "ground_reaction",
     "human_gait",
     "identify",
+    "identify_pushed",
     "inverse_dynamics",
     "leg_motion",
     "plan_bout",

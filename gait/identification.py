@@ -1,26 +1,28 @@
-"""System identification, the block the thesis left empty: K, beta and theta_eq from torque, angle and velocity.
+"""System identification without disturbance: K, beta and theta_eq from torque, angle and velocity of a gait.
 
 In each phase of the stride the joint is taken as one spring and damper, torque = K (theta_eq - theta - beta theta'),
 which is linear in K theta_eq, K and K beta: ordinary least squares. Intervals are exact if the torque's errors are
 independent, normal and of one size, and angle and velocity are without error. Neither holds in a gait laboratory:
 smoothed or averaged curves have errors that last for many samples, and then the intervals are too narrow (a warning
-says so); noise on the angle makes K too small (`noise_study`). And no data of an undisturbed gait can tell a constant
-theta_eq from one that moves with the angle: a K found here is the spring's only if theta_eq stood still in the phase.
+says so); noise on the angle makes K too small (`noise_study`).
+
+What it cannot do: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle.
+What is found is the slope of the loop of torque over angle (quasi-stiffness), the spring's K only if theta_eq stood
+still in the phase. On the simulation's fixed schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at
+30-44 % of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning know
+nothing of that. Where a gait can be pushed, `perturbation` finds K itself.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
 from .errors import SpringfootError, require_count, require_number, require_within
+from .spring_fit import Estimate, fit_spring, intervals
 
-CONFIDENCE = 0.95
-"""Confidence of every interval."""
 COLLINEAR = 0.95
 """Correlation of angle and velocity beyond which they hardly tell K from beta (variance inflation above 10)."""
 ILL_CONDITIONED = 30.0
@@ -32,14 +34,6 @@ CORRELATED = 0.5
 """Lag-1 correlation of the residuals beyond which the intervals are called too narrow."""
 
 PARAMETERS = ("stiffness", "damping_time", "equilibrium")
-
-
-class Estimate(NamedTuple):
-    """A number and its 95 % confidence interval, which is infinite where the data set no bound."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +79,8 @@ def identify(
     margin: float = 0,
 ) -> tuple[PhaseSpring, ...]:
     """K, beta and theta_eq of each phase of the stride, by least squares, with their intervals.
+
+    They are those of a spring only if its theta_eq stood still in the phase: else use `perturbation.identify_pushed`.
 
     Args:
         torque: [N m], or per kg, positive as the angle (a plantarflexion moment with its sign turned).
@@ -147,7 +143,7 @@ def noise_study(
     outcomes = []
     for edges, curves in _windows(torque, angle, velocity, phase, bounds, margin):
         count = len(curves[0])
-        fit = _fit(*curves) if count > 3 else None
+        fit = fit_spring(*curves) if count > 3 else None
         if fit is None or not fit.solvable:
             raise SpringfootError(
                 f"no spring to be identified from {edges[0]:g} to {edges[1]:g}: see identify's warning"
@@ -155,8 +151,8 @@ def noise_study(
         offset, K, c = fit.coefficients
         clean = (offset - K * curves[1] - c * curves[2], *curves[1:])
         noisy = [curve + sd * random.standard_normal((repeats, count)) for curve, sd in zip(clean, noises, strict=True)]
-        truth = np.array([ratio[0] for ratio in _intervals(fit)])
-        value, low, high = np.moveaxis(np.array(_intervals(_fit(*noisy))), 1, 0)
+        truth = np.array([ratio[0] for ratio in intervals(fit)])
+        value, low, high = np.moveaxis(np.array(intervals(fit_spring(*noisy))), 1, 0)
         held = np.mean((truth >= low.T) & (truth <= high.T), axis=0) * 100
         bias = np.median(value.T - truth, axis=0)
         spread = np.cov(np.stack(clean[1:]), bias=True)
@@ -174,76 +170,6 @@ def noise_study(
     return tuple(outcomes)
 
 
-class _Fit(NamedTuple):
-    """tau = a - K theta - c theta', fitted along the last axis; leading axes are fits of their own."""
-
-    coefficients: NDArray
-    """(..., 3): a, K, c."""
-    covariance: NDArray
-    """(..., 3, 3)."""
-    residual: NDArray
-    """(..., n)."""
-    freedom: int
-    """n - 3."""
-    solvable: bool
-    """False if the data leave K and c open; the numbers then mean nothing."""
-
-
-def _fit(torque: NDArray, angle: NDArray, velocity: NDArray) -> _Fit:
-    """Least squares about the means, angle and velocity scaled to unit size: no digits lost to units or offsets."""
-    count = torque.shape[-1]
-    mean = np.stack([angle.mean(-1), velocity.mean(-1)], -1)
-    moved = np.stack([angle, velocity], -1) - mean[..., None, :]
-    size = np.sqrt((moved**2).mean(-2))
-    solvable = bool(np.all(size > 1e-9 * (1 + np.abs(mean))))
-    size = np.where(size > 0, size, 1.0)
-    unit = moved / size[..., None, :]
-    gram = np.einsum("...ni,...nj->...ij", unit, unit)
-    solvable &= bool(np.all(np.linalg.det(gram) > 1e-10 * count**2))
-    inverse = np.linalg.pinv(gram, hermitian=True) / size[..., None, :] / size[..., :, None]
-    pull = np.einsum("...ni,...n->...i", moved, torque - torque.mean(-1, keepdims=True))
-    slopes = -np.einsum("...ij,...j->...i", inverse, pull)  # K, c
-    offset = torque.mean(-1) + np.einsum("...i,...i->...", slopes, mean)
-    residual = torque - offset[..., None] + np.einsum("...ni,...i->...n", moved + mean[..., None, :], slopes)
-    freedom = count - 3
-    variance = (residual**2).sum(-1) / freedom
-    # a = mean torque + mean . (K, c), and the mean torque errs independently of the slopes.
-    across = np.einsum("...ij,...j->...i", inverse, mean)
-    covariance = np.empty((*variance.shape, 3, 3))
-    covariance[..., 1:, 1:] = inverse
-    covariance[..., 0, 1:] = covariance[..., 1:, 0] = across
-    covariance[..., 0, 0] = 1 / count + np.einsum("...i,...i->...", across, mean)
-    return _Fit(
-        np.concatenate([offset[..., None], slopes], -1),
-        covariance * variance[..., None, None],
-        residual,
-        freedom,
-        solvable,
-    )
-
-
-def _intervals(fit: _Fit) -> list[tuple[NDArray, NDArray, NDArray]]:
-    """(value, low, high) of K, beta and theta_eq.
-
-    Fieller 1954 for the ratios: all r for which the numerator - r K does not differ from 0. Exact where the delta
-    method is not; where K may be 0 the ratio has no bounds.
-    """
-    quantile = stdtrit(fit.freedom, (1 + CONFIDENCE) / 2)  # Student's t
-    a, K, c = np.moveaxis(fit.coefficients, -1, 0)
-    v = np.moveaxis(fit.covariance, (-2, -1), (0, 1)) * quantile**2
-    results = [(K, K - np.sqrt(v[1, 1]), K + np.sqrt(v[1, 1]))]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for top, index in ((c, 2), (a, 0)):
-            squared = K**2 - v[1, 1]
-            middle = (top * K - v[index, 1]) / squared
-            product = (top**2 - v[index, index]) / squared
-            half = np.sqrt(np.maximum(middle**2 - product, 0.0))
-            bounded = squared > 0
-            low, high = np.where(bounded, middle - half, -np.inf), np.where(bounded, middle + half, np.inf)
-            results.append((top / K, low, high))
-    return results
-
-
 def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
     """The result of one phase and its warning."""
     count = len(torque)
@@ -254,7 +180,7 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
     if count <= 3:
         reasons.append(f"{count} samples are too few for three unknowns")
     else:
-        fit = _fit(torque, angle, velocity)
+        fit = fit_spring(torque, angle, velocity)
         columns = np.stack([np.ones(count), angle, velocity], -1)
         size = np.sqrt((columns**2).sum(0))
         condition = float(np.linalg.cond(columns / np.where(size > 0, size, 1.0)))
@@ -271,7 +197,7 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
         if not fit.solvable:
             reasons.append("K, beta and theta_eq cannot be told apart")
         else:
-            estimates = found = [Estimate(*map(float, numbers)) for numbers in _intervals(fit)]
+            estimates = found = [Estimate(*map(float, numbers)) for numbers in intervals(fit)]
             lost, total = fit.residual @ fit.residual, np.sum((torque - torque.mean()) ** 2)
             r2 = float(1 - lost / total) if total > 0 else None
             if lost > 1e-20 * (torque @ torque):

@@ -41,7 +41,7 @@ adults (Fukuchi et al., PeerJ 6:e4640, 2018, CC BY 4.0; per-trial slopes compute
 
 
 def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
-    """People's ankle stiffness per phase at 1.2 m/s (`human_gait`, mean curves) beside another laboratory's trials."""
+    """People's ankle quasi-stiffness, not the joint's own K, at 1.2 m/s (`human_gait`) beside another laboratory's."""
     human = human_gait(FUKUCHI_SPEED)
     phase = np.arange(100) / 100
     angle, moment = human.mean("ankle", phase), human.mean("ankle_moment", phase)

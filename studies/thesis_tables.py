@@ -242,7 +242,10 @@ from DJS-GA). The bias is what white noise of {np.degrees(ANGLE_NOISE):.1f}° on
 
 The rising phases agree. Controlled plantarflexion is short and depends on where foot flat is put; mean curves blur
 push-off. A negative β is no damper: the muscle does work there, or its stiffness is not constant. Residuals are
-correlated from sample to sample, so that these intervals are too narrow."""
+correlated from sample to sample, so that these intervals are too narrow. All of these are slopes of a loop, of an
+undisturbed gait: the joint's own stiffness only if its rest angle stood still, which nobody knows. Of the simulated
+walk, whose rest angle moves, the same estimator misses the stiffness by half ([results.md](results.md),
+Identification)."""
 
 
 def people_work() -> dict[str, float]:
