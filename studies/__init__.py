@@ -8,6 +8,8 @@ if TYPE_CHECKING:
     from .comparison import compare
     from .constant_search import best_constant
     from .identifiability import any_stiffness, mean_springs, rebuilt, spring_work
+    from .open_loop import frozen
+    from .push_experiment import identified
     from .seed_agreement import agreements
     from .study import Answer, Study, WalkingStudy
 
@@ -20,6 +22,8 @@ __all__ = [
     "best_constant",
     "compare",
     "draw_pairs",
+    "frozen",
+    "identified",
     "mean_springs",
     "rebuilt",
     "spring_work",
@@ -35,6 +39,8 @@ _MODULE = {
     "best_constant": "constant_search",
     "compare": "comparison",
     "draw_pairs": "body_sweep",
+    "frozen": "open_loop",
+    "identified": "push_experiment",
     "mean_springs": "identifiability",
     "rebuilt": "identifiability",
     "spring_work": "identifiability",

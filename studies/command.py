@@ -29,6 +29,7 @@ STUDIES = {
     "stiffness-cost": ("stiffness_cost.StiffnessCost", "What does a cost on stiffness take and give? (trains)"),
     "agreement": ("seed_agreement.SeedAgreement", "Do the springs of several policies agree over the stride?"),
     "any-stiffness": ("identifiability.AnyStiffness", "Does a gait walk with any other stiffness?"),
+    "identify": ("push_identification.Identify", "Do pushes find a policy's springs, and are they springs at all?"),
     "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
     "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
     "slope-tuning": ("slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
