@@ -10,8 +10,8 @@ undisturbed gait cannot say it (`identification`): its theta_eq moves with the a
 
 Phases are equal within bins of `BIN`, and the mean course is a straight line in each, since theta_eq moves on in it. K
 is linear between knots: a ramp taken for a constant leaks its own deviations into K. Intervals leave out one trial
-at a time (`jackknife`), so that errors may last a whole trial.
-And whatever else the torque might follow is asked: a joint that reacts to it is no spring, whatever K is fitted.
+at a time (`jackknife`), so that errors may last a whole trial. And whatever else the torque might follow is asked: a
+joint that reacts to it is no spring, whatever K is fitted.
 
 What no such experiment can tell: a reflex of the joint's own angle at the same instant is a spring to it, a reaction to
 a state that was not recorded is noise, and noise of the angle makes K too small (`PushedSpring.attenuation`).
@@ -42,7 +42,7 @@ LEAST_PRECISION = 0.5
 REACTION_LEVEL = 0.01
 """Significance at which further states must matter for the verdict `REACTS`."""
 REACTION_SHARE = 0.02
-"""Share of all that is explained which they must explain beyond K and beta for it."""
+"""Share of all that is explained which they must explain beyond K and beta: a torque a seventh of the spring's."""
 
 SPRING, REACTS, UNKNOWN = "spring", "reacts: not a spring", "not identified"
 

@@ -42,8 +42,10 @@ class Experiment:
 
     policy: str
     """What was pushed."""
+    episodes: int
+    """How many."""
     falls: int
-    """Episodes that fell."""
+    """How many of them fell."""
     damping_time: tuple[float, float]
     """True beta of ankle and toe [s]."""
     rows: tuple[Row, ...]
@@ -107,7 +109,7 @@ def sentence(experiment: Experiment) -> str:
         off = [abs(row.pushed.stiffness.value / row.applied[0] - 1) for row in rows if row.pushed.stiffness]
         within = f", K within {100 * max(off):.1f} % of what was applied" if off else ""
         said.append(f"{joint} a spring in {counts[1]} of {len(rows)} phases{within}")
-    return f"`{experiment.policy}`: {'; '.join(said)}. Falls: {experiment.falls}."
+    return f"`{experiment.policy}`: {'; '.join(said)}. {experiment.falls} of {experiment.episodes} episodes fell."
 
 
 def coverage_table(experiments: Sequence[Experiment]) -> str:
@@ -252,6 +254,7 @@ class Identify(WalkingStudy):
         ankle, toe = damping_times(body_of(settings))[FEET]
         return Experiment(
             policy=name,
+            episodes=self.episodes,
             falls=int((pushed.fall_reason != "").sum()),
             damping_time=(float(ankle), float(toe)),
             rows=tuple(rows),
