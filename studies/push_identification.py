@@ -26,7 +26,7 @@ from springfoot.gait.spring_fit import Estimate
 from springfoot.gait.stiffness import SPRINGS
 
 from .push_experiment import Row, identified, prepare_pushed, samples
-from .study import Answer, Progress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy
 
 SECTION, COVERAGE_SECTION = "IDENTIFICATION", "IDENTIFICATION-COVERAGE"
 """Of the results page."""
@@ -200,7 +200,7 @@ class Identify(WalkingStudy):
         require_number("noise_percent", self.noise_percent, 0)
         require_count("repeats", self.repeats, 0)
 
-    def ask(self, progress: Progress) -> Answer:
+    def ask(self, progress: OnProgress) -> Answer:
         """Push every policy."""
         experiments = [self._push(name, progress) for name in self.policies]
         if self.repeats:
@@ -235,7 +235,7 @@ class Identify(WalkingStudy):
             f"mean stride's largest, lasting 50 ms.{decided}"
         )
 
-    def _push(self, name: str, progress: Progress) -> Experiment:
+    def _push(self, name: str, progress: OnProgress) -> Experiment:
         """The experiment on one policy, and its repeats."""
         pushes = ("push_newton", "push_seconds", "push_interval")
         given: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
