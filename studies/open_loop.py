@@ -16,24 +16,24 @@ from .identifiability import PHASE_SEGMENTS, MeanSprings, mean_springs
 
 FROZEN = "frozen"
 """`frozen:POLICY` is what the copy of a policy is called."""
-KNOT_FIELDS = 50
+COPIED_PHASES = 50
 """Of a copy's K over the stride: each its mean over 2 % of the stride around the knot, and linear between them."""
 EPISODES, SECONDS = 20, 12.0
 """Undisturbed walking whose mean K is taken."""
 
 
 def frozen_schedule(springs: MeanSprings, settings: BipedSettings) -> StiffnessSchedule:
-    """Mean K of ankle and toe at `KNOT_FIELDS` phases, linear between; the equilibrium of `settings` where that has one.
+    """Mean K of ankle and toe at `COPIED_PHASES` phases, linear between; the settings' equilibrium where they have one.
 
     A residual action can leave the range of absolute ones, a copy cannot: K beyond it is the nearer end's.
     """
-    each = PHASE_SEGMENTS // KNOT_FIELDS
+    each = PHASE_SEGMENTS // COPIED_PHASES
     stiffness = np.clip(springs.stiffness, *stiffness_ranges(settings, springs.body))
-    around = np.roll(stiffness, each // 2, axis=0).reshape(KNOT_FIELDS, each, len(SPRINGS)).mean(1)
+    around = np.roll(stiffness, each // 2, axis=0).reshape(COPIED_PHASES, each, len(SPRINGS)).mean(1)
     rest = np.zeros((len(GRID), len(SPRINGS)))
     if settings.equilibrium == "phase":
         rest = StiffnessSchedule.from_json(settings.schedule).at(GRID)[1]
-    at = np.arange(KNOT_FIELDS) / KNOT_FIELDS
+    at = np.arange(COPIED_PHASES) / COPIED_PHASES
     curves = [np.interp(GRID, at, knots, period=1.0) for knots in around.T]
     columns = zip(SPRINGS, curves, rest.T, strict=True)
     return StiffnessSchedule(**{joint: tuple(map(Segment, GRID, k, theta)) for joint, k, theta in columns})
