@@ -15,7 +15,7 @@ from springfoot.gait.perturbation import REACTS, SPRING
 from springfoot.gait.stiffness import StiffnessSchedule
 from springfoot.studies.command import study_main
 from springfoot.studies.identifiability import mean_springs
-from springfoot.studies.open_loop import KNOT_FIELDS, frozen
+from springfoot.studies.open_loop import COPIED_PHASES, frozen
 from springfoot.studies.push_experiment import Row, identified, prepare_pushed, samples
 
 PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}
@@ -89,9 +89,9 @@ def test_a_frozen_copy_has_the_policys_mean_stiffness_and_rest_angle_and_follows
     schedule = StiffnessSchedule.from_json(settings.schedule)
     begun = np.isfinite(played.series["phase"])
     assert played.series["stiffness"][begun] == pytest.approx(schedule.at(played.series["phase"][begun])[0], rel=0.05)
-    knots = schedule.at(np.arange(KNOT_FIELDS) / KNOT_FIELDS)[0]
+    knots = schedule.at(np.arange(COPIED_PHASES) / COPIED_PHASES)[0]
     stance = slice(2, 30)  # 4 to 60 % of the stride
-    theirs = mean_springs(walked).stiffness[:: 200 // KNOT_FIELDS]
+    theirs = mean_springs(walked).stiffness[:: 200 // COPIED_PHASES]
     assert knots[stance] == pytest.approx(theirs[stance], rel=0.25)
     assert np.abs(knots[stance] / theirs[stance] - 1).mean() < 0.06
     rest = [np.interp(GRID[40:600:20], *_course(recording)) for recording in (walked, played)]
