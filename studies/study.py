@@ -59,7 +59,7 @@ class Study:
 
     @property
     def total(self) -> float | None:
-        """OnProgress at the end; None where it is not known."""
+        """Progress at the end; None where it is not known."""
         return None
 
     def ask(self, progress: OnProgress) -> Answer:
