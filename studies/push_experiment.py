@@ -143,20 +143,22 @@ class Row:
         return self.load > LOADED
 
 
-def identified(pushed: Samples, undisturbed: Samples | None = None) -> list[Row]:
-    """The springs of ankle and toe in every phase of `BOUNDS`."""
+def identified(pushed: Samples, undisturbed: Samples | None = None, margin: float = 0.0) -> list[Row]:
+    """The springs of ankle and toe in every phase of `BOUNDS`, `margin` [stride] left out at both ends of each."""
     rows = []
     at = (np.arange(COURSE) + 0.5) / COURSE
     for column, joint in enumerate(SPRINGS):
         data = {name: getattr(pushed, name)[:, column] for name in ("torque", "angle", "velocity")}
-        found = identify_pushed(**data, phase=pushed.phase, trial=pushed.trial, bounds=BOUNDS, states=pushed.states)
+        found = identify_pushed(
+            **data, phase=pushed.phase, trial=pushed.trial, bounds=BOUNDS, states=pushed.states, margin=margin
+        )
         still: Sequence[PhaseSpring | None] = [None] * len(found)
         if undisturbed is not None:
             data = {name: getattr(undisturbed, name)[:, column] for name in data}
-            still = identify(**data, phase=undisturbed.phase, bounds=BOUNDS)
+            still = identify(**data, phase=undisturbed.phase, bounds=BOUNDS, margin=margin)
         force = np.abs(pushed.course[:, column])
         for spring, other in zip(found, still, strict=True):
-            inside = (pushed.phase >= spring.start) & (pushed.phase < spring.end)
+            inside = (pushed.phase >= spring.start + margin) & (pushed.phase < spring.end - margin)
             truth = pushed.stiffness[inside, column]
             here = force[(at >= spring.start) & (at < spring.end)]
             rows.append(

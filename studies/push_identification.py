@@ -186,6 +186,8 @@ class Identify(WalkingStudy):
     """Noise on the measured torque: standard deviation in percent of the largest torque of the mean stride."""
     decisions: Literal["100hz", "50hz", "25hz"] | None = None
     """When K is decided; unless given 100hz for what follows the phase alone, and as trained for a policy."""
+    margin: float = 0.0
+    """Part of the stride left out at both ends of each phase: 0.02 where K is held from the phase before."""
     repeats: int = 0
     """Ask instead how often the intervals of so many other experiments hold, each of 28 episodes × 6 s."""
 
@@ -198,6 +200,7 @@ class Identify(WalkingStudy):
             raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
         require_number("push_newton", self.push_newton, 0, above=True, unit="N")
         require_number("noise_percent", self.noise_percent, 0)
+        require_number("margin", self.margin, 0, 0.02, "of a stride")
         require_count("repeats", self.repeats, 0)
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -229,6 +232,7 @@ class Identify(WalkingStudy):
     @property
     def _pushes(self) -> str:
         decided = f" K decided at {self.decisions}." if self.decisions else ""
+        decided += f" {100 * self.margin:g} % of the stride left out at both ends of each phase." if self.margin else ""
         return (
             f"A push of ±{self.push_newton:g} N × {self.push_seconds:g} s at a random time in each "
             f"{self.push_interval:g} s; both legs together; noise on the torque of {self.noise_percent:g} % of the "
@@ -245,12 +249,12 @@ class Identify(WalkingStudy):
         pushed = record(policy, settings, episodes=self.episodes, seed=self.seed, **said)
         alone = replace(settings, push_newton=0.0)
         quiet = record(policy, alone, episodes=UNDISTURBED_EPISODES, seed=self.seed, **said)
-        rows = identified(samples(pushed, self.noise_percent, self.seed), samples(quiet))
+        rows = identified(samples(pushed, self.noise_percent, self.seed), samples(quiet), self.margin)
         repeats, shorter = [], replace(settings, episode_seconds=REPEAT_SECONDS)
         for repeat in range(self.repeats):
             first = self.seed + self.episodes + repeat * REPEAT_EPISODES
             again = record(policy, shorter, episodes=REPEAT_EPISODES, seed=first, **said)
-            repeats.append(tuple(identified(samples(again, self.noise_percent, first))))
+            repeats.append(tuple(identified(samples(again, self.noise_percent, first), margin=self.margin)))
         ankle, toe = damping_times(body_of(settings))[FEET]
         return Experiment(
             policy=name,
