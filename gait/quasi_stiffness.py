@@ -21,7 +21,7 @@ class QuasiStiffness:
     slope: float
     """Of people's mean curve, moment over angle by least squares [N m/(rad kg)]."""
     identified: PhaseSpring
-    """The spring and damper of the same stretch; stiffness [N m/(rad kg)]."""
+    """Spring and damper of the stretch, if theta_eq stood still in it (`identification`); K [N m/(rad kg)]."""
     published: float
     """Median of the published slopes [N m/(rad kg)]."""
     published_sd: float
