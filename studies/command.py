@@ -30,6 +30,7 @@ STUDIES = {
     "agreement": ("seed_agreement.SeedAgreement", "Do the springs of several policies agree over the stride?"),
     "any-stiffness": ("identifiability.AnyStiffness", "Does a gait walk with any other stiffness?"),
     "identify": ("push_identification.Identify", "Do pushes find a policy's springs, and are they springs at all?"),
+    "influence": ("influence.Influence", "Does stiffness change torque, the CoM's acceleration and the walk?"),
     "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
     "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
     "slope-tuning": ("slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),

@@ -1,0 +1,130 @@
+"""From paired walks to the influence of stiffness: intervals, links between cells, files and page."""
+
+from dataclasses import replace
+from math import isnan, sqrt
+
+import numpy as np
+import pytest
+
+from springfoot.agents.files import csv_text
+from springfoot.gait import SpringfootError
+from springfoot.studies.influence import CONDITIONS, Influence, headline, tables, walk_under
+from springfoot.studies.influence_figure import save_influence_figure
+from springfoot.studies.stiffness_responses import (
+    CSV_HEAD,
+    IMPULSE,
+    LINKS_HEAD,
+    SPEED,
+    csv_rows,
+    response,
+)
+from springfoot.studies.stiffness_steps import CELLS, DURATIONS, FIXED, MOVEMENT, PairedWalks
+
+SEEDS, STRIDES = 6, 8
+FORETOLD = "∫Δa dt → Δspeed of many strides"
+
+
+def walks(scale=1.0):
+    """Walks whose speed changes by twice the impulse, with a little noise; nothing changes with `scale` 0."""
+    random = np.random.default_rng(1)
+    fixed = scale * np.linspace(-0.01, 0.01, len(CELLS))[:, None, None] * np.ones((len(CELLS), SEEDS, len(FIXED)))
+    noise = scale * 1e-4 * random.standard_normal((len(CELLS), len(DURATIONS), SEEDS, STRIDES, len(MOVEMENT)))
+    return PairedWalks(
+        fixed=fixed,
+        velocity=fixed[..., FIXED.index("forward_m_s")],
+        movement=2.0 * fixed[:, None, :, None, :1] + noise,
+        unchanged=np.full((SEEDS, STRIDES, len(MOVEMENT)), 1.2),
+        cut=np.zeros(len(CELLS)),
+    )
+
+
+def test_a_speed_that_follows_the_acceleration_is_foretold_and_a_scrambled_one_is_not():
+    found = response(walks(), 0.1)
+    r, low, high, scrambled = found.links[FORETOLD]
+    assert r > 0.999 and low <= r <= high and scrambled < 0.01
+    assert found.foretold.sum() == found.moved.sum() == len(CELLS)  # the smallest changes speed by 1.8 mm/s
+    other = walks()
+    order = np.random.default_rng(3).permutation(len(CELLS))
+    r, _, _, scrambled = response(replace(other, movement=other.movement[order]), 0.1).links[FORETOLD]
+    assert abs(r) < 0.6 and scrambled > 0.05
+
+
+def test_the_opposite_sign_is_not_foretold():
+    other = walks()
+    found = response(replace(other, movement=-other.movement), 0.1)
+    assert found.links[FORETOLD][0] < -0.999 and found.foretold.sum() == 0 and found.moved.all()
+
+
+def test_intervals_hold_the_mean_and_narrow_with_the_noise():
+    found = response(walks(), 0.1)
+    low, high = found.interval[SPEED].T
+    assert (low <= found.mean[SPEED]).all() and (found.mean[SPEED] <= high).all()
+    assert 0 < (high - low).max() < 4e-4
+    assert found.mean[SPEED] == pytest.approx(2.0 * found.mean[IMPULSE], abs=2e-4)
+
+
+def test_a_walk_that_falls_is_counted_and_left_out_of_its_cell():
+    fallen = walks()
+    fallen.movement[4, 1, 2] = np.nan
+    found, whole = response(fallen, 0.1), response(walks(), 0.1)
+    assert found.falls.sum() == found.falls[4, 1] == 1
+    assert found.mean[SPEED][4] == pytest.approx(whole.mean[SPEED][4], abs=1e-4)
+    for cell in set(range(len(CELLS))) - {4}:
+        assert found.mean[SPEED][cell] == whole.mean[SPEED][cell]
+
+
+def test_a_cell_in_which_all_fall_has_no_number(tmp_path):
+    fallen = walks()
+    fallen.movement[4] = np.nan
+    found = {"as it is": response(fallen, 0.1)}
+    assert isnan(found["as it is"].mean[SPEED][4]) and isnan(found["as it is"].links[FORETOLD][0])
+    assert "| ankle, push-off (50–62 %) | – |" in tables(Influence(), found)
+    assert ",push-off,0.5,0.62,every stride,speed_m_s,many,,,,6,0\n" in csv_text(CSV_HEAD, csv_rows(found))
+    save_influence_figure(tmp_path / "influence.png", found)
+    assert (tmp_path / "influence.png").stat().st_size > 10_000
+
+
+def test_where_nothing_changes_nothing_is_claimed():
+    found = {"as it is": response(walks(0.0), 0.0)}
+    assert "most in nothing beyond its interval; elsewhere by at most 0.0 mm/s" in headline(Influence(), found)
+    assert not found["as it is"].moved.any() and isnan(found["as it is"].links[FORETOLD][0])
+
+
+def test_conditions_change_what_they_say():
+    asked = {name: walk_under(name, "schedule", 0.1, 0.002) for name in CONDITIONS}
+    assert {name for name, (_, _, change) in asked.items() if change != 0.1} == {"opposite change"}
+    assert asked["opposite change"][2] == -0.1
+    settings = {name: own for name, (_, own, _) in asked.items()}
+    assert {name for name, each in settings.items() if each.unevenness_m == 0.0} == {"level ground"}
+    assert settings["1.90 m, 95 kg"].speed == pytest.approx(1.2 * sqrt(1.90 / 1.70))
+    assert (settings["1.55 m, 50 kg"].height, settings["1.55 m, 50 kg"].mass) == (1.55, 50.0)
+    assert [settings[f"θ_eq {name}"].equilibrium for name in ("neutral", "by phase")] == ["neutral", "phase"]
+    assert settings["pretrained"].action_mode == "residual" and settings["as it is"].decisions == "100hz"
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        ({"conditions": ("on the moon",)}, "conditions must be of 'as it is', .*, got 'on the moon'"),
+        ({"seeds": 1}, "seeds must be"),
+        ({"strides": 3}, "strides must be"),
+        ({"change_percent": -95.0}, "change_percent must be"),
+        ({"policy": "nobody"}, "no policy 'nobody'"),
+    ],
+)
+def test_bad_flags_are_refused_before_anything_walks(flags, message):
+    with pytest.raises(SpringfootError, match=message):
+        Influence(**flags).check()
+
+
+def test_the_same_seeds_give_the_same_files_with_any_number_of_threads():
+    answers = [
+        Influence(seeds=2, strides=4, conditions=("as it is",), threads=threads).ask(lambda seconds: None)
+        for threads in (1, 2)
+    ]
+    for name, head in (("influence.csv", CSV_HEAD), ("influence_links.csv", LINKS_HEAD)):
+        one, other = (answer.files[name] for answer in answers)
+        assert one == other
+        assert str(one).splitlines()[0] == ",".join(head)
+    assert answers[0].text == answers[1].text
+    assert answers[0].sections["INFLUENCE"].startswith("![")
