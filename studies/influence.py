@@ -133,16 +133,13 @@ def headline(study: Influence, responses: Mapping[str, Response]) -> str:
     first = next(iter(responses.values()))
     mean = first.mean[SPEED]
     most = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
-    rest = max((abs(own) for cell, own in enumerate(mean) if cell not in most), default=np.nan)
-    effects = (
-        "; ".join(f"{_cell(cell)} by {_number(first, SPEED, cell, '+.1f', 1e3)} mm/s" for cell in most)
-        or "nothing beyond its interval"
-    )
+    rest = np.nanmax(np.abs(np.delete(mean, most)))
+    effects = [f"{_cell(cell)}, {_number(first, SPEED, cell, '+.1f', 1e3)} mm/s" for cell in most]
     r, low, high, scrambled = first.links["∫Δa dt → Δspeed of many strides"]
     return (
         f"**{study.change_percent:+g} % of stiffness in one joint and phase of every stride, θ_eq kept, changes the "
-        f"speed of `{study.policy}` ({first.speed:.3f} m/s) most in {effects}; elsewhere by at most "
-        f"{1e3 * rest:.1f} mm/s.** What it does to the CoM's forward acceleration at once foretells this with "
+        f"speed of `{study.policy}` ({first.speed:.3f} m/s) most here: {'; '.join(effects) or 'nowhere'}. Elsewhere by "
+        f"at most {1e3 * rest:.1f} mm/s.** What it does to the CoM's forward acceleration at once foretells this with "
         f"r = {r:.2f} [{low:.2f}, {high:.2f}] over the {len(CELLS)} joints and phases (a scrambled order of them does "
         f"as well in {100 * scrambled:.1f} % of cases), and with the right sign in {first.foretold.sum()} of the "
         f"{first.moved.sum()} that change speed by {1e3 * LEAST_MOVEMENT:g} mm/s or more."
