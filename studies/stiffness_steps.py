@@ -183,7 +183,7 @@ class _Record:
         """(S,) of each unchanged walk, before the next step; 0 is the first."""
         self._biped, self._change, self._num = biped, change, num
         self._ticks: list[tuple[NDArray, ...]] = []
-        self._samples = np.zeros((len(CELLS), num, 4))  # windows, torque [N m], acceleration (forward, up) [m/s^2]
+        self._samples = np.zeros((len(CELLS), num, 4))  # count; sums of torque [N m], acceleration (x, z) [m/s^2]
         biped.on_tick = self._keep
 
     def _keep(self, tick: Tick) -> None:
@@ -208,12 +208,12 @@ class _Record:
         clocks = np.zeros((self._num, strides))
         for index in range(len(active)):
             own = index % self._num
-            if not (active[own] and active[index]):
-                continue
             first = TICK * np.argmax(stride[:, own] == 0)
             contacts = [find_contacts(load[:, index, side], TICK, CONTACT_THRESHOLD_BW, TICK) for side in range(2)]
             landed = contacts[LEFT].heel_strikes
             landed = landed[landed > first - PHASE_LAG][: strides + 1]
+            if not active[index] or len(landed) <= strides:
+                continue
             if index == own:
                 clocks[own] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
             movement[index] = _movement(com[:, index], ankle[:, index], contacts, landed, clocks[own])
@@ -222,11 +222,12 @@ class _Record:
         now = velocity.reshape(len(velocity), -1, self._num)[ends, :, np.arange(self._num)]  # (phases, S, copies)
         single = 1 + np.arange(len(CELLS)) * len(DURATIONS)
         place = [list(PHASES).index(name) for _, name in CELLS]
-        windows = np.where(active[: self._num, None], self._samples[..., :1], np.nan)
-        impulse = TICK / len(SIDES) * self._samples[..., 2:] * (windows / windows)
+        stood = np.isfinite(movement[0]).all((1, 2))
+        windows, torque_acceleration = np.split(self._samples, [1], axis=-1)
+        mean = torque_acceleration / np.where(stood[:, None], windows, np.nan)
         return PairedWalks(
-            fixed=np.concatenate([self._samples[..., 1:] / windows, impulse], -1),
-            velocity=np.where(active[: self._num], now[place, :, single] - now[place, :, 0], np.nan),
+            fixed=np.concatenate([mean, mean[..., 1:] * windows * TICK / len(SIDES)], -1),
+            velocity=np.where(stood, now[place, :, single] - now[place, :, 0], np.nan),
             movement=(movement[1:] - movement[0]).reshape(len(CELLS), len(DURATIONS), *movement.shape[1:]),
             unchanged=movement[0],
             cut=cut,

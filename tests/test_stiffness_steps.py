@@ -2,6 +2,7 @@
 
 from copy import copy
 from itertools import product
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -172,6 +173,25 @@ def test_walks_move_where_springs_carry_load_and_not_in_swing(pairs):
     torque = walks.fixed[..., FIXED.index("torque_Nm")].mean(-1)
     assert torque[CELLS.index((0, "heel-off"))] == pytest.approx(7.6, abs=0.5)  # N m, a tenth of the spring's own
     assert not walks.falls.any() and not walks.cut.any()
+
+
+def test_the_impulse_is_acceleration_times_the_phase_and_foretells_the_velocity_at_its_end(pairs):
+    walks = pairs[CHANGE]
+    fixed: dict[str, Any] = dict(zip(FIXED, np.moveaxis(walks.fixed.mean(1), -1, 0), strict=True))
+    ahead = walks.unchanged[..., MOVEMENT.index("com_ahead_m")]
+    period = np.diff(ahead).mean() / walks.unchanged[..., MOVEMENT.index("speed_m_s")].mean()
+    seconds = period * np.array([end - begin for begin, end in (PHASES[name] for _, name in CELLS)])
+    for direction in ("forward", "upward"):
+        expected = fixed[f"{direction}_m_s2"] * seconds
+        assert fixed[f"{direction}_m_s"] == pytest.approx(expected, rel=0.1, abs=1e-4)
+    assert 0.7 < np.corrcoef(fixed["forward_m_s"], walks.velocity.mean(1))[0, 1] < 0.95
+
+
+def test_the_coms_lead_after_a_stride_is_its_speed_times_the_strides_time(pairs):
+    walks = pairs[CHANGE]
+    speed, ahead = (walks.movement[:, 1, :, 0, MOVEMENT.index(name)] for name in ("speed_m_s", "com_ahead_m"))
+    assert np.corrcoef(speed.ravel(), ahead.ravel())[0, 1] > 0.99
+    assert np.polyfit(speed.ravel(), ahead.ravel(), 1)[0] == pytest.approx(1.09, abs=0.15)
 
 
 def test_steps_as_long_as_strides_are_fast(pairs):
