@@ -109,15 +109,16 @@ def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
     if x.shape[1] < 2 or not (np.ptp(x.mean(1)) > 0 and np.ptp(y.mean(1)) > 0):
         return np.nan, np.nan, np.nan, np.nan
 
-    def r(seeds: NDArray) -> float:
-        return float(np.corrcoef(x[:, seeds].mean(1), y[:, seeds].mean(1))[0, 1])
+    def r(seeds: NDArray, axis: int = -1) -> Any:
+        ends: Any = pearsonr(x[:, seeds].mean(axis), y[:, seeds].mean(axis), axis=0)
+        return ends.statistic
 
     seeds, rng = np.arange(x.shape[1]), np.random.default_rng(0)
-    spread = bootstrap((seeds,), r, vectorized=False, n_resamples=RESAMPLES, method="percentile", rng=rng)
+    spread = bootstrap((seeds,), r, n_resamples=RESAMPLES, method="percentile", rng=rng)
     low, high = spread.confidence_interval
     how = PermutationMethod(n_resamples=RESAMPLES, rng=rng)
     scrambled: Any = pearsonr(x.mean(1), y.mean(1), method=how)
-    return r(seeds), float(low), float(high), float(scrambled.pvalue)
+    return float(r(seeds)), float(low), float(high), float(scrambled.pvalue)
 
 
 CSV_HEAD = (
