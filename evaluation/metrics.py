@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.physics.model import JOINTS
 from springfoot.envs.settings import body_of, reference_gait, settings_to_json
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
@@ -95,6 +98,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     def stiffness(name: str) -> dict[str, Any]:
         return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), 60.0 if toe_off is None else toe_off)
 
+    work = _joint_work(tally)
     return {
         "policy": recording.policy,
         "environment": settings_to_json(settings),
@@ -135,11 +139,64 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
             "forward_r": force_r("grf_forward"),
         },
         "moments": {name: moment(name) for name in MOMENT_CURVES},
-        "ankle_work_J_kg": {"positive": _mean(tally.ankle_positive), "negative": _mean(tally.ankle_negative)},
+        "ankle_work_J_kg": work["ankle"],
+        "joint_work_J_kg": work,
+        "energy_J_kg": _energy(tally),
+        "springs_J_kg": _springs(tally),
+        "zmp": _zmp(recording.plan_zmp, tally),
         "cost_of_transport": score.cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
         "stiffness_Nm_rad": {name: stiffness(name) for name in ("ankle", "toe")},
         "contact_travel_m": _mean(tally.travel),
         "toe_clearance_m": float(np.median(tally.clearance)) if tally.clearance else None,
+    }
+
+
+def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
+    """`joint_work_J_kg`."""
+    if not tally.joint_work:
+        return {joint: {"positive": None, "negative": None} for joint in JOINTS}
+    mean = np.mean(tally.joint_work, axis=0)
+    return {
+        joint: {"positive": float(up), "negative": float(-down)} for joint, (up, down) in zip(JOINTS, mean, strict=True)
+    }
+
+
+SPRING_SOURCES = ("stiffness_changes", "equilibrium_changes", "spring_damping")
+"""What gives a spring its energy, and takes it, between the plan and the joint (`springfoot.envs.physics.energy`)."""
+
+
+def _energy(tally: StrideTally) -> dict[str, float | None]:
+    """`energy_J_kg`: both legs, a stride, into the body positive."""
+    order = ("actuators", "stiffness_changes", "equilibrium_changes", "passive_damping", "spring_damping", "contact")
+    names = (*order, "pushes", "mechanical_change", "residual")
+    if not tally.energy:
+        return dict.fromkeys(names)
+    entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
+    for source in SPRING_SOURCES:
+        entry[source] = sum(entry[f"{source}/{joint}"] for joint in JOINTS)
+    change = entry["mechanical_change"] = entry["mechanical"]
+    entry["residual"] = change - sum(entry[name] for name in ("actuators", "passive_damping", "contact", "pushes"))
+    return {name: entry[name] for name in names}
+
+
+def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
+    """`springs_J_kg`: of one leg, a stride."""
+    if not tally.energy:
+        return {joint: dict.fromkeys(SPRING_SOURCES) for joint in JOINTS}
+    entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
+    return {joint: {source: 0.5 * entry[f"{source}/{joint}"] for source in SPRING_SOURCES} for joint in JOINTS}
+
+
+def _zmp(planned: NDArray, tally: StrideTally) -> dict[str, float | None]:
+    """`zmp`: the mean CoP against the plan over percent 0 to 99 of the step; at 100 % the plan is at the next foot."""
+    cop = tally.cop.mean("x")[:-1]
+    alone = np.full(len(cop), False)
+    if tally.step_time:
+        alone = PERCENT[:-1] >= 100 * np.mean(tally.double_support) / np.mean(tally.step_time)
+    return {
+        "cop_rmse_single_support_m": score.rmse(cop[alone], planned[:-1][alone]) if alone.any() else None,
+        "cop_rmse_m": score.rmse(cop, planned[:-1]),
+        "r": score.correlation(cop, planned[:-1]),
     }
 
 

@@ -19,6 +19,7 @@ from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.control.subjects import DRAWN
+from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.settings import (
@@ -45,7 +46,9 @@ SERIES: dict[str, Callable[[Tick], NDArray]] = {
     "angle": lambda tick: tick.measurement.angle,  # (side, joint) [rad]
     "velocity": lambda tick: tick.measurement.velocity,  # (side, joint) [rad/s]
     "torque": lambda tick: tick.measurement.torque,  # (side, joint) actuator torque [N m]
-    "passive_torque": lambda tick: tick.passive_torque,  # (side, joint) joint damping [N m]
+    "joint_torque": lambda tick: tick.work.torque,  # (side, joint) actuator + joint damping, mean of the tick [N m]
+    "joint_work": lambda tick: tick.work.work,  # (side, joint, (positive, negative)) work of it in the tick [J]
+    "energy": lambda tick: tick.work.energy.view(float).reshape(len(tick.active), -1),  # (LEDGER,) [J]
     "com": lambda tick: tick.measurement.com,  # (x, z) [m]
     "com_velocity": lambda tick: tick.measurement.com_velocity,  # (x, z) [m/s]
     "com_reference": lambda tick: tick.com_reference,  # (x, z) where the plan wants it now [m]
@@ -80,6 +83,8 @@ class Recording:
     """(E,) why an episode ended early, "" where it did not."""
     plan_com: NDArray
     """(101, 2) planned CoM over percent of the step: x from the ankle of the foot whose stance began last, z [m]."""
+    plan_zmp: NDArray
+    """(101,) planned ZMP over percent of the step, x from the same ankle [m]."""
     series: dict[str, NDArray]
     """Name -> (E, T, ...) float32, as listed in `SERIES`."""
 
@@ -90,9 +95,11 @@ class Recording:
             "settings": settings_to_json(self.settings),
             "seed": self.seed,
             "tick_s": TICK,
-            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS},
+            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS, "energy": ledger_entries()},
         }
-        arrays: dict[str, Any] = {name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com")}
+        arrays: dict[str, Any] = {
+            name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com", "plan_zmp")
+        }
         np.savez(path, header=np.array(json.dumps(header)), **(arrays | dict[str, Any](self.series)))
 
 
@@ -172,7 +179,7 @@ def record(
         ticks=ticks,
         returns=returns,
         fall_reason=reason,
-        plan_com=planned_com(reference_walk_at(settings, settings.speed).plan),
+        **_planned(reference_walk_at(settings, settings.speed).plan),
         series=series,
     )
 
@@ -211,7 +218,7 @@ def record_each(
                 ticks=ticks[row],
                 returns=returns[row],
                 fall_reason=reason[row],
-                plan_com=planned_com(reference_walk_at(alone, alone.speed).plan),
+                **_planned(reference_walk_at(alone, alone.speed).plan),
                 series={key: values[row] for key, values in series.items()},
             )
         )
@@ -267,8 +274,8 @@ def _walk(
     return ticks, returns, reason, series
 
 
-def planned_com(plan: WalkPlan) -> NDArray:
-    """(101, 2) CoM of a `WalkPlan` over percent of the step: x from the stance ankle, z [m]."""
+def _planned(plan: WalkPlan) -> dict[str, NDArray]:
+    """`plan_com` and `plan_zmp` of a `Recording`."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
-    return np.stack(plan.com(step_phase), -1)
+    return {"plan_com": np.stack(plan.com(step_phase), -1), "plan_zmp": plan.zmp(step_phase)}

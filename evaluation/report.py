@@ -104,7 +104,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     """The table's rows, in groups."""
     people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
     grf, their_grf, com = metrics["grf"], people["grf"], metrics["com"]
-    works, rest = metrics["ankle_work_J_kg"], metrics["came_to_rest"]
+    zmp, rest = metrics["zmp"], metrics["came_to_rest"]
     at_rest = [] if rest is None else [("came to rest", "", f"{rest} of {metrics['episodes']}", "", "", "")]
 
     def row(
@@ -160,14 +160,21 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             for name, v in metrics["moments"].items()
         ]
         + [
-            row(f"ankle work, {sign}", "J/kg", works[sign], ".2f", people["ankle_work_J_kg"][sign])
+            row(f"{name} work, {sign}", "J/kg", work[sign], ".2f", people["joint_work_J_kg"].get(name, {}).get(sign))
+            for name, work in metrics["joint_work_J_kg"].items()
             for sign in ("positive", "negative")
         ]
         + [row("cost of transport", "", metrics["cost_of_transport"], ".3f")],
         [
+            row(f"energy, {name.replace('_', ' ')}", "J/kg", metrics["energy_J_kg"][name], "+.3f")
+            for name in ("actuators", "passive_damping", "contact", "residual")
+        ],
+        [
             mm("CoM x to plan, RMSE", com["x_rmse_m"]),
             mm("CoM z to plan, RMSE", com["z_rmse_m"], com["z_r"]),
             mm("CoM rise", com["rise_m"]),
+            mm("CoP to ZMP, RMSE", zmp["cop_rmse_m"], zmp["r"]),
+            mm("in single support", zmp["cop_rmse_single_support_m"]),
             mm("toe clearance", metrics["toe_clearance_m"]),
             mm("contact travel a stance", metrics["contact_travel_m"]),
         ],
@@ -182,7 +189,7 @@ def people_metrics(human: HumanGait) -> dict[str, Any]:
     """The numbers of people, or of own data, from their mean curves; keys as in metrics.json."""
     phase = PERCENT / 100
     features = score.force_features(human.mean("grf_vertical", phase), human.mean("grf_forward", phase))
-    positive, negative = score.stride_work(human.mean("ankle_power", phase)[None], np.array([human.stride_time]))
+    work = {name: _people_work(human, name) for name in ("hip", "knee", "ankle")}
     return {
         "speed_m_s": human.speed,
         "step_length_m": human.step_length,
@@ -197,5 +204,13 @@ def people_metrics(human: HumanGait) -> dict[str, Any]:
             "forward_peak_bw": features.forward_peak,
         },
         "moments": {name: score.largest(human.mean(f"{name}_moment", phase))[0] for name in ("hip", "knee", "ankle")},
-        "ankle_work_J_kg": {"positive": float(positive[0]), "negative": float(negative[0])},
+        "ankle_work_J_kg": work["ankle"],
+        "joint_work_J_kg": work,
     }
+
+
+def _people_work(human: HumanGait, joint: str) -> dict[str, float]:
+    """Positive and negative work of one of people's joints in a stride [J/kg], from their mean power."""
+    power = human.mean(f"{joint}_power", PERCENT / 100)[None]
+    positive, negative = score.stride_work(power, np.array([human.stride_time]))
+    return {"positive": float(positive[0]), "negative": float(negative[0])}

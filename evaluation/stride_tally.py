@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_material
 from springfoot.envs.settings import body_of
@@ -65,6 +66,8 @@ class StrideTally:
     """Curves over the stride of both feet."""
     com: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x", "z", "vx")))
     """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
+    cop: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x",)))
+    """CoP of both feet over the step, x from the same ankle [m]."""
     strides_of_falls: int = 0
     """Strides of episodes that ended in a fall."""
     at_rest: int = 0
@@ -85,10 +88,10 @@ class StrideTally:
     """Of each stride [%]."""
     vertical_max: list[float] = field(default_factory=list)
     """Largest vertical force of each stride [BW]."""
-    ankle_positive: list[float] = field(default_factory=list)
-    """Positive work of the ankle in each stride [J/kg]."""
-    ankle_negative: list[float] = field(default_factory=list)
-    """Negative work of the ankle in each stride, as a positive number [J/kg]."""
+    joint_work: list[NDArray] = field(default_factory=list)
+    """(joint, 2) positive and negative work of one leg in each of its strides [J/kg]."""
+    energy: list[NDArray] = field(default_factory=list)
+    """What each entry of the body's ledger (`springfoot.envs.physics.energy`) comes to in each stride [J/kg]."""
     travel: list[float] = field(default_factory=list)
     """Distance the loaded sole slides in each stance [m]."""
     clearance: list[float] = field(default_factory=list)
@@ -115,16 +118,16 @@ def _add_episode(
 ) -> None:
     """`steady` is the time [s] the numbers are taken from."""
     weight = body.mass * GRAVITY
-    com, power = series["com"], (series["torque"] + series["passive_torque"]) * series["velocity"]
+    com = series["com"]
     begin, end = (round(min(time / TICK, len(com))) for time in steady)
     if end > begin:
         distance, seconds = com[end - 1, 0] - com[begin - 1, 0], (end - begin) * TICK
         tally.distance += distance
-        tally.work += float(score.positive_work(power[begin:end], TICK).sum())
+        tally.work += float(series["joint_work"][begin:end, ..., 0].sum())
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
 
-    # Forces are means over a tick, so they belong to its middle; states to its end.
+    # Forces and moments are means over a tick, so they belong to its middle; states to its end.
     vertical = series["force"][..., 1].sum(axis=2)
     contacts = [
         find_contacts(vertical[:, side], TICK, CONTACT_THRESHOLD_BW * weight, first=TICK / 2)
@@ -138,7 +141,7 @@ def _add_episode(
         curves = np.concatenate(
             [
                 on_percent(_states(series, side, body), heel_strike, end, TICK, first=TICK),
-                on_percent(_forces(series, side, weight), heel_strike, end, TICK, first=TICK / 2),
+                on_percent(_means(series, side, body), heel_strike, end, TICK, first=TICK / 2),
             ],
             axis=-1,
         )[..., _ORDER]
@@ -146,9 +149,8 @@ def _add_episode(
         tally.both.add(curves)
         tally.strides_of_falls += fell * len(strides)
         tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
-        work = score.stride_work(curves[..., GAIT_CYCLE_COLUMNS.index("ankle_power_W_per_kg")], end - heel_strike)
-        tally.ankle_positive += list(work[0])
-        tally.ankle_negative += list(work[1])
+        tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, end) / body.mass)
+        tally.energy += list(_energies(series["energy"], heel_strike, end) / body.mass)
         contact, load = series["contact"][:, side], series["force"][:, side, :, 1]
         for start, leave, stop in np.floor(strides / TICK).astype(int):
             tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
@@ -171,6 +173,8 @@ def _add_steps(
             [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
         )
         tally.com.add(on_percent(relative, begin, end, TICK, first=TICK))
+        cop = _centre_of_pressure(series) - _mid_tick(series["ankle"][:, side, 0])
+        tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         # Step length: where the other foot lands at the step's end, less where this one landed at its start.
         at = np.floor(np.stack([begin, end]) / TICK).astype(int)
         ankle = series["ankle"][..., 0]
@@ -181,12 +185,44 @@ def _add_steps(
         tally.double_support += list(np.where(support < end - begin, support, 0.0))
 
 
+def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+    """(S, ...) sums of (T, ...) over spans from `begin` to `end` (S,) [s], ticks that lie in part counted in part."""
+    total = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
+
+    def at(time: NDArray) -> NDArray:
+        place = time / TICK
+        index = np.minimum(place.astype(int), len(per_tick) - 1)
+        share = (place - index).reshape(-1, *[1] * (total.ndim - 1))
+        return total[index] + share * (total[index + 1] - total[index])
+
+    return at(end) - at(begin)
+
+
+def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+    """(S, entries) of the ledger (T, entries) in strides from `begin` to `end` (S,): its works, and the rise of the
+    mechanical energy [J]."""
+    flow, state = energy.copy(), ledger_entries().index("mechanical")
+    flow[1:, state] = np.diff(energy[:, state])
+    return _sums(flow, begin, end)
+
+
+def _mid_tick(state: NDArray) -> NDArray:
+    """What is known at the ends of ticks (T, ...) at their middles."""
+    return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
+
+
+def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
+    """(T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
+    load, place = series["force"][..., 1], _mid_tick(series["contact"][..., 0])
+    total = load.sum(axis=(1, 2))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (load * place).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)
+
+
 def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without the forces."""
+    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without those of `_means`."""
     angle = np.degrees(series["angle"][:, side])
     pitch = np.degrees(series["base"][:, 2])
-    moment = -(series["torque"] + series["passive_torque"])[:, side] / body.mass
-    power = -moment * series["velocity"][:, side]
     thigh = angle[:, HIP] - pitch
     shank = thigh - angle[:, KNEE]
     equilibrium = np.degrees(series["equilibrium"][:, side])
@@ -197,21 +233,25 @@ def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
             thigh,
             shank,
             shank + angle[:, ANKLE],
-            *(moment[:, joint] for joint in (HIP, KNEE, ANKLE)),
-            *(power[:, joint] for joint in (HIP, KNEE, ANKLE)),
             angle[:, TOE],
-            moment[:, TOE],
             series["stiffness"][:, side],
             equilibrium,
         ]
     )
 
 
-def _forces(series: dict[str, NDArray], side: int, weight: float) -> NDArray:
-    """(T, 2) vertical and forward force of one foot [BW]."""
-    return series["force"][:, side].sum(axis=1)[:, ::-1] / weight
+def _means(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+    """(T, C) curves that are means over ticks, in the order of `_MEANS`."""
+    force = series["force"][:, side].sum(axis=1) / (body.mass * GRAVITY)
+    moment = -series["joint_torque"][:, side] / body.mass
+    power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass
+    return np.column_stack([force[:, ::-1], moment, power[:, :TOE]])
 
 
-_FORCES = ("grf_vertical_bw", "grf_forward_bw")
-_STATES = tuple(name for name in GAIT_CYCLE_COLUMNS if name not in _FORCES)
-_ORDER = [(_STATES + _FORCES).index(name) for name in GAIT_CYCLE_COLUMNS]
+_MEANS = (
+    *("grf_vertical_bw", "grf_forward_bw"),
+    *(f"{joint}_moment_Nm_per_kg" for joint in ("hip", "knee", "ankle", "mtp")),
+    *(f"{joint}_power_W_per_kg" for joint in ("hip", "knee", "ankle")),
+)
+_STATES = tuple(name for name in GAIT_CYCLE_COLUMNS if name not in _MEANS)
+_ORDER = [(_STATES + _MEANS).index(name) for name in GAIT_CYCLE_COLUMNS]

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.metrics import measure
@@ -39,6 +40,14 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None) -> Recording:
     torque = np.zeros((count, 2, 4))
     for joint, name in enumerate(("hip", "knee", "ankle")):
         torque[..., joint] = -HUMAN.mean(f"{name}_moment", phase) * BODY.mass
+    mean_torque = np.zeros_like(torque)
+    for joint, name in enumerate(("hip", "knee", "ankle")):
+        mean_torque[..., joint] = -HUMAN.mean(f"{name}_moment", middle) * BODY.mass
+    rate = joints(lambda name: HUMAN.rate(name, middle) / HUMAN.stride_time)
+    work = mean_torque * rate * 0.01
+    energy = np.zeros((count, len(ledger_entries())))
+    energy[:, [ledger_entries().index(name) for name in ("actuators", "contact")]] = 0.3, -0.1  # J a tick
+    energy[:, ledger_entries().index("mechanical")] = 600.0 + 0.25 * np.arange(count)
     force = np.zeros((count, 2, 3, 2))
     force[:, :, 1, 0] = HUMAN.mean("grf_forward", middle) * WEIGHT
     force[:, :, 1, 1] = HUMAN.mean("grf_vertical", middle) * WEIGHT
@@ -59,8 +68,10 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None) -> Recording:
         "base": np.tile([0.0, 0.88, PITCH], (count, 1)),
         "angle": angle,
         "velocity": velocity,
-        "torque": 0.9 * torque,
-        "passive_torque": 0.1 * torque,
+        "torque": torque,
+        "joint_torque": mean_torque,
+        "joint_work": np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1),
+        "energy": energy,
         "com": com,
         "com_velocity": np.gradient(com, 0.01, axis=0),
         "com_reference": com,
@@ -85,6 +96,7 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None) -> Recording:
         returns=np.arange(episodes, dtype=float),
         fall_reason=np.array(["fell: hip too low" if i in fell else "" for i in range(episodes)]),
         plan_com=plan,
+        plan_zmp=plan[:, 0],
         series=stacked,
     )
 
@@ -129,6 +141,35 @@ def test_centre_of_mass_on_its_plan_has_no_error(gait):
     assert com["z_rmse_m"] < 0.001
     assert com["z_r"] > 0.995
     assert com["rise_m"] == pytest.approx(0.04, abs=5e-4)
+
+
+def test_energies_of_a_stride_are_the_sums_of_its_ticks(gait):
+    energy, ticks = gait.metrics["energy_J_kg"], HUMAN.stride_time / 0.01
+    assert energy["actuators"] == pytest.approx(0.3 * ticks / BODY.mass, rel=1e-3)
+    assert energy["mechanical_change"] == pytest.approx(0.25 * ticks / BODY.mass, rel=1e-3)
+    assert energy["residual"] == pytest.approx((0.25 - 0.3 + 0.1) * ticks / BODY.mass, rel=1e-3)
+    assert energy["pushes"] == 0.0
+
+
+def test_joint_work_is_that_of_peoples_moments_and_rates(gait):
+    phase = np.arange(1000) / 1000
+    for joint, curve in (("hip", "thigh"), ("knee", "knee"), ("ankle", "ankle")):
+        power = -HUMAN.mean(f"{joint}_moment", phase) * HUMAN.rate(curve, phase)  # of a stride
+        work = gait.metrics["joint_work_J_kg"][joint]
+        assert work["positive"] == pytest.approx(np.maximum(power, 0.0).mean(), rel=0.03)
+        assert work["negative"] == pytest.approx(-np.minimum(power, 0.0).mean(), rel=0.03)
+    assert gait.metrics["ankle_work_J_kg"] == gait.metrics["joint_work_J_kg"]["ankle"]
+
+
+@pytest.mark.parametrize("off", [0.0, 0.03])
+def test_a_cop_beside_the_planned_zmp_is_as_far_off_as_it_is(off):
+    recording = people(1)  # whose planned ZMP runs below the planned CoM
+    recording.series["contact"][..., 0] = recording.series["com"][..., None, None, 0] + off
+    zmp = measure(recording).metrics["zmp"]
+    # Heel strike is seen at 0.05 BW, a few ms after it: 1.2 m/s makes that a few mm.
+    assert zmp["cop_rmse_single_support_m"] == pytest.approx(off, abs=0.008)
+    assert zmp["cop_rmse_m"] == pytest.approx(off, abs=0.008)
+    assert zmp["r"] > 0.999
 
 
 def test_moments_are_actuator_and_passive_torque_with_extension_positive(gait):

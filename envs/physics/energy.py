@@ -47,6 +47,16 @@ RECORDED = ("qvel", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
 """Fields of MuJoCo's data that are recorded after each physics step, as `StepRecord` holds them."""
 
 
+def ledger_entries() -> tuple[str, ...]:
+    """Names of the numbers of `LEDGER` in order, `stiffness_changes/ankle` for one of an array over joints."""
+    arrays = {name for name in LEDGER.names or () if LEDGER[name].shape}
+    return tuple(
+        entry
+        for name in LEDGER.names or ()
+        for entry in ([f"{name}/{joint}" for joint in JOINTS] if name in arrays else [name])
+    )
+
+
 class StepRecord(NamedTuple):
     """What MuJoCo reports of each of a window's S physics steps; D degrees of freedom, in the order of qvel."""
 
