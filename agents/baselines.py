@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from springfoot.envs.control.equilibrium import fixed_stiffness
+from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_phases
@@ -22,7 +22,7 @@ from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.reward import OBSERVATION
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.stiffness import StiffnessSchedule, thesis_schedule
+from springfoot.gait.stiffness import PRINTED_SWING, THESIS_SWING, TOE_STIFFNESS, StiffnessSchedule, thesis_schedule
 
 PolicyFunction = Callable[[NDArray], NDArray]
 """Observations (N, D) -> actions (N, 4) in [-1, 1]."""
@@ -52,7 +52,7 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
 
 
 def untrained(settings: BipedSettings) -> PolicyFunction:
-    """Always action 0: the middle of the stiffness range on its log scale."""
+    """What training starts from: mean action 0, mid-range on the log scale, or in residual mode the fixed schedule."""
     return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
 
 
@@ -62,18 +62,27 @@ def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
     return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
 
 
-def schedule(settings: BipedSettings) -> PolicyFunction:
-    """Follow a fixed stiffness over the stride: that of `settings.schedule`, or else the one tuned with the legs.
+def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
+    """A fixed stiffness over the stride, times `factor`: that of `settings.schedule`, or that of the leg tuning.
 
     The tuned one goes with the speed that is commanded at each moment. Both scale with the body.
     """
     body, speeds = body_of(settings), tabulated_speeds(settings)
     if settings.schedule is not None:
         stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
-        return _follow(stiffness[None], speeds[:1], settings, body)
+        return _follow(factor * stiffness[None], speeds[:1], settings, body)
     time_scale = sqrt(body.length_scale)
     tuned = [leg_constants(settings.equilibrium, settings.cadence, speed / time_scale) for speed in speeds]
-    return _follow(np.stack([fixed_stiffness(constants, body) for constants in tuned]), speeds, settings, body)
+    stiffness = np.stack([fixed_stiffness(constants, body) for constants in tuned])
+    return _follow(factor * stiffness, speeds, settings, body)
+
+
+def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
+    """People's ankle quasi-stiffness over the stride, as measured (K_ref), and `TOE_STIFFNESS`: nothing is tuned."""
+    body = body_of(settings)
+    ankle = plateau_curve(REFERENCE_STIFFNESS)
+    stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
+    return _follow(stiffness[None], tabulated_speeds(settings)[:1], settings, body)
 
 
 def _follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
@@ -99,34 +108,56 @@ def _require_absolute(settings: BipedSettings) -> None:
         raise SpringfootError("a stiffness schedule or constant needs action_mode 'absolute', got 'residual'")
 
 
-BASELINES = ("untrained", "random", "constant", "schedule", "thesis")
-"""Names of the baselines; `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad]."""
+BASELINES = ("untrained", "random", "constant", "schedule", "quasi_stiffness", "thesis", "thesis_printed")
+"""Names of the baselines. `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad], `schedule:FACTOR` the
+schedule times a factor."""
+SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
+"""Swing springs of the thesis's lines: completed, and as printed."""
 
 
 def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
     """A baseline by name, in the environment of `settings`; `seed` is that of `random`."""
     kind, colon, numbers = name.partition(":")
-    if colon and kind != "constant":
-        raise SpringfootError(f"only constant takes numbers, as in constant:300,40, got {name!r}")
-    if kind == "constant":
-        return constant(settings, _stiffness_from(numbers) if colon else CONSTANT_STIFFNESS)
-    if kind == "random":
-        return uniform(settings, seed)
-    if kind in BASELINES:
-        return {"untrained": untrained, "schedule": schedule, "thesis": schedule}[kind](settings)
-    raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
+    if kind not in BASELINES:
+        raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
+    if colon and kind not in ("constant", "schedule"):
+        raise SpringfootError(f"only constant and schedule take numbers, as in constant:300,40, got {name!r}")
+    match kind:
+        case "constant":
+            return constant(settings, _stiffness_from(numbers) if colon else CONSTANT_STIFFNESS)
+        case "random":
+            return uniform(settings, seed)
+        case "untrained":
+            return untrained(settings)
+        case "quasi_stiffness":
+            return quasi_stiffness(settings)
+        case _:
+            return schedule(settings, _factor_from(numbers) if colon else 1.0)
 
 
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
     """The environment settings that a baseline needs, for the body and speed of `settings`.
 
-    Baselines set stiffness in N m/rad, so their actions are absolute. `thesis` brings the thesis's straight lines
-    between gait events, and their equilibrium angles.
+    What is stiffness in N m/rad acts absolutely; `untrained` and `random` act as `settings` say. The thesis's lines
+    bring the springs between gait events, their rest angles included.
     """
+    if name in ("untrained", "random"):
+        return {}
     absolute = {"action_mode": "absolute"}
-    if name != "thesis":
+    if name not in SWINGS:
         return absolute
-    return absolute | {"equilibrium": "phase", "schedule": thesis_schedule(body_of(settings), settings.speed).to_json()}
+    lines = thesis_schedule(body_of(settings), settings.speed, SWINGS[name])
+    return absolute | {"equilibrium": "phase", "schedule": lines.to_json()}
+
+
+def _factor_from(text: str) -> float:
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = nan
+    if not 0 < factor < inf:
+        raise SpringfootError(f"schedule takes a positive factor, as in schedule:1.2, got {text!r}")
+    return factor
 
 
 def _stiffness_from(text: str) -> tuple[float, float]:

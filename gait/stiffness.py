@@ -5,6 +5,7 @@ Angle and torque of ankle and toe over one stride -> gait events -> a straight l
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import radians
 from typing import NamedTuple
 
 import numpy as np
@@ -175,30 +176,40 @@ def schedule_from_curves(
     )
 
 
+THESIS_SWING = ((45.0, 0.0), (25.0, 10.0))
+"""Swing springs of ankle and toe, (K [N m/rad] for 1.70 m and 63 kg, rest angle [deg]), that complete its lines.
+
+The toe joint rests 10 deg up, as people hold it; so it clears the floor, with an ankle of 20 as of 45 N m/rad and a toe
+of 5 as of 25. Resting at 0 it catches the floor, as a drop foot does, with springs up to 200 and 50 N m/rad as well: it
+is posture that helps, not K (docs/thesis.md).
+"""
+PRINTED_SWING = tuple((k, 0.0) for k in LOWEST_STIFFNESS)
+"""As printed: the thesis gives swing no stiffness; the lowest that an ankle and a toe can have, resting at 0."""
+
+
 def thesis_schedule(
-    body: Body, speed: float = 1.2, swing_stiffness: tuple[float, float] = LOWEST_STIFFNESS
+    body: Body, speed: float = 1.2, swing: tuple[tuple[float, float], ...] = THESIS_SWING
 ) -> StiffnessSchedule:
     """The thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
 
-    Torques scale with mass x height from people's at `speed` [m/s]. People's moment of the toe is not known: the
-    toe has `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. In swing both springs rest at 0 with
-    `swing_stiffness` (ankle, toe) [N m/rad, for 1.70 m and 63 kg]; no line of the ankle falls below it.
+    Torques scale with mass x height from people's at `speed` [m/s]. Of the toe people's moment is not known: it has
+    `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. No line of the ankle falls below its `LOWEST_STIFFNESS`.
+    `swing` is (K [N m/rad, for 1.70 m and 63 kg], rest angle [deg]) of ankle and toe after toe-off.
     """
     human = human_gait(speed, body.height)
     scale = body.stiffness_scale
-    lowest_ankle, lowest_toe = (
-        require_within("swing_stiffness", k, STIFFNESS_RANGE, "N m/rad") for k in swing_stiffness
-    )
     phase = np.linspace(0.0, human.toe_off, 1001)
     # The data count plantarflexion positive, the joint dorsiflexion.
     torque = -human.mean("ankle_moment", phase) * body.total_mass * body.length_scale
-    return schedule_from_curves(
+    stance = schedule_from_curves(
         phase,
         human.toe_off,
         (human.mean("ankle", phase), torque),
-        lowest=(lowest_ankle * scale, lowest_toe * scale),
+        lowest=(LOWEST_STIFFNESS[0] * scale, LOWEST_STIFFNESS[1] * scale),
         toe_stiffness=TOE_STIFFNESS * scale,
     )
+    ankle, toe = (Segment(human.toe_off, k * scale, radians(rest_deg)) for k, rest_deg in swing)
+    return StiffnessSchedule((*stance.ankle[:-1], ankle), (*stance.toe[:-1], toe))
 
 
 def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:

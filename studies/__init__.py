@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .body_sweep import draw_pairs, walk_pairs
-    from .comparison import compare
+    from .comparison import contenders
     from .constant_search import best_constant
     from .identifiability import any_stiffness, mean_springs, rebuilt, spring_work
     from .open_loop import frozen
@@ -20,7 +20,7 @@ __all__ = [
     "agreements",
     "any_stiffness",
     "best_constant",
-    "compare",
+    "contenders",
     "draw_pairs",
     "frozen",
     "identified",
@@ -37,7 +37,7 @@ _MODULE = {
     "agreements": "seed_agreement",
     "any_stiffness": "identifiability",
     "best_constant": "constant_search",
-    "compare": "comparison",
+    "contenders": "comparison",
     "draw_pairs": "body_sweep",
     "frozen": "open_loop",
     "identified": "push_experiment",

@@ -1,40 +1,55 @@
-"""A policy held against every baseline, on the same seeds, hence starts and pushes, and by its own reward.
+"""A policy held against every spring that needs no learning, on the same seeds, hence starts and pushes.
 
-    springfoot study compare --constant 300 40
+    springfoot study compare --constant 363 79.5 --factor 1.2 --page docs/results.md
 
-Every row is one recording, measured as by `evaluate.py`.
+Every row walks in the policy's environment, earns its reward and is measured as by `evaluate.py`. Returns are compared
+episode by episode (paired bootstrap), falls by McNemar's test.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, NamedTuple
 
-import numpy as np
 import tyro
 from numpy.typing import NDArray
-from scipy.stats import bootstrap
 
-from springfoot.agents.baselines import BASELINES, PolicyFunction, own_settings
-from springfoot.agents.flags import given, optional_flags
+from springfoot.agents.baselines import PolicyFunction, own_settings
+from springfoot.agents.flags import SettingsFlags, given, optional_flags
 from springfoot.agents.markdown import table, text_of
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import prepare, record
 
-from .quantities import COMPARED_JOINTS, falls_text, rmse_text, walks_csv
+from .intervals import RESAMPLES, mean_interval, paired_p, share_interval
+from .open_loop import FROZEN, frozen
+from .quantities import rmse_text, walks_csv
 from .study import Answer, OnProgress, WalkingStudy
 
 PUSHED = BipedSettings(push_newton=150.0)
-"""Pushes [N] of `best-constant` and `compare` unless flagged otherwise."""
-RESAMPLES = 10_000
-"""Resamples of the bootstrap."""
-INTERVALS = f"Intervals: 95 %, percentile bootstrap of the mean over episodes (scipy.stats), {RESAMPLES:,} resamples."
+"""Pushes [N] of `best-constant` unless flagged otherwise."""
+PUSHES = (150.0, 200.0)
+"""Pushes [N] of `compare`."""
+QUASI_SPEED = 1.35
+"""Commanded speed [m/s] at which people's quasi-stiffness, which is not tuned, walks about 1.2 m/s."""
+SIGNIFICANT = 0.05
+"""Below this p, McNemar's, one row falls less often than another."""
+INTERVALS = (
+    f"Intervals: 95 %, percentile bootstrap over episodes (scipy.stats, {RESAMPLES:,} resamples), of the difference "
+    "paired; falls: Wilson's, and p of McNemar's exact test against the first row."
+)
 """How they are made."""
 SECTION = "COMPARE"
 """Of the results page."""
 
 PushedFlags = optional_flags("PushedFlags", BipedSettings, PUSHED)
+
+
+class Contender(NamedTuple):
+    """A policy, what its row is called, and the environment it walks in."""
+
+    name: str
+    policy: PolicyFunction
+    settings: BipedSettings
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,129 +62,140 @@ class Row:
     """As in metrics.json."""
     returns: NDArray
     """(episodes,) return of each."""
+    fell: NDArray
+    """(episodes,) whether it fell."""
 
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the mean return."""
         return mean_interval(self.returns)
 
-
-def mean_interval(values: NDArray, level: float = 0.95) -> tuple[float, float]:
-    """Percentile bootstrap interval of the mean of a sample (n,), from `RESAMPLES` resamples of a fixed seed.
-
-    Falls make returns two-humped and skewed, so no normal distribution is assumed. Of one value, that value.
-    """
-    if len(values) < 2:
-        return float(values[0]), float(values[0])
-    found = bootstrap(
-        (values,),
-        np.mean,
-        n_resamples=RESAMPLES,
-        confidence_level=level,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    )
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+    def difference(self, first: "Row") -> tuple[float, float, float] | None:
+        """Mean return of `first` less this row's, and its interval; None where another speed was commanded."""
+        if self.metrics["environment"]["speed"] != first.metrics["environment"]["speed"]:
+            return None
+        differences = first.returns - self.returns
+        return float(differences.mean()), *mean_interval(differences)
 
 
 def run_row(name: str, policy: PolicyFunction, settings: BipedSettings, **how: Any) -> Row:
     """Record (`episodes`, `seed`, `threads`, `progress` as for `recording.record`) and measure a policy."""
     recording = record(policy, settings, name=name, **how)
-    return Row(name=name, metrics=measure(recording).metrics, returns=recording.returns)
+    fell = recording.fall_reason != ""
+    return Row(name=name, metrics=measure(recording).metrics, returns=recording.returns, fell=fell)
 
 
-def compare(
+def contenders(
     name: str,
     given: dict[str, Any],
-    best: tuple[float, float] | None = None,
-    *,
-    episodes: int = 100,
+    constant: tuple[float, float] | None = None,
+    factor: float | None = None,
     seed: int = 0,
     threads: int = 2,
-    progress: OnProgress = lambda seconds: None,
-) -> list[Row]:
-    """The policy `name` and every baseline on the same episodes, in the policy's own environment and reward.
+) -> list[Contender]:
+    """The policy `name`, and what it has to beat, in its own environment and reward.
 
-    Args:
-        name: any policy of `recording.prepare`.
-        given: environment settings that differ from the evaluation's standard conditions and the policy's own.
-        best: ankle and toe stiffness [N m/rad] of one more constant, as found by `best_constant`.
-        episodes, seed, threads, progress: as for `recording.record`.
-
-    Baselines act absolutely, whatever the policy does, and each pays for changing its own action. The row `thesis` has
-    its own equilibrium, "phase".
+    Its own mean K played open loop; what its training starts from; the tuned schedule, and its best `factor`; the best
+    `constant` (ankle, toe) [N m/rad] and the default one; people's quasi-stiffness as it is, and commanded
+    `QUASI_SPEED`; the thesis's lines, completed and as printed; random actions. `given` are environment settings that
+    differ from the evaluation's standard conditions and the policy's own. Each row pays for changing its own action.
     """
     policy, settings = prepare(name, given, seed)
-    found = [] if best is None else [f"constant:{best[0]:g},{best[1]:g}"]
-    prepared = [(name, policy, settings)]
-    for baseline in [*BASELINES, *found]:
-        own = own_settings(baseline, settings)
-        prepared.append((baseline, *prepare(baseline, settings_to_json(settings) | own, seed)))
-    how = {"episodes": episodes, "seed": seed, "threads": threads, "progress": progress}
-    return [run_row(*each, **how) for each in prepared]
+    found = [Contender(name, policy, settings)]
+    if settings.equilibrium in ("planned", "angle", "neutral"):
+        found.append(Contender(f"{FROZEN}:{name}", *frozen(name, given, seed, threads)))
+    names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
+    names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
+    names += ["constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]
+    for each in names:
+        own = settings_to_json(settings) | own_settings(each, settings)
+        found.append(Contender(each, *prepare(each, own, seed)))
+        if each == "quasi_stiffness" and settings.speed == BipedSettings.speed:
+            faster = prepare(each, own | {"speed": QUASI_SPEED}, seed)
+            found.append(Contender(f"{each}, commanded {QUASI_SPEED:g} m/s", *faster))
+    return found
 
 
 def comparison_table(rows: Sequence[Row]) -> str:
-    """Markdown: the first row's policy against the others, and whether the intervals of the mean return are apart."""
+    """Markdown: the first row's policy against the others."""
     first = rows[0]
-    head = ["policy", "falls", "return, mean [95 %]", "speed m/s", "RMSE thigh / knee / ankle °", "peaks 1 / 2 BW"]
-    lines = [[*head, f"return against {first.name}"]]
+    head = ["policy", "falls [95 %]", "p", "return", f"{first.name} is ahead by [95 %]", "speed m/s"]
+    lines = []
     for row in rows:
-        m, (low, high) = row.metrics, row.interval
-        peaks = " / ".join(text_of(m["grf"][f"vertical_peak{peak}_bw"], ".2f") for peak in (1, 2))
+        m = row.metrics
+        low, high = share_interval(m["falls"], m["episodes"])
+        falls = f"{m['falls']} of {m['episodes']} [{100 * low:.0f}, {100 * high:.0f} %]"
+        ahead, p = "", ""
+        if row is not first:
+            difference = row.difference(first)
+            ahead = "–" if difference is None else "{:.1f} [{:.1f}, {:.1f}]".format(*difference)
+            p = f"{paired_p(first.fell, row.fell):.2g}"
         speed = text_of(m["speed_m_s"]["mean"], ".3f")
-        returns = f"{row.returns.mean():.1f} [{low:.1f}, {high:.1f}]"
-        against = "" if row is first else _against(row, first)
-        lines.append([f"`{row.name}`", falls_text(m), returns, speed, rmse_text(m), peaks, against])
-    return table(lines[0], lines[1:])
+        lines.append([f"`{row.name}`", falls, p, f"{row.returns.mean():.1f}", ahead, speed, rmse_text(m)])
+    return table([*head, "RMSE thigh / knee / ankle °"], lines)
 
 
 def verdict(rows: Sequence[Row]) -> str:
-    """Of how many rows the first one's mean return is higher with intervals apart; where its joints are farther off."""
+    """Which rows the first one is ahead of, in return and in falls, and which not."""
     first, *others = rows
-    apart = sum(_against(row, first).startswith("lower") for row in others)
-    closer = []
-    for row, joint in product(others, COMPARED_JOINTS):
-        rmse, own = (each.metrics["joints"][joint]["rmse_deg"] for each in (row, first))
-        if rmse is not None and own is not None and rmse < own:
-            closer.append(f"{row.name} {joint} by {own - rmse:.2f}°")
+    told = {row.name: row.difference(first) for row in others}
+    behind = [name for name, difference in told.items() if difference is not None and difference[1] <= 0.0]
+    known = sum(difference is not None for difference in told.values())
+    fewer = [
+        row.name for row in others if paired_p(first.fell, row.fell) < SIGNIFICANT and first.fell.sum() < row.fell.sum()
+    ]
+    alike = [row.name for row in others if row.name not in fewer]
     return (
-        f"{first.name}: higher mean return, intervals apart, than {apart} of {len(others)} rows; "
-        f"smaller joint RMSE than its own: {', '.join(closer) or 'none'}."
+        f"{first.name} earns more than {known - len(behind)} of {known} rows (interval above 0)"
+        f"{'; not more than ' + ', '.join(behind) if behind else ''}. It falls less often than {len(fewer)} of "
+        f"{len(others)} (p < {SIGNIFICANT:g}){'; not less than ' + ', '.join(alike) if alike else ''}."
     )
-
-
-def _against(row: Row, first: Row) -> str:
-    """On which side of the first row's interval another's lies."""
-    (low, high), (first_low, first_high) = row.interval, first.interval
-    if high < first_low:
-        return "lower, intervals apart"
-    return "higher, intervals apart" if low > first_high else "intervals overlap"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compare(WalkingStudy):
-    """Hold a policy against every baseline: falls, returns with 95 % intervals, speed, joint angles, forces."""
+    """Hold a policy against every spring that needs no learning, under pushes: falls, returns, speed, joint angles."""
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
     """Any policy of evaluate.py; all rows walk in its environment and earn its reward."""
     constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
-    """One more constant stiffness [N m/rad]: what best-constant found."""
+    """The best constant stiffness [N m/rad], as best-constant finds it."""
+    factor: Annotated[float | None, tyro.conf.arg(metavar="FLOAT")] = None
+    """The best factor on the schedule, as best-factor finds it."""
+    pushes: tuple[float, ...] = PUSHES
+    """Sizes of the pushes [N], a table each."""
     episodes: int = 100
     """Episodes of each row."""
-    environment: tyro.conf.OmitArgPrefixes[PushedFlags]  # type: ignore[valid-type]
+    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
     """What to walk in; a trained policy brings its own settings, standard conditions aside."""
 
+    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,)}
+
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every row."""
-        conditions = pushed(self.seconds, self.environment)
-        rows = compare(self.policy, conditions, self.constant, **self.how, progress=progress)
-        text = f"{comparison_table(rows)}\n\n{what_ran(self, rows[0])}\n{INTERVALS}\n{verdict(rows)}"
-        low_high = [dict(zip(("return_low", "return_high"), row.interval, strict=True)) for row in rows]
-        numbers = walks_csv(
-            [({"policy": row.name} | ends, row.metrics) for row, ends in zip(rows, low_high, strict=True)]
-        )
-        return Answer(text=text, files={"compare.csv": numbers}, sections={SECTION: text})
+        """Walk every row under every push."""
+        parts, lines = [], []
+        for push in self.pushes:
+            conditions = {"episode_seconds": self.seconds} | given(self.environment) | {"push_newton": push}
+            found = contenders(self.policy, conditions, self.constant, self.factor, self.seed, self.threads)
+            rows = [run_row(*each, **self.how, progress=progress) for each in found]
+            parts += [f"**{what_ran(self, rows[0])}**", comparison_table(rows), verdict(rows)]
+            lines += [(_ends(push, row, rows[0]), row.metrics) for row in rows]
+        text = "\n\n".join([*parts, INTERVALS])
+        return Answer(text=text, files={"compare.csv": walks_csv(lines)}, sections={SECTION: text})
+
+
+def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
+    """What a row's line in compare.csv begins with."""
+    difference = row.difference(first) or (None, None, None)
+    falls = share_interval(row.metrics["falls"], row.metrics["episodes"])
+    return {
+        "policy": row.name,
+        "push_newton": push,
+        **dict(zip(("falls_low", "falls_high"), falls, strict=True)),
+        "falls_p": paired_p(first.fell, row.fell),
+        **dict(zip(("return_low", "return_high"), row.interval, strict=True)),
+        **dict(zip(("ahead", "ahead_low", "ahead_high"), difference, strict=True)),
+    }
 
 
 def pushed(seconds: float, environment: Any) -> dict[str, Any]:

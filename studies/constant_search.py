@@ -1,6 +1,7 @@
-"""The constant ankle and toe stiffness that earns most, in the environment and by the reward of a policy.
+"""The constant stiffness, and the factor on the tuned schedule, that earn most in a policy's environment and reward.
 
 springfoot study best-constant
+springfoot study best-factor
 """
 
 from dataclasses import dataclass, replace
@@ -11,18 +12,22 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from springfoot.agents.baselines import constant
+from springfoot.agents.baselines import constant, schedule
 from springfoot.agents.files import csv_text
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.recording import prepare, record
 
-from .comparison import INTERVALS, PushedFlags, mean_interval, pushed
+from .comparison import PushedFlags, pushed
+from .intervals import RESAMPLES, mean_interval
 from .study import Answer, OnProgress, WalkingStudy
 
 COARSE = (8, 5)
 """First grid of the search for a constant, ankle by toe stiffness: evenly on a log scale over their ranges."""
 REFINEMENTS = 3
 """Times the search then halves its spacing around the best so far."""
+FACTORS = tuple(round(0.5 * 1.1**k, 2) for k in range(17))
+"""On the schedule, 0.5 to 2.3, a tenth apart."""
+_INTERVAL = f"Interval: 95 %, percentile bootstrap over episodes (scipy.stats, {RESAMPLES:,} resamples)."
 SEARCH_SEED = 100_000
 """Of the search's first episode: far from a comparison's, so that the best constant is not fitted to its starts."""
 
@@ -94,8 +99,49 @@ class BestConstant(WalkingStudy):
             f"--constant {ankle:g} {toe:g}\n"
             f"ankle {ankle:g}, toe {toe:g} N·m/rad for 1.70 m and 63 kg: mean return {returns.mean():.1f} "
             f"[{low:.1f}, {high:.1f}] over the search's {len(returns)} episodes, the best of {self.total:g} tries.\n"
-            f"{INTERVALS}"
+            f"{_INTERVAL}"
         )
         lines = [(*pair, float(each.mean())) for pair, each in tried.items()]
         head = ["ankle_Nm_per_rad", "toe_Nm_per_rad", "return_mean"]
         return Answer(text=text, files={"tried.csv": csv_text(head, lines)}, sections={"BEST-CONSTANT": text})
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestFactor(WalkingStudy):
+    """Find the factor on the tuned schedule with the highest mean return."""
+
+    policy: str = "pretrained"
+    """In whose environment and reward: any policy of evaluate.py; untrained for the defaults."""
+    episodes: int = 16
+    """Episodes of each candidate."""
+    seed: int = SEARCH_SEED
+    """Of every candidate's first episode; keep it apart from that of the comparison."""
+    environment: tyro.conf.OmitArgPrefixes[PushedFlags]  # type: ignore[valid-type]
+    """What to walk in."""
+
+    UNIT: ClassVar[str] = " tries"
+    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 1.0}
+
+    @property
+    def total(self) -> float:
+        """Candidates."""
+        return len(FACTORS)
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Search."""
+        _, settings = prepare(self.policy, pushed(self.seconds, self.environment))
+        settings = replace(settings, action_mode="absolute")
+        tried: dict[float, NDArray] = {}
+        for factor in FACTORS:
+            policy = schedule(settings, factor)
+            tried[factor] = record(policy, settings, name="schedule", **self.how).returns
+            progress(1)
+        best = max(tried, key=lambda factor: tried[factor].mean())
+        low, high = mean_interval(tried[best])
+        text = (
+            f"--factor {best:g}\n"
+            f"schedule × {best:g}: mean return {tried[best].mean():.1f} [{low:.1f}, {high:.1f}] over the search's "
+            f"{len(tried[best])} episodes, the best of {len(FACTORS)} tries.\n{_INTERVAL}"
+        )
+        numbers = csv_text(["factor", "return_mean"], [(factor, float(own.mean())) for factor, own in tried.items()])
+        return Answer(text=text, files={"tried.csv": numbers}, sections={"BEST-FACTOR": text})

@@ -5,10 +5,12 @@ import pytest
 
 from springfoot.agents.baselines import BASELINES, baseline, leg_phase, own_settings
 from springfoot.envs.biped_batch import Biped
+from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.gait import Body, SpringfootError
+from springfoot.gait.stiffness import TOE_STIFFNESS
 
 
 def settings_of(name, **values):
@@ -80,13 +82,32 @@ def test_schedule_follows_the_body_and_the_speed_of_each_environment(own):
         assert set_to == pytest.approx(wanted, rel=1e-4)
 
 
-def test_thesis_brings_its_schedule_and_swings_at_the_lowest_stiffness():
-    settings = settings_of("thesis")
+@pytest.mark.parametrize(("name", "ankle"), [("thesis", 45.0), ("thesis_printed", 20.0)])
+def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
+    settings = settings_of(name)
     assert settings.equilibrium == "phase" and settings.schedule is not None
     biped = started(settings, [0.8])
-    action = baseline("thesis", settings)(biped.observe())
-    assert action[0, 0] == -1.0  # left ankle in swing
-    assert action[0, 2] > -1.0  # right ankle in stance
+    set_to = stiffness_of(baseline(name, settings)(biped.observe()).reshape(1, 2, 2), settings, Body())
+    assert set_to[0, 0, 0] == pytest.approx(ankle, rel=1e-5)  # left ankle in swing
+    assert set_to[0, 1, 0] > 100.0  # right ankle in stance
+
+
+def test_a_factor_multiplies_the_schedule():
+    biped = started(BipedSettings(), np.linspace(0, 1, 21)[:-1])
+    once, half = (
+        stiffness_of(baseline(name, biped.settings)(biped.observe()).reshape(20, 2, 2), biped.settings, Body())
+        for name in ("schedule", "schedule:0.5")
+    )
+    assert half == pytest.approx(0.5 * once, rel=1e-5)
+
+
+def test_quasi_stiffness_is_peoples_on_its_plateaus():
+    biped = started(BipedSettings(), [0.03, 0.17, 0.37, 0.56, 0.8])
+    set_to = stiffness_of(
+        baseline("quasi_stiffness", biped.settings)(biped.observe()).reshape(5, 2, 2), biped.settings, Body()
+    )
+    assert set_to[:, 0, 0] == pytest.approx(REFERENCE_STIFFNESS, rel=1e-5)
+    assert set_to[..., 1] == pytest.approx(TOE_STIFFNESS, rel=1e-5)
 
 
 def test_schedule_follows_one_that_is_given():
@@ -113,7 +134,17 @@ def test_stiffness_in_residual_mode_is_refused():
 
 
 @pytest.mark.parametrize(
-    "name", ["standing", "constant:1", "constant:1,-2", "constant:a,b", "constant:nan,3", "random:3"]
+    "name",
+    [
+        "standing",
+        "constant:1",
+        "constant:1,-2",
+        "constant:a,b",
+        "constant:nan,3",
+        "random:3",
+        "schedule:0",
+        "schedule:a",
+    ],
 )
 def test_unknown_baselines_are_refused_with_one_line(name):
     with pytest.raises(SpringfootError) as caught:

@@ -10,42 +10,51 @@ import pytest
 from springfoot.agents.baselines import BASELINES, constant
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.evaluation.recording import prepare, record
-from springfoot.studies import comparison, quantities
+from springfoot.studies import comparison, intervals, quantities
 from springfoot.studies.command import study_main
 from springfoot.studies.constant_search import best_constant
 from springfoot.studies.seeds import seeds_table
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
+THESIS = {"thesis", "thesis_printed"}
 
 
 @pytest.fixture(scope="module")
 def rows():
-    return comparison.compare("schedule", SHORT, best=(200.0, 30.0), episodes=2, seed=3)
+    found = comparison.contenders("schedule", SHORT, constant=(200.0, 30.0), factor=1.2, seed=3)
+    return [comparison.run_row(*each, episodes=2, seed=3) for each in found]
 
 
-def test_every_baseline_is_a_row_with_its_springs(rows):
-    assert [row.name for row in rows] == ["schedule", *BASELINES, "constant:200,30"]
-    stiffness = rows[-1].metrics["stiffness_Nm_rad"]
-    assert stiffness["ankle"]["mid_stance"] == pytest.approx(200.0)
-    assert stiffness["toe"]["mid_stance"] == pytest.approx(30.0)
+def test_every_spring_that_needs_no_learning_is_a_row(rows):
+    names = [row.name for row in rows]
+    assert names[:5] == ["schedule", "frozen:schedule", "untrained", "schedule", "schedule:1.2"]
+    assert set(BASELINES) < set(names) and "quasi_stiffness, commanded 1.35 m/s" in names
+    stiffness = {row.name: row.metrics["stiffness_Nm_rad"] for row in rows}
+    assert stiffness["constant:200,30"]["ankle"]["mid_stance"] == pytest.approx(200.0)
+    assert stiffness["constant:200,30"]["toe"]["mid_stance"] == pytest.approx(30.0)
+    own, factor = (stiffness[name]["ankle"]["mid_stance"] for name in ("schedule", "schedule:1.2"))
+    assert factor == pytest.approx(1.2 * own, rel=0.02)
 
 
-def test_rows_share_conditions_and_reward_and_the_thesis_has_its_own_equilibrium(rows):
+def test_rows_share_conditions_and_reward_but_for_what_makes_them_other_springs(rows):
     first = rows[0].metrics["environment"]
     for row in rows:
-        own = {"equilibrium", "schedule"} if row.name == "thesis" else set()
+        own = {"equilibrium", "schedule"} if row.name in THESIS else set()
+        own |= {"schedule"} if row.name.startswith("frozen") else set()
+        own |= {"speed"} if "commanded" in row.name else set()
         assert {key for key in first if row.metrics["environment"][key] != first[key]} == own
     assert first["push_newton"] == 150.0
 
 
 def test_a_baseline_earns_the_reward_of_the_policy_it_is_held_against():
     weights = {"alive": 1.0, "speed": 0.0}
-    given = SHORT | {"reward_weights": weights, "episode_seconds": 1.0}
+    given = {"reward_weights": weights, "episode_seconds": 1.0}
     alone = settings_from(**given)
-    (found,) = [row for row in comparison.compare("schedule", given, episodes=2, seed=3) if row.name == "constant"]
-    assert np.array_equal(found.returns, record(constant(alone), alone, name="", episodes=2, seed=3).returns)
+    (found,) = [each for each in comparison.contenders("schedule", given) if each.name == "constant"]
+    returns = comparison.run_row(*found, episodes=2, seed=3).returns
+    assert np.array_equal(returns, record(constant(alone), alone, name="", episodes=2, seed=3).returns)
     plain = settings_from(**(given | {"reward_weights": {}}))
-    assert not np.array_equal(found.returns, record(constant(plain), plain, name="", episodes=2, seed=3).returns)
+    assert not np.array_equal(returns, record(constant(plain), plain, name="", episodes=2, seed=3).returns)
 
 
 def test_a_row_is_what_evaluate_would_find(rows):
@@ -53,48 +62,78 @@ def test_a_row_is_what_evaluate_would_find(rows):
     assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3).returns)
 
 
-def test_a_residual_policy_stands_beside_baselines_that_act_absolutely():
-    rows = comparison.compare("untrained", SHORT | {"action_mode": "residual"}, episodes=1)
-    speed = {(index > 0, row.name): row.metrics["speed_m_s"]["mean"] for index, row in enumerate(rows)}
-    assert speed[False, "untrained"] == pytest.approx(speed[True, "schedule"], rel=1e-3)  # no action: the schedule
-    assert speed[True, "untrained"] != pytest.approx(speed[True, "schedule"], rel=1e-2)  # mid-range
+def test_untrained_is_where_the_policys_own_training_starts():
+    found = {each.name: each for each in comparison.contenders("pretrained", {"episode_seconds": 1.0})}
+    assert found["untrained"].settings.action_mode == found["pretrained"].settings.action_mode == "residual"
+    assert found["schedule"].settings.action_mode == "absolute"
+    returns = [comparison.run_row(*found[name], episodes=1).returns[0] for name in ("untrained", "schedule")]
+    assert returns[0] == pytest.approx(returns[1], rel=5e-3)  # a factor of 1; its action does not change, so costs less
+
+
+def test_an_open_loop_copy_has_the_policys_mean_stiffness(rows):
+    own, copy = (row.metrics["stiffness_Nm_rad"]["ankle"] for row in rows[:2])
+    assert [copy[phase] for phase in own] == pytest.approx(
+        [own[phase] for phase in own], rel=0.15
+    )  # pushed: other phases
 
 
 def test_interval_is_that_of_a_normal_mean_and_covers_it_as_often_as_said():
     random = np.random.default_rng(1)
-    low, high = comparison.mean_interval(random.normal(5.0, 2.0, 400))
+    low, high = intervals.mean_interval(random.normal(5.0, 2.0, 400))
     assert high - low == pytest.approx(2 * 1.96 * 2.0 / np.sqrt(400), rel=0.1)
     covered = 0
     for _ in range(200):
-        low, high = comparison.mean_interval(random.normal(5.0, 2.0, 50))
+        low, high = intervals.mean_interval(random.normal(5.0, 2.0, 50))
         covered += low <= 5.0 <= high
     assert 0.88 < covered / 200 < 0.99
-    assert comparison.mean_interval(np.full(7, 3.0)) == comparison.mean_interval(np.array([3.0])) == (3.0, 3.0)
+    assert intervals.mean_interval(np.full(7, 3.0)) == intervals.mean_interval(np.array([3.0])) == (3.0, 3.0)
 
 
-def row_of(name, returns, rmse=2.0):
-    """A row of given returns, all joints equally far off."""
+def row_of(name, returns, fell=(), speed=1.2):
+    """A row of given returns, all joints equally far off, in which the episodes `fell` fell."""
     metrics = {
-        "falls": 1,
+        "falls": len(fell),
         "episodes": len(returns),
         "speed_m_s": {"mean": 1.2},
-        "joints": {joint: {"rmse_deg": rmse} for joint in quantities.COMPARED_JOINTS},
-        "grf": {"vertical_peak1_bw": 1.05, "vertical_peak2_bw": None},
+        "environment": {"speed": speed},
+        "joints": {joint: {"rmse_deg": 2.0} for joint in quantities.COMPARED_JOINTS},
     }
-    return comparison.Row(name=name, metrics=metrics, returns=np.array(returns, float))
+    fallen = np.isin(np.arange(len(returns)), fell)
+    return comparison.Row(name=name, metrics=metrics, returns=np.array(returns, float), fell=fallen)
 
 
-def test_table_says_whether_intervals_are_apart_and_which_joints_are_closer():
-    ours = row_of("ours", [10, 11, 12, 13])
-    rows = [ours, row_of("worse", [1, 2, 3, 4]), row_of("alike", [9, 11, 12, 15], 1.75), row_of("better", [20, 21])]
+def test_intervals_of_shares_are_wilsons():
+    # Newcombe 1998, Statistics in Medicine 17, 857: 81 of 263, 0 of 20, 1 of 29.
+    for count, total, low, high in ((81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)):
+        assert intervals.share_interval(count, total) == pytest.approx((low, high), abs=1e-4)
+
+
+def test_falls_of_paired_rows_are_told_apart_by_the_episodes_that_differ():
+    fell = np.arange(20) < 10
+    assert intervals.paired_p(fell, fell) == 1.0
+    assert intervals.paired_p(np.zeros(20, bool), fell) == pytest.approx(2 * 0.5**10)
+    assert intervals.paired_p(fell, np.zeros(20, bool)) == pytest.approx(2 * 0.5**10)
+    assert intervals.paired_p(fell, ~fell) == 1.0
+
+
+def test_table_and_verdict_say_what_the_policy_is_ahead_of_and_what_not():
+    noise = np.array([0.0, 1.0, -1.0, 0.5] * 5)
+    ours = row_of("ours", 10 + noise)
+    rows = [
+        ours,
+        row_of("worse", 8 + noise[::-1], fell=range(12)),
+        row_of("alike", 10 + noise[::-1], fell=[3]),
+        row_of("elsewhere", 1 + noise, speed=1.4),
+    ]
     head, rule, *body = comparison.comparison_table(rows).splitlines()
     assert head.count("|") == rule.count("|") == body[0].count("|")
-    ends = [line.split("|")[-2].strip() for line in body]
-    assert ends == ["", "lower, intervals apart", "intervals overlap", "higher, intervals apart"]
-    assert body[0].startswith("| `ours` | 1 of 4 | 11.5 [") and "1.05 / –" in body[0]
-    verdict = comparison.verdict(rows)
-    assert "than 1 of 3 rows" in verdict
-    assert "alike knee by 0.25°" in verdict and "worse" not in verdict
+    assert body[0].startswith("| `ours` | 0 of 20 [0, 16 %] |  | 10.1 |  | 1.200 |")
+    assert body[1].startswith("| `worse` | 12 of 20 [39, 78 %] | 0.00049 | 8.1 | 2.0 [")
+    assert "| – |" in body[3]
+    assert comparison.verdict(rows) == (
+        "ours earns more than 1 of 2 rows (interval above 0); not more than alike. It falls less often than 1 of 3 "
+        "(p < 0.05); not less than alike, elsewhere."
+    )
 
 
 def test_best_constant_is_at_least_as_good_as_the_ends_of_the_range():
@@ -112,9 +151,9 @@ def test_best_constant_is_at_least_as_good_as_the_ends_of_the_range():
 
 
 def test_seeds_table_has_the_spread_over_policies(rows):
-    lines = seeds_table(rows[:1] + rows[-1:]).splitlines()
+    lines = seeds_table([rows[0], rows[5]]).splitlines()
     cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
-    one, other = (row.metrics["stiffness_Nm_rad"]["ankle"]["push_off"] for row in (rows[0], rows[-1]))
+    one, other = (row.metrics["stiffness_Nm_rad"]["ankle"]["push_off"] for row in (rows[0], rows[5]))
     mean, sd = (one + other) / 2, abs(one - other) / np.sqrt(2)
     assert cells["ankle K push-off N·m/rad"] == [f"{one:.0f}", f"{other:.0f}", f"{mean:.0f} ± {sd:.0f}"]
 

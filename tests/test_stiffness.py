@@ -11,6 +11,7 @@ from springfoot.gait import Body, SpringfootError, human_gait, plan_walk
 from springfoot.gait.quasi_stiffness import FUKUCHI_OVERGROUND, ankle_quasi_stiffness
 from springfoot.gait.stiffness import (
     LOWEST_STIFFNESS,
+    PRINTED_SWING,
     Segment,
     StiffnessSchedule,
     ankle_events,
@@ -164,7 +165,7 @@ def test_json_round_trip_is_exact():
     assert StiffnessSchedule.from_json(json.loads(json.dumps(schedule.to_json()))) == schedule
 
 
-def test_thesis_schedule_follows_peoples_torque_at_its_events_and_is_soft_in_swing():
+def test_thesis_schedule_follows_peoples_torque_at_its_events_and_swings_as_told():
     body = Body()
     schedule, human = thesis_schedule(body), human_gait(1.2)
     foot_flat, dorsiflexed, toe_off = (segment.start for segment in schedule.ankle[1:])
@@ -176,12 +177,15 @@ def test_thesis_schedule_follows_peoples_torque_at_its_events_and_is_soft_in_swi
             assert torque == pytest.approx(-human.mean("ankle_moment", phase) * body.mass, abs=0.01)
     stance = [segment.stiffness for segment in schedule.ankle[:3]]
     assert stance[1] > stance[2] > stance[0]
-    np.testing.assert_array_equal(schedule.at(0.8)[0], LOWEST_STIFFNESS)
-    assert schedule.at(0.3)[0][1] == 28.0 and np.all(schedule.at(0.8)[1] == 0)
+    assert schedule.at(0.8)[0].tolist() == [45.0, 25.0] and schedule.at(0.3)[0][1] == 28.0
+    assert np.degrees(schedule.at(0.8)[1]) == pytest.approx([0.0, 10.0])
+    printed = thesis_schedule(body, swing=PRINTED_SWING)
+    np.testing.assert_array_equal(printed.at(0.8)[0], LOWEST_STIFFNESS)
+    assert np.all(printed.at(0.8)[1] == 0) and printed.ankle[:-1] == schedule.ankle[:-1]
 
 
 def test_thesis_schedule_is_the_one_that_baselines_were_measured_with():
-    schedule = thesis_schedule(Body())
+    schedule = thesis_schedule(Body(), swing=PRINTED_SWING)
     np.testing.assert_allclose(
         np.array(schedule.ankle),
         [
