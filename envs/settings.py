@@ -103,7 +103,7 @@ class BipedSettings:
     angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     feedforward: Feedforward = field(default="people", metadata=_SPRINGS)
     """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
-    that inverse dynamics give for the plan (a prediction: no force of people's is used)."""
+    that inverse dynamics give for the plan. Either way the constants they go with were tuned on people's walk."""
     action_mode: ActionMode = field(default="absolute", metadata=_SPRINGS)
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
     decisions: Decisions = field(default="50hz", metadata=_SPRINGS)

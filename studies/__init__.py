@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from .body_sweep import draw_pairs, walk_pairs
     from .comparison import contenders
     from .constant_search import best_constant
-    from .identifiability import any_stiffness, mean_springs, rebuilt, spring_work
+    from .identifiability import any_stiffness, mean_springs, rebuilt
     from .open_loop import frozen
     from .push_experiment import identified
     from .seed_agreement import agreements
@@ -26,7 +26,6 @@ __all__ = [
     "identified",
     "mean_springs",
     "rebuilt",
-    "spring_work",
     "walk_pairs",
 ]
 
@@ -43,7 +42,6 @@ _MODULE = {
     "identified": "push_experiment",
     "mean_springs": "identifiability",
     "rebuilt": "identifiability",
-    "spring_work": "identifiability",
     "walk_pairs": "body_sweep",
 }
 

@@ -76,7 +76,7 @@ INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
     "no ankle moment fed forward": lambda c: replace(c, feedforward=(*c.feedforward[:2], 0.0)),
     "no knots": lambda c: replace(c, **{name: (0.0,) * len(getattr(c, name)) for name in KNOT_FIELDS}),
     "no speed feedback to the stance hip": lambda c: replace(c, speed_torque=0.0),
-    "no foot placement by speed": lambda c: replace(c, swing_speed_gain=0.0),
+    "no shift of the swing hip by speed": lambda c: replace(c, swing_speed_gain=0.0),
 }
 """Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
 QUANTITIES = (

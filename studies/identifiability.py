@@ -117,20 +117,6 @@ def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
     raise SpringfootError(f"stiffness must be one of {', '.join(STIFFNESSES)} (or other numbers > 0), got {name!r}")
 
 
-def spring_work(recording: Recording) -> dict[str, NDArray]:
-    """Work put into the springs in each control window [J], (E, T, side, 2) for ankle and toe, NaN before the second.
-
-    `stiffness`: by changing K under load; `equilibrium`: by moving theta_eq. As the environment's `work/` of a step.
-    """
-    series = {name: values.astype(float) for name, values in recording.series.items()}
-    angle, rest, stiffness = series["angle"][..., FEET], series["equilibrium"], series["stiffness"]
-    work = {name: np.full(stiffness.shape, np.nan) for name in ("stiffness", "equilibrium")}
-    before, moved = rest[:, :-1] - angle[:, :-1], rest[:, 1:] - angle[:, :-1]
-    work["stiffness"][:, 1:] = 0.5 * np.diff(stiffness, axis=1) * before**2
-    work["equilibrium"][:, 1:] = 0.5 * stiffness[:, 1:] * (moved**2 - before**2)
-    return work
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Row:
     """One stiffness, walked under every condition."""
@@ -139,18 +125,14 @@ class Row:
     metrics: dict[str, dict[str, Any]]
     """Condition -> as metrics.json."""
     work: dict[str, float | None]
-    """Net work put into one ankle's spring in an undisturbed stride [J/kg], by `stiffness` and by `equilibrium`."""
+    """Net work put into one ankle's spring in an undisturbed stride [J/kg], by changing K and by moving theta_eq."""
 
 
 def walk_row(name: str, walks: dict[str, Recording]) -> Row:
     """Measure the recordings of one stiffness, by condition; the first is the undisturbed one."""
     metrics = {condition: measure(recording).metrics for condition, recording in walks.items()}
-    undisturbed = next(iter(walks.values()))
-    cadence, begin = next(iter(metrics.values()))["cadence_steps_min"], round(WARM_UP / TICK)
-    work: dict[str, float | None] = {}
-    for source, joules in spring_work(undisturbed).items():
-        power = joules[:, begin:, :, 0] / TICK / undisturbed.settings.mass
-        work[source] = float(np.nanmean(power)) * 120.0 / cadence if cadence else None
+    springs = next(iter(metrics.values()))["springs_J_kg"]["ankle"]
+    work = {source: springs[f"{source}_changes"] for source in ("stiffness", "equilibrium")}
     return Row(name=name, metrics=metrics, work=work)
 
 

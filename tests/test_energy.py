@@ -107,6 +107,24 @@ def test_energy_closes_over_ten_strides(name, given):
     assert both == pytest.approx(own["actuators"].sum() + own["passive_damping"].sum(), rel=1e-9)
 
 
+def test_changes_of_springs_are_those_that_every_step_reports():
+    policy, settings = prepare("schedule", {"episode_seconds": 3.0})
+    biped, ticks, reported = Biped(settings, 2), [], {}
+    biped.reset(np.arange(2), [0, 1])
+    biped.on_tick = ticks.append
+    observation = biped.observe()
+    for _ in range(100):
+        result = biped.step(policy(observation))
+        observation = result.observation
+        for source in ("stiffness", "equilibrium"):
+            both = [result.info[f"work/{source}/ankle_{side}"] for side in SIDES]
+            reported[source] = reported.get(source, 0.0) + sum(both)
+    energy = np.stack([tick.work.energy for tick in ticks])
+    for source, joules in reported.items():
+        assert energy[f"{source}_changes"][..., ANKLE].sum(0) == pytest.approx(joules, rel=1e-9)
+        assert np.abs(joules).min() > 0.1
+
+
 def test_changes_of_a_spring_cost_what_its_deflection_says():
     angle = np.zeros((1, len(SIDES), len(JOINTS)))
     angle[0, 1, ANKLE] = 0.1

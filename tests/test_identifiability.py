@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.model import damping_times
 from springfoot.evaluation.recording import prepare, record
@@ -17,7 +16,6 @@ from springfoot.studies.identifiability import (
     STARTS,
     mean_springs,
     rebuilt,
-    spring_work,
     stiffness_named,
 )
 
@@ -52,22 +50,6 @@ def test_every_stiffness_gives_the_same_torque_on_the_gaits_course(walked, name)
     torque = stiffness * (rest - springs.angle - beta * springs.velocity)
     assert torque == pytest.approx(springs.torque, abs=1e-9)
     assert np.ptp(stiffness[:, 0]) == 0 if name.startswith("flat") else np.ptp(stiffness[:, 0]) > 50
-
-
-def test_work_of_the_springs_is_that_of_the_environments_info(walked):
-    policy, settings = prepare("schedule", {"episode_seconds": 1.0})
-    seconds = record(policy, settings, name="schedule", episodes=2, seed=5)
-    biped = Biped(settings, 2)
-    biped.reset(np.arange(2), [5, 6])
-    observation, sums = biped.observe(), {name: np.zeros(2) for name in ("stiffness", "equilibrium")}
-    for _ in range(50):
-        result = biped.step(policy(observation))
-        observation = result.observation
-        for name in sums:
-            sums[name] += result.info[f"work/{name}/ankle_left"]
-    for name, joules in spring_work(seconds).items():
-        assert np.nansum(joules[:, :, 0, 0], axis=1) == pytest.approx(sums[name], rel=1e-3, abs=1e-3)
-        assert np.abs(sums[name]).min() > 0.1
 
 
 def test_a_flat_stiffness_walks_the_same_gait_without_work_of_its_own(walked):

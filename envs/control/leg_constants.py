@@ -46,7 +46,7 @@ class LegConstants:
     trunk_rise: float
     """Stride phase in which the stance hip takes over the trunk [-]."""
     swing_speed_gain: float
-    """Shift of the swing hip's target for each m/s that the body is too fast (foot placement) [rad s/m]."""
+    """Shift of the swing hip's target for each m/s that the body is too fast; negative: less flexed [rad s/m]."""
     neutral_deg: tuple[float, float]
     """Constant ankle and toe angle of `equilibrium="neutral"` [deg]."""
     toe_flat_deg: float

@@ -184,10 +184,10 @@ def _command(gains, speed, scale, curves, base, base_velocity, com_velocity, con
         torque = scale[i].torque
         trunk = -gain.trunk_stiffness * (base[i, 2] - gain.pitch) - gain.trunk_damping * base_velocity[i, 2]
         on_trunk = trunk + gain.speed_torque * too_fast
-        placement = gain.swing_gain * too_fast  # a faster body puts its foot further ahead
+        aim = gain.swing_gain * too_fast  # negative in every live set: the thigh of a body too fast aims less far ahead
         for side in range(2):
             stance, hip, knee = curves[i, side, 0], torque * curves[i, side, 1], torque * curves[i, side, 2]
-            own = stance * on_trunk + (1.0 - stance) * hip * placement
+            own = stance * on_trunk + (1.0 - stance) * hip * aim
             control[i, side, HIP, 0], control[i, side, HIP, 1] = hip, torque * curves[i, side, 3] + own
             control[i, side, KNEE, 0], control[i, side, KNEE, 1] = knee, torque * curves[i, side, 4]
 
