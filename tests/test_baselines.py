@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from springfoot.agents.baselines import BASELINES, baseline, leg_phase, own_settings
+from springfoot.agents.baselines import BASELINES, baseline, leg_phase, own_settings, schedule
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.envs.task.observation import OBSERVATION
+from springfoot.evaluation.recording import record
 from springfoot.gait import Body, SpringfootError
-from springfoot.gait.stiffness import TOE_STIFFNESS
+from springfoot.gait.stiffness import TOE_STIFFNESS, thesis_schedule
 
 
 def settings_of(name, **values):
@@ -90,6 +91,23 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
     set_to = stiffness_of(baseline(name, settings)(biped.observe()).reshape(1, 2, 2), settings, Body())
     assert set_to[0, 0, 0] == pytest.approx(ankle, rel=1e-5)  # left ankle in swing
     assert set_to[0, 1, 0] > 100.0  # right ankle in stance
+
+
+@pytest.mark.parametrize(
+    ("swing", "falls"),
+    [
+        (((45.0, 0.0), (25.0, 10.0)), 0),  # (K, rest angle in degrees) of ankle and toe
+        (((20.0, 0.0), (25.0, 10.0)), 0),
+        (((45.0, 0.0), (5.0, 10.0)), 0),
+        (((20.0, 0.0), (5.0, 0.0)), 4),  # as printed
+        (((200.0, 0.0), (50.0, 0.0)), 4),
+        (((45.0, 0.0), (25.0, 0.0)), 4),
+    ],
+)
+def test_the_thesis_falls_by_the_posture_of_its_toe_in_swing_whatever_its_stiffness(swing, falls):
+    lines = thesis_schedule(Body(), swing=swing)
+    settings = BipedSettings(equilibrium="phase", schedule=lines.to_json(), episode_seconds=8.0)
+    assert np.count_nonzero(record(schedule(settings), settings, name="", episodes=4).fall_reason) == falls
 
 
 def test_a_factor_multiplies_the_schedule():
