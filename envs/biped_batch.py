@@ -24,7 +24,7 @@ from .control.standing import WALKING, Standing, off_phase
 from .control.subjects import Subjects
 from .physics.foot_contact import CONTACTS
 from .physics.measurement import Measurement
-from .physics.model import ACTIONS, JOINTS, SIDES, passive_damping
+from .physics.model import ACTIONS, JOINTS, SIDES
 from .physics.simulation import Simulation
 from .settings import BipedSettings
 from .step_result import StepResult, Tick, report
@@ -88,7 +88,6 @@ class Biped:
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
-        self._passive_damping = np.tile(passive_damping(self.body), (num_envs, 1, 1))
 
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
         self._ground = Ground(settings, self._simulation, self.subjects)
@@ -201,7 +200,6 @@ class Biped:
             bodies = [self.subjects.bodies[index] for index in ids]
             self._simulation.fit(ids, bodies)
             self._task.fit(ids)
-            self._passive_damping[ids, 0] = [passive_damping(body) for body in bodies]
         self._legs.follow()
 
     def observe(self) -> NDArray:
@@ -293,7 +291,6 @@ class Biped:
             phase=phase,
             stiffness=stiffness.copy(),
             equilibrium=drive / stiffness,
-            passive_torque=-self._passive_damping * m.velocity,
             work=self._simulation.work,
             com_reference=self._task.planned_com(m, self._legs.phase),
             active=running.copy(),

@@ -79,8 +79,6 @@ class Tick:
     """(N, side, joint) K held in the window [N m/rad]."""
     equilibrium: NDArray
     """(N, side, joint) rest angle theta_eq held in the window, feed-forward torque included as torque / K [rad]."""
-    passive_torque: NDArray
-    """(N, side, joint) torque of the joint damping at the window's end [N m]."""
     work: WindowWork
     """Torque, work and energy over the window's physics steps."""
     com_reference: NDArray

@@ -32,7 +32,7 @@ from .stiffness_responses import (
     LEAST_MOVEMENT,
     LINKS,
     LINKS_HEAD,
-    SPEED,
+    MANY_STRIDES_SPEED,
     TORQUE,
     VELOCITY,
     Key,
@@ -47,18 +47,26 @@ from .study import Answer, OnProgress, Study
 SECTION, FIGURE = "INFLUENCE", "influence.png"
 BODIES = {"1.55 m, 50 kg": (1.55, 50.0), "1.90 m, 95 kg": (1.90, 95.0)}
 """Height [m] and mass [kg] of other bodies; their speed is Froude-equal to the policy's own."""
-CONDITIONS = ("as it is", "opposite change", "level ground", "θ_eq by phase", "θ_eq neutral", *BODIES, "pretrained")
+INFLUENCE_CONDITIONS = (
+    "as it is",
+    "opposite change",
+    "level ground",
+    "θ_eq by phase",
+    "θ_eq neutral",
+    *BODIES,
+    "pretrained",
+)
 """Under which stiffness is changed."""
 
 
 def walk_under(condition: str, policy: str, change: float, unevenness: float, seed: int = 0) -> tuple[Any, Any, float]:
-    """Policy, settings and change of K of one of `CONDITIONS`, from those of the first one.
+    """Policy, settings and change of K of one of `INFLUENCE_CONDITIONS`, from those of the first one.
 
     A baseline decides at 100 Hz, as the body is controlled; at 50 Hz a level walk falls in step with the decisions, in
     one of two strides.
     """
-    if condition not in CONDITIONS:
-        raise SpringfootError(f"conditions must be of {', '.join(map(repr, CONDITIONS))}, got {condition!r}")
+    if condition not in INFLUENCE_CONDITIONS:
+        raise SpringfootError(f"conditions must be of {', '.join(map(repr, INFLUENCE_CONDITIONS))}, got {condition!r}")
     name = condition if condition == "pretrained" else policy
     given: dict[str, Any] = {"unevenness_m": 0.0 if condition == "level ground" else unevenness}
     if name.partition(":")[0] in BASELINES:
@@ -82,7 +90,7 @@ class Influence(Study):
     """Whose stiffness: any policy of evaluate.py."""
     change_percent: float = 10.0
     """Change of K [%]."""
-    conditions: tuple[str, ...] = CONDITIONS
+    conditions: tuple[str, ...] = INFLUENCE_CONDITIONS
     """Under which, all unless given; the first is told in full."""
     seeds: int = 16
     """Walks of each change, from other starts on other ground."""
@@ -95,7 +103,7 @@ class Influence(Study):
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {"seeds": 2, "strides": 4, "conditions": CONDITIONS[:1]}
+    QUICK: ClassVar[Mapping[str, Any]] = {"seeds": 2, "strides": 4, "conditions": INFLUENCE_CONDITIONS[:1]}
 
     def check(self) -> None:
         """Refuse what cannot be."""
@@ -131,10 +139,10 @@ class Influence(Study):
 def headline(study: Influence, responses: Mapping[str, Response]) -> str:
     """What moves the walk most, and how far the acceleration foretells it."""
     first = next(iter(responses.values()))
-    mean = first.mean[SPEED]
+    mean = first.mean[MANY_STRIDES_SPEED]
     most = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
     rest = np.nanmax(np.abs(np.delete(mean, most)))
-    effects = [f"{_cell(cell)}, {_number(first, SPEED, cell, '+.1f', 1e3)} mm/s" for cell in most]
+    effects = [f"{_cell(cell)}, {_number(first, MANY_STRIDES_SPEED, cell, '+.1f', 1e3)} mm/s" for cell in most]
     r, low, high, scrambled = first.links["∫Δa dt → Δspeed of many strides"]
     return (
         f"**{study.change_percent:+g} % of stiffness in one joint and phase of every stride, θ_eq kept, changes the "
@@ -196,7 +204,7 @@ def _chain(responses: Mapping[str, Response]) -> str:
                 number(VELOCITY, pattern="+.1f", unit=1e3),
                 several("one stride", "speed_m_s", ("1", "2", "many")),
                 several("every stride", "speed_m_s", ("1", "2")),
-                number(SPEED, pattern="+.1f", unit=1e3),
+                number(MANY_STRIDES_SPEED, pattern="+.1f", unit=1e3),
                 number(("every stride", "step_length_m", "many"), pattern="+.1f", unit=1e3),
                 several("every stride", "com_ahead_m", ("1", "2", "many"), "+.0f"),
                 several("every stride", "com_height_m", ("many",), "+.2f"),
@@ -207,7 +215,7 @@ def _chain(responses: Mapping[str, Response]) -> str:
 
 def _everywhere(responses: Mapping[str, Response]) -> str:
     rows = [
-        [_cell(cell), *(_number(own, SPEED, cell, "+.1f", 1e3) for own in responses.values())]
+        [_cell(cell), *(_number(own, MANY_STRIDES_SPEED, cell, "+.1f", 1e3) for own in responses.values())]
         for cell in range(len(CELLS))
     ]
     rows.append(["unchanged m/s", *(f"{own.speed:.3f}" for own in responses.values())])

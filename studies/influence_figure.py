@@ -10,11 +10,15 @@ from matplotlib.figure import Figure
 
 from springfoot.evaluation.gait_figure import MODEL, PEOPLE, PLAN, STYLE
 
-from .stiffness_responses import ACCELERATION, IMPULSE, SPEED, TORQUE, VELOCITY, Key, Response
+from .stiffness_responses import ACCELERATION, IMPULSE, MANY_STRIDES_SPEED, TORQUE, VELOCITY, Key, Response
 from .stiffness_steps import CELLS, PHASES, SPRINGS
 
 UP: Key = ("fixed state", "upward_m_s2", "")
-STRIDES = {"first stride": ("1", "#9cc5d3", 0.26), "second": ("2", "#4d97b0", 0.0), "many": ("many", MODEL, -0.26)}
+DRAWN_STRIDES = {
+    "first stride": ("1", "#9cc5d3", 0.26),
+    "second": ("2", "#4d97b0", 0.0),
+    "many": ("many", MODEL, -0.26),
+}
 """What is drawn of the speed: when, colour and place beside the cell's middle."""
 ROWS = -np.array([cell + 1.2 * joint for cell, (joint, _) in enumerate(CELLS)])
 """Place of each cell on the vertical axis, the joints apart."""
@@ -58,7 +62,7 @@ def _bars(ax: Axes, own: Response, key: Key, label: str, title: str, unit: float
 
 
 def _speeds(ax: Axes, own: Response) -> None:
-    for label, (when, color, shift) in STRIDES.items():
+    for label, (when, color, shift) in DRAWN_STRIDES.items():
         key: Key = ("every stride", "speed_m_s", when)
         ax.errorbar(
             1e3 * own.mean[key],
@@ -83,13 +87,13 @@ def _foretold(ax: Axes, responses: Mapping[str, Response]) -> None:
     for number, (_, own) in enumerate(others):
         ax.plot(
             1e3 * own.mean[IMPULSE],
-            1e3 * own.mean[SPEED],
+            1e3 * own.mean[MANY_STRIDES_SPEED],
             "o",
             ms=2.6,
             color=PEOPLE,
             label="" if number else "other conditions",
         )
-    x, y = 1e3 * first.mean[IMPULSE], 1e3 * first.mean[SPEED]
+    x, y = 1e3 * first.mean[IMPULSE], 1e3 * first.mean[MANY_STRIDES_SPEED]
     ax.plot(x, y, "o", ms=5, color=MODEL, label=name)
     for cell, (joint, phase) in enumerate(CELLS):
         if abs(y[cell]) >= 1e3 * LABELLED:

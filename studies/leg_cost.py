@@ -110,7 +110,7 @@ def _walk(settings, candidates, walks, seed, threads, ease=0.0) -> tuple[NDArray
         "load": np.stack([m.force[..., 1] for m in measured]),
         "pitch": np.stack([m.base[:, 2] for m in measured]),
         "angle": np.stack([m.angle for m in measured]),
-        "moment": np.stack([m.torque + tick.passive_torque for m, tick in zip(measured, ticks, strict=True)]),
+        "moment": np.stack([tick.work.torque for tick in ticks]),
         "force": np.stack([m.force.sum(2) for m in measured]),
     }
     return missing, record, biped

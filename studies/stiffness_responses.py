@@ -22,13 +22,13 @@ TORQUE: Key = ("fixed state", "torque_Nm", "")
 ACCELERATION: Key = ("fixed state", "forward_m_s2", "")
 IMPULSE: Key = ("fixed state", "forward_m_s", "")
 VELOCITY: Key = ("one stride", "velocity_m_s", "phase")
-SPEED: Key = ("every stride", "speed_m_s", "many")
+MANY_STRIDES_SPEED: Key = ("every stride", "speed_m_s", "many")
 LINKS: dict[str, tuple[Key, Key]] = {
     "Δτ → Δa": (TORQUE, ACCELERATION),
     "∫Δa dt → Δv as the phase ends": (IMPULSE, VELOCITY),
     "∫Δa dt → Δspeed of the first stride": (IMPULSE, ("every stride", "speed_m_s", "1")),
-    "∫Δa dt → Δspeed of many strides": (IMPULSE, SPEED),
-    "Δv as the phase ends → Δspeed of many strides": (VELOCITY, SPEED),
+    "∫Δa dt → Δspeed of many strides": (IMPULSE, MANY_STRIDES_SPEED),
+    "Δv as the phase ends → Δspeed of many strides": (VELOCITY, MANY_STRIDES_SPEED),
 }
 """What is held against what over the cells; a is the CoM's acceleration forward."""
 
@@ -56,12 +56,14 @@ class Response:
     @property
     def moved(self) -> NDArray:
         """(C,) whether the speed of many strides changes: its interval is off 0, and its mean by `LEAST_MOVEMENT`."""
-        return (self.interval[SPEED].prod(-1) > 0) & (np.abs(self.mean[SPEED]) >= LEAST_MOVEMENT)
+        return (self.interval[MANY_STRIDES_SPEED].prod(-1) > 0) & (
+            np.abs(self.mean[MANY_STRIDES_SPEED]) >= LEAST_MOVEMENT
+        )
 
     @property
     def foretold(self) -> NDArray:
         """(C,) whether that is so and the acceleration at the unchanged walk's states has the sign of it."""
-        return self.moved & (self.mean[IMPULSE] * self.mean[SPEED] > 0)
+        return self.moved & (self.mean[IMPULSE] * self.mean[MANY_STRIDES_SPEED] > 0)
 
 
 def response(walks: PairedWalks, change: float) -> Response:

@@ -25,9 +25,8 @@ from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, on_percent, sample
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import LOADING_END_PERCENT, PUSH_OFF_BEGIN_PERCENT
+from springfoot.gait.stiffness import SPRINGS
 
-SPRINGS = JOINTS[FEET]
-"""Ankle and toe."""
 _EDGES = (0.0, LOADING_END_PERCENT / 100, PLATEAUS[4], PUSH_OFF_BEGIN_PERCENT / 100, 0.5, TOE_OFF[0], 1.0)
 _NAMES = ("loading", "early mid-stance", "late mid-stance", "heel-off", "push-off", "swing")
 PHASES = dict(zip(_NAMES, pairwise(_EDGES), strict=True))

@@ -8,13 +8,13 @@ import pytest
 
 from springfoot.agents.files import csv_text
 from springfoot.gait import SpringfootError
-from springfoot.studies.influence import CONDITIONS, Influence, headline, tables, walk_under
+from springfoot.studies.influence import INFLUENCE_CONDITIONS, Influence, headline, tables, walk_under
 from springfoot.studies.influence_figure import save_influence_figure
 from springfoot.studies.stiffness_responses import (
     CSV_HEAD,
     IMPULSE,
     LINKS_HEAD,
-    SPEED,
+    MANY_STRIDES_SPEED,
     csv_rows,
     response,
 )
@@ -57,10 +57,10 @@ def test_the_opposite_sign_is_not_foretold():
 
 def test_intervals_hold_the_mean_and_narrow_with_the_noise():
     found = response(walks(), 0.1)
-    low, high = found.interval[SPEED].T
-    assert (low <= found.mean[SPEED]).all() and (found.mean[SPEED] <= high).all()
+    low, high = found.interval[MANY_STRIDES_SPEED].T
+    assert (low <= found.mean[MANY_STRIDES_SPEED]).all() and (found.mean[MANY_STRIDES_SPEED] <= high).all()
     assert 0 < (high - low).max() < 4e-4
-    assert found.mean[SPEED] == pytest.approx(2.0 * found.mean[IMPULSE], abs=2e-4)
+    assert found.mean[MANY_STRIDES_SPEED] == pytest.approx(2.0 * found.mean[IMPULSE], abs=2e-4)
 
 
 def test_a_walk_that_falls_is_counted_and_left_out_of_its_cell():
@@ -68,16 +68,16 @@ def test_a_walk_that_falls_is_counted_and_left_out_of_its_cell():
     fallen.movement[4, 1, 2] = np.nan
     found, whole = response(fallen, 0.1), response(walks(), 0.1)
     assert found.falls.sum() == found.falls[4, 1] == 1
-    assert found.mean[SPEED][4] == pytest.approx(whole.mean[SPEED][4], abs=1e-4)
+    assert found.mean[MANY_STRIDES_SPEED][4] == pytest.approx(whole.mean[MANY_STRIDES_SPEED][4], abs=1e-4)
     for cell in set(range(len(CELLS))) - {4}:
-        assert found.mean[SPEED][cell] == whole.mean[SPEED][cell]
+        assert found.mean[MANY_STRIDES_SPEED][cell] == whole.mean[MANY_STRIDES_SPEED][cell]
 
 
 def test_a_cell_in_which_all_fall_has_no_number(tmp_path):
     fallen = walks()
     fallen.movement[4] = np.nan
     found = {"as it is": response(fallen, 0.1)}
-    assert isnan(found["as it is"].mean[SPEED][4]) and isnan(found["as it is"].links[FORETOLD][0])
+    assert isnan(found["as it is"].mean[MANY_STRIDES_SPEED][4]) and isnan(found["as it is"].links[FORETOLD][0])
     assert "| ankle, push-off (50–62 %) | – |" in tables(Influence(), found)
     assert ",push-off,0.5,0.62,every stride,speed_m_s,many,,,,6,0\n" in csv_text(CSV_HEAD, csv_rows(found))
     save_influence_figure(tmp_path / "influence.png", found)
@@ -91,7 +91,7 @@ def test_where_nothing_changes_nothing_is_claimed():
 
 
 def test_conditions_change_what_they_say():
-    asked = {name: walk_under(name, "schedule", 0.1, 0.002) for name in CONDITIONS}
+    asked = {name: walk_under(name, "schedule", 0.1, 0.002) for name in INFLUENCE_CONDITIONS}
     assert {name for name, (_, _, change) in asked.items() if change != 0.1} == {"opposite change"}
     assert asked["opposite change"][2] == -0.1
     settings = {name: own for name, (_, own, _) in asked.items()}
