@@ -69,8 +69,8 @@ def best_constant(
 
 
 @dataclass(frozen=True, kw_only=True)
-class BestConstant(WalkingStudy):
-    """Find the constant ankle and toe stiffness with the highest mean return."""
+class _Search(WalkingStudy):
+    """Candidates that all walk the same episodes, in the environment and by the reward of a policy."""
 
     policy: str = "pretrained"
     """In whose environment and reward: any policy of evaluate.py; untrained for the defaults."""
@@ -84,6 +84,15 @@ class BestConstant(WalkingStudy):
     UNIT: ClassVar[str] = " tries"
     QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 1.0}
 
+    def settings(self) -> BipedSettings:
+        """In which they walk."""
+        return prepare(self.policy, pushed(self.seconds, self.environment))[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestConstant(_Search):
+    """Find the constant ankle and toe stiffness with the highest mean return."""
+
     @property
     def total(self) -> float:
         """Candidates."""
@@ -91,8 +100,7 @@ class BestConstant(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Search."""
-        _, settings = prepare(self.policy, pushed(self.seconds, self.environment))
-        (ankle, toe), tried = best_constant(settings, **self.how, progress=progress)
+        (ankle, toe), tried = best_constant(self.settings(), **self.how, progress=progress)
         returns = tried[ankle, toe]
         low, high = mean_interval(returns)
         text = (
@@ -107,20 +115,8 @@ class BestConstant(WalkingStudy):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BestFactor(WalkingStudy):
+class BestFactor(_Search):
     """Find the factor on the tuned schedule with the highest mean return."""
-
-    policy: str = "pretrained"
-    """In whose environment and reward: any policy of evaluate.py; untrained for the defaults."""
-    episodes: int = 16
-    """Episodes of each candidate."""
-    seed: int = SEARCH_SEED
-    """Of every candidate's first episode; keep it apart from that of the comparison."""
-    environment: tyro.conf.OmitArgPrefixes[PushedFlags]  # type: ignore[valid-type]
-    """What to walk in."""
-
-    UNIT: ClassVar[str] = " tries"
-    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 1.0}
 
     @property
     def total(self) -> float:
@@ -129,8 +125,7 @@ class BestFactor(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Search."""
-        _, settings = prepare(self.policy, pushed(self.seconds, self.environment))
-        settings = replace(settings, action_mode="absolute")
+        settings = replace(self.settings(), action_mode="absolute")
         tried: dict[float, NDArray] = {}
         for factor in FACTORS:
             policy = schedule(settings, factor)
