@@ -1,4 +1,4 @@
-"""Training to time: our recipe and the design study's, end to end; and what planning adds to it."""
+"""Training to time: our recipe and that of the first throw-away study, end to end; and what planning adds to it."""
 
 from dataclasses import replace
 from functools import partial

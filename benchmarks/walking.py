@@ -22,7 +22,7 @@ SEED = 0
 STEP = WINDOWS_PER_STEP * CONTROL_WINDOW
 """Simulated time of one environment step [s]."""
 STUDY_TIMESTEP = 0.001
-"""Physics step of the design study [s]; integrator, solver and cone as ours, flags as MuJoCo's default."""
+"""Physics step of the first throw-away study [s]; integrator, solver and cone as ours, flags as MuJoCo's default."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from springfoot.gait.errors import SpringfootError
 
-from .control.decisions import Decisions
+from .control.decisions import DecisionTimes
 from .control.equilibrium import foot_curves
 from .control.foot_springs import FootSprings, draw_delay
 from .control.leg_constants import LegConstants, SlopeConstants, slope_constants
@@ -84,7 +84,7 @@ class Biped:
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, incline)
-        self._decisions = Decisions(settings, self.human, num_envs)
+        self._decisions = DecisionTimes(settings, self.human, num_envs)
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
@@ -272,10 +272,10 @@ class Biped:
         legs, m, control = self._legs, self._now, self._simulation.control
         phase = None if self.on_tick is None else legs.phase.copy()
         self._springs.move_equilibrium(rests, m.angle, control, walking)
-        legs.command(m, control)
+        legs.drive(m, control)
         if self._standing is not None:
             standing = running & ~walking
-            self._standing.command(m, standing, control)
+            self._standing.drive(m, standing, control)
             self._springs.hold(control, m.angle, standing)
         advance = self._simulation.advance_watched if self.on_tick else self._simulation.advance
         self._now = advance(ids)

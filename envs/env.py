@@ -175,7 +175,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | `push_seconds`            | `0.1`           | duration of each push [s]                                          |
     | `push_interval`           | `4.0`           | one push at a random time in each interval [s]                     |
     | `sensor_noise`            | `0.0`           | SD of noise on what is measured of the observation                 |
-    | `stiffness_delay_s`       | `0.0`           | a commanded stiffness acts this much later [s]                     |
+    | `stiffness_delay_s`       | `0.0`           | a new stiffness acts this much later [s]                           |
     | `stiffness_delay_range_s` | `None`          | delays drawn at each reset [s], in place of it                     |
     | **reward**                |                 |                                                                    |
     | `reward_weights`          | `{}`            | weights that differ from the table above                           |

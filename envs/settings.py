@@ -150,7 +150,7 @@ class BipedSettings:
     """Standard deviation of Gaussian noise, new at every step, on all that is measured of the observation, in its own
     dimensionless units [0..0.1]: 0.01 is 0.6 deg, 9 mm of hip height, 2 deg/s, and 1 % of body weight."""
     stiffness_delay_s: float = field(default=0.0, metadata=_DISTURBANCE)
-    """A commanded ankle or toe stiffness acts this much later (pure delay) [0..0.04 s, in steps of 0.01 s]."""
+    """A new ankle or toe stiffness acts this much later (pure delay) [0..0.04 s, in steps of 0.01 s]."""
     stiffness_delay_range_s: tuple[float, float] | None = field(default=None, metadata=_DISTURBANCE | _DRAWN)
     """Delays drawn at each reset in place of `stiffness_delay_s`, evenly from the steps of 0.01 s [s]."""
     reward_weights: dict[str, float] = field(default_factory=dict, metadata=_REWARD)

@@ -125,12 +125,14 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[PolicyFunc
     return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
 
 
-def load_recording(path: Path) -> Recording:
-    """The recording in a `strides.npz`; raises `SpringfootError` for any other file."""
+def load_recording(path: str | Path) -> Recording:
+    """The recording in a `strides.npz`; raises `SpringfootError` for any other file, and for one of another version."""
     try:
-        with path.open("rb") as opened, np.load(opened) as file:
+        with Path(path).open("rb") as opened, np.load(opened) as file:
             arrays = dict(file)
         header: dict[str, Any] = json.loads(str(arrays.pop("header")))
+        if missing := [name for name in ("plan_zmp", *SERIES) if name not in arrays]:
+            raise SpringfootError(f"it has no {missing[0]}: another version of springfoot wrote it; evaluate again")
         series = {name: arrays.pop(name) for name in SERIES}
         settings = settings_from(**header["settings"])
         return Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)

@@ -138,7 +138,7 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
     """
     require_within("speed", speed, SPEED_RANGE, "m/s")
     require_within("height", height, HEIGHT_RANGE, "m")
-    table = _harmonics()
+    table = harmonics()
     length_ratio = height / table["height_m"]
     conditions = table["conditions"]
     speeds = np.array([condition["speed_m_s"] for condition in conditions])
@@ -177,12 +177,12 @@ def human_cop(stance_share: ArrayLike) -> NDArray:
     begins and ends was not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
     share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
-    coefficients = np.array(_harmonics()["cop"]["coefficients"])
+    coefficients = np.array(harmonics()["cop"]["coefficients"])
     return share[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
 @cache
-def _harmonics() -> dict:
+def harmonics() -> dict:
     """The fitted series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
     text = resources.files("springfoot.gait").joinpath("human_harmonics.json").read_text(encoding="utf-8")
     table = json.loads(text)

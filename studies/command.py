@@ -40,6 +40,10 @@ STUDIES = {
 """Name of each study on the command line -> its class, imported when it is asked, and its question."""
 
 
+LEARNERS = ("cma", "stable_baselines3", "tensorboard", "torch")
+"""Packages that the extra `train` has and `evaluate` has not."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `springfoot`; returns the exit code, 2 for bad input and for a package that is not installed.
 
@@ -66,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith("springfoot"):
             raise
-        extra = "evaluate" if words[0] == "evaluate" else "train"
+        extra = "train" if words[0] == "train" or error.name in LEARNERS else "evaluate"
         print(
             f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
             file=sys.stderr,

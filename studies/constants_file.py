@@ -1,14 +1,15 @@
 """The file of constants that searches begin with and write to: `envs/control/legs.json`."""
 
 import json
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from springfoot.agents.files import write_atomically
 from springfoot.gait.errors import SpringfootError
 
-CONSTANTS = Path("envs/control/legs.json")
-"""Of the repository."""
+CONSTANTS = Path(str(resources.files("springfoot.envs.control") / "legs.json"))
+"""The package's own: in a clone, what is committed."""
 
 
 def read_constants(path: Path) -> dict[str, Any]:

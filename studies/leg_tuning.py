@@ -94,6 +94,7 @@ class LegTuning(Study):
     """File of constants to read and to write."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2}
+    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:
@@ -110,14 +111,14 @@ class LegTuning(Study):
     def ask(self, progress: OnProgress) -> Answer:
         """Search.
 
-        Raises `SpringfootError`, with nothing written, for constants to start from that are not in the file, and
-        another kind of file.
+        Raises `SpringfootError`, with nothing written, for a file of another kind, and for constants to start from that
+        are not in it.
         """
         name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward)
         known = read_constants(self.constants)["constants"]
         if (start := self.start or name) not in known:
             raise SpringfootError(
-                f"no constants {start!r} to start from in {self.constants}; --start: {', '.join(known)}"
+                f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
             )
         search = Search(constants_from(known[start]))
         settings = BipedSettings(

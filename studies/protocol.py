@@ -34,10 +34,10 @@ class Protocol:
         metrics = {}
         for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
             wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})
-            walker, settings = prepare(policy, wanted, self.seed)
+            acting, settings = prepare(policy, wanted, self.seed)
             names = ("episodes", "seed", "threads", "progress")
             how: dict[str, Any] = {name: getattr(self, name) for name in names} | {"legs": legs}
-            metrics[condition] = measure(record(walker, settings, name=policy, **how)).metrics
+            metrics[condition] = measure(record(acting, settings, name=policy, **how)).metrics
         return metrics
 
     @property

@@ -29,8 +29,8 @@ from .open_loop import FROZEN, frozen
 BOUNDS = (*PLATEAUS, 1.0)
 """Phases: the plateaus of the fixed schedule, on which its K is constant, and the ramps between them."""
 DECISIONS = "100hz"
-"""When K of what follows the phase alone is decided: as often as theta_eq moves. Held for longer, K is that of an
-earlier phase, by more or less as the foot landed, and so no function of the phase where it ramps."""
+"""When a baseline or a copy, whose K follows the phase alone, decides: as often as theta_eq moves. K that is held for
+longer belongs to an earlier phase, by more or less in each step; where it ramps it is then no function of phase."""
 LOADED = 0.1
 """A joint carries load in a phase if its mean torque there is beyond this share of the largest of its mean course."""
 LAST_SECOND = 1.0
@@ -46,7 +46,10 @@ REFLEX_DELAY = 0.02
 def prepare_pushed(
     name: str, given: dict[str, Any], seed: int = 0, threads: int = 2
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """As `recording.prepare`, `frozen:POLICY` too; what follows the phase alone decides at `DECISIONS` unless given."""
+    """As `recording.prepare`, and `frozen:POLICY` too.
+
+    Baselines and copies decide at `DECISIONS` unless `given` says otherwise: their K follows the phase alone.
+    """
     kind, _, other = name.partition(":")
     if kind == FROZEN and not other:
         raise SpringfootError(f"{FROZEN} is the copy of a policy, as in {FROZEN}:pretrained, got {name!r}")

@@ -1,4 +1,4 @@
-"""Do seeds agree? The springs of several policies over the stride, and which limits of a human-like walk each misses.
+"""Do seeds agree? The springs of several policies over the stride, and which criteria of a human-like walk each misses.
 
     springfoot study agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --page docs/results.md
 
@@ -131,28 +131,28 @@ def _stretches(mask: NDArray) -> str:
 
 
 def limits_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str:
-    """Markdown: every limit and its number in each evaluation; in bold what is missed even when loosened.
+    """Markdown: every criterion and its number in each evaluation; in bold what is missed even when loosened.
 
-    A number in brackets meets the loosened limit alone. The last row counts.
+    A number in brackets meets the loosened criterion alone. The last row counts.
     """
     measured = [numbers(each) for each in metrics]
     lines, missed = [], [0] * len(measured)
-    for limit in HUMAN_LIKE:
+    for criterion in HUMAN_LIKE:
         cells = []
         for column, values in enumerate(measured):
-            state = _state(limit, values)
+            state = _state(criterion, values)
             missed[column] += state == "**"
-            cells.append({"": "{}", "(": "({})", "**": "**{}**"}[state].format(number_text(limit, values)))
-        loose = limit.loosened()
-        lines.append([limit.name, limit.text, loose.text if loose != limit else "", *cells])
+            cells.append({"": "{}", "(": "({})", "**": "**{}**"}[state].format(number_text(criterion, values)))
+        loose = criterion.loosened()
+        lines.append([criterion.name, criterion.text, loose.text if loose != criterion else "", *cells])
     lines.append(["missed", "", "", *map(str, missed)])
     return table(["", "limit", "loosened", *(f"`{name}`" for name in names)], lines)
 
 
-def _state(limit: Criterion, values: dict[str, Any]) -> str:
-    if limit.holds(values):
+def _state(criterion: Criterion, values: dict[str, Any]) -> str:
+    if criterion.holds(values):
         return ""
-    return "(" if limit.loosened().holds(values) else "**"
+    return "(" if criterion.loosened().holds(values) else "**"
 
 
 def curves_csv(found: Sequence[Agreement]) -> str:
@@ -223,7 +223,7 @@ class SeedAgreement(WalkingStudy):
             [
                 agreement_table(found),
                 limits_table(labels, [gait.metrics for gait in gaits]),
-                f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened limit alone; "
+                f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened criterion alone; "
                 "**bold**: missed.",
             ]
         )

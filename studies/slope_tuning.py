@@ -126,6 +126,7 @@ class SlopeTuning(Study):
     """File of constants to begin with and to write."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4, "walks": 1, "seconds": 3.0}
+    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:
@@ -181,7 +182,7 @@ class SlopeTuning(Study):
         write_constants(self.constants, table)
 
     def _judge(self, constants: SlopeConstants) -> tuple[float, str]:
-        """What walks from starts that the search does not know pay, and how they go."""
+        """What these constants pay on walks whose starts the search did not use, and how those walks go."""
         walks, seconds = (1, 3.0) if self.quick else (JUDGED_WALKS, JUDGED_SECONDS)
         seed = self.seed + 1_000_000
         level = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()

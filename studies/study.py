@@ -51,6 +51,8 @@ class Study:
 
     QUICK: ClassVar[Mapping[str, Any]] = {}
     """Name of a flag -> its value with `--quick`."""
+    PAGED: ClassVar[bool] = True
+    """Whether it has a section for a page."""
     UNIT: ClassVar[str] = "s"
     """What its progress counts."""
 
@@ -81,7 +83,9 @@ class Study:
         study.check()
         out = study.out or next_free(Path("runs"), name)
         if out.exists():
-            raise SpringfootError(f"{out} exists already; give --out a new folder")
+            raise SpringfootError(f"{out} exists already: out must be a new folder")
+        if study.page is not None and not study.PAGED:
+            raise SpringfootError(f"page: {name} has no section to write")
         if study.page is not None and not study.page.parent.is_dir():
             raise SpringfootError(f"there is no folder {study.page.parent} for the page {study.page.name}")
         with tqdm(

@@ -118,7 +118,7 @@ def as_planned(plan: WalkPlan) -> DrawnWalk:
 
 
 def of_people(speed: float, body: Body) -> DrawnWalk:
-    """People's mean walk: CoM from their forces integrated twice, feet from their angles under a hip that moves so."""
+    """People's mean walk: CoM from their forces, integrated twice; feet from their angles below the hip."""
     human = human_gait(speed, body.height)
     n = 1000
     phase = np.arange(n) / n

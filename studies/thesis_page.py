@@ -13,7 +13,7 @@ import numpy as np
 
 from springfoot.agents.files import write_atomically
 from springfoot.agents.markdown import table
-from springfoot.gait import thesis_schedule
+from springfoot.gait import SpringfootError, thesis_schedule
 from springfoot.gait.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
 
 from .study import Answer, OnProgress, Study
@@ -28,6 +28,10 @@ PRINTED_TIMES = np.linspace(0.5, 1.25, 7501)
 def walks() -> tuple[DrawnWalk, DrawnWalk, DrawnWalk]:
     """The three columns of every figure."""
     return as_printed(ThesisWalk()), as_planned(corrected()), of_people(THESIS_SPEED, BODY)
+
+
+TITLE = "# The thesis: as printed, corrected, and people"
+"""First line of the page."""
 
 
 def page() -> str:
@@ -45,7 +49,7 @@ def _filled(paragraph: str) -> str:
 
 def _head() -> str:
     plan = corrected()
-    return f"""# The thesis: as printed, corrected, and people
+    return f"""{TITLE}
 
 D. W. Nam, *Numerical analysis of ZMP based biped walking model with different stiffness of ankle and toe joint*, DGIST
 2016. **As printed** is `springfoot.gait.thesis`: its via-points and formulas, faults included; names that its program
@@ -185,6 +189,13 @@ class Thesis(Study):
         drawn, text = walks(), page()
         files = {f"thesis/figure-{number}.png": partial(save_figure, number, drawn) for number in FIGURES}
         return Answer(text=text, files={"thesis.md": text} | files)
+
+    def check(self) -> None:
+        """Refuse to write over a page of something else."""
+        if self.page is not None and self.page.is_file():
+            first = self.page.read_text(encoding="utf-8", errors="replace").partition("\n")[0]
+            if first != TITLE:
+                raise SpringfootError(f"{self.page} is another page: this study writes a whole one, titled {TITLE!r}")
 
     def write_page(self, page: Path, answer: Answer) -> None:
         """Write the whole page."""

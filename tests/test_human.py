@@ -43,13 +43,13 @@ def test_curves_match_the_measured_ones(condition):
 
 @needs_data
 def test_committed_series_are_what_the_command_makes():
-    from springfoot.gait.human import _harmonics
+    from springfoot.gait.human import harmonics
 
     fitted = fit_human.fit(REFERENCE)
     for kind in ("mean", "sd"):
         for name, rows in fitted[kind].items():
             array = np.array(rows)
-            committed = _harmonics()[kind][name]
+            committed = harmonics()[kind][name]
             expected = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
             np.testing.assert_allclose(committed, expected, atol=2e-7)
 

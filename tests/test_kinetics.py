@@ -173,10 +173,10 @@ def test_peoples_measured_curves_give_their_measured_ankle_moment():
 @needs_data
 def test_committed_cop_is_what_the_command_makes_and_close_to_the_measured_one():
     from springfoot.gait import fit_human
-    from springfoot.gait.human import _harmonics
+    from springfoot.gait.human import harmonics
 
     fitted = fit_human.fit(REFERENCE)["cop"]["coefficients"]
-    np.testing.assert_allclose(_harmonics()["cop"]["coefficients"], fitted, atol=2e-6)
+    np.testing.assert_allclose(harmonics()["cop"]["coefficients"], fitted, atol=2e-6)
     with (REFERENCE / "human_cop.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["cop_forward_from_ankle_m"]]
     measured = np.array([float(row["cop_forward_from_ankle_m"]) for row in rows])

@@ -56,7 +56,7 @@ def test_quick_takes_its_own_counts_and_says_that_figures_mean_nothing(tmp_path,
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
-        ({"out": "old"}, "old exists already; give --out a new folder"),
+        ({"out": "old"}, "old exists already: out must be a new folder"),
         ({"page": "none/page.md"}, "no folder .*none for the page page.md"),
         ({"episodes": 0}, "episodes must be"),
         ({"seconds": 0.0}, "seconds must be"),

@@ -275,7 +275,7 @@ def test_nothing_jumps_as_the_speed_changes():
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         legs.follow()
         springs.move_equilibrium(phase, m.angle, control)
-        legs.command(m, control)
+        legs.drive(m, control)
         equilibrium = 100 * springs.equilibrium
         plan = 100 * task.tracking(m, phase)
         rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))

@@ -20,7 +20,7 @@ def gait_events(human: HumanGait) -> NDArray:
     return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], human.toe_off])
 
 
-class Decisions:
+class DecisionTimes:
     """Decides which actions of N bodies take effect in a step.
 
     With `decisions="event"` events are read from the leg's phase. A touchdown sets the phase to 0, so the heel strike

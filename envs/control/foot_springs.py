@@ -45,7 +45,7 @@ def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDAr
 
 
 def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
-    """Control windows from the command of a stiffness until it acts, in one episode; drawn if the settings say so."""
+    """Control windows from the request of a stiffness until it acts, in one episode; drawn if the settings say so."""
     if settings.stiffness_delay_range_s is None:
         return round(settings.stiffness_delay_s / CONTROL_WINDOW)
     shortest, longest = (round(delay / CONTROL_WINDOW) for delay in settings.stiffness_delay_range_s)
@@ -60,7 +60,7 @@ class FootSprings:
         body: the body that the tables are for.
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
-        subjects: bodies and commanded speeds.
+        subjects: bodies and requested speeds.
         incline: what a slope adds to the equilibrium (`envs.control.leg_controller.slope_table`).
     """
 
@@ -92,15 +92,15 @@ class FootSprings:
         self._fresh = np.ones(num, bool)
         self._everyone = np.ones(num, bool)
         self._delay = np.zeros(num, int)
-        self._commands = np.zeros(
+        self._requests = np.zeros(
             (num, 1 + round(LONGEST_DELAY / CONTROL_WINDOW), 2, 2)
         )  # in the last windows, newest first
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
         """Begin an episode of springs `ids` (K,).
 
-        Their next change does no work and acts at once, as if it had been commanded long before. Later changes act
-        `delay` (K,) control windows after their command.
+        Their next change does no work and acts at once, as if it had been requested long before. Later changes act
+        `delay` (K,) control windows after their request.
         """
         self._fresh[ids] = True
         self._delay[ids] = delay
@@ -117,7 +117,7 @@ class FootSprings:
         running: NDArray | None = None,
         scheduled: NDArray | None = None,
     ) -> None:
-        """Command new stiffness by an action (N, 4), to act after the delay.
+        """Request new stiffness by an action (N, 4), to act after the delay.
 
         Changing K to K' under a deflection x puts 1/2 (K' - K) x^2 into the spring; x is that of the joint angles
         `angle` (N, side, joint) [rad]. Springs of bodies not `running` (N,) do not change (None: all are running);
@@ -136,7 +136,7 @@ class FootSprings:
             middle = np.where(fixed, self._schedule.at(leg_phase, self._subjects.place), middle)
             factor = np.where(fixed, 1.0, factor)
         running = self._everyone if running is None else running
-        state = self._fresh, running, self._delay, self._commands, self.stiffness
+        state = self._fresh, running, self._delay, self._requests, self.stiffness
         works = self.work_stiffness, self.work_equilibrium
         _stiffen(middle, factor, self._subjects.scale, angle, self.equilibrium, *state, *works)
 
@@ -152,7 +152,7 @@ class FootSprings:
         if self._follows and self._subjects.slope.any():
             equilibrium[..., 0] += self._subjects.slope[:, None] * self._incline.at(leg_phase)[..., ANKLE]
         running = self._everyone if running is None else running
-        state = self._fresh, running, self._delay, self._commands, self.stiffness, self.equilibrium
+        state = self._fresh, running, self._delay, self._requests, self.stiffness, self.equilibrium
         _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)
 
     def hold(self, control: NDArray, angle: NDArray, held: NDArray) -> None:
@@ -161,7 +161,7 @@ class FootSprings:
         They act without delay, and the work of both changes is counted as above.
         """
         works = self.work_stiffness, self.work_equilibrium
-        _hold(control, angle, held, self._fresh, self._commands, self.stiffness, self.equilibrium, *works)
+        _hold(control, angle, held, self._fresh, self._requests, self.stiffness, self.equilibrium, *works)
 
 
 @kernel
@@ -174,7 +174,7 @@ def _stiffen(
     fresh,
     running,
     delay,
-    commands,
+    requests,
     stiffness,
     work_stiffness,
     work_equilibrium,
@@ -187,9 +187,9 @@ def _stiffen(
                     before = stiffness[i, side, joint]
                     after = middle[i, side, joint] * scale[i].torque * factor[i, side, joint]
                     deflection = equilibrium[i, side, joint] - angle[i, side, ANKLE + joint]
-                    commands[i, 0, side, joint] = after
+                    requests[i, 0, side, joint] = after
                     if fresh[i]:
-                        commands[i, :, side, joint] = after
+                        requests[i, :, side, joint] = after
                     if fresh[i] or delay[i] == 0:
                         stiffness[i, side, joint] = after
                     if not fresh[i] and delay[i] == 0:
@@ -198,11 +198,11 @@ def _stiffen(
 
 @kernel
 def _move(
-    wanted, angle, fresh, running, delay, commands, stiffness, equilibrium, work_stiffness, work_equilibrium, control
+    wanted, angle, fresh, running, delay, requests, stiffness, equilibrium, work_stiffness, work_equilibrium, control
 ):
     for i in range(len(equilibrium)):
         if running[i] and delay[i] > 0:
-            _arrive(delay[i], angle[i], equilibrium[i], commands[i], stiffness[i], work_stiffness[i])
+            _arrive(delay[i], angle[i], equilibrium[i], requests[i], stiffness[i], work_stiffness[i])
         for side in range(2):
             for joint in range(2):
                 k, theta = stiffness[i, side, joint], angle[i, side, ANKLE + joint]
@@ -217,20 +217,20 @@ def _move(
 
 
 @kernel
-def _arrive(delay, angle, equilibrium, commands, stiffness, work):
-    """Let the command of `delay` windows ago act, and shift the past commands by one window."""
+def _arrive(delay, angle, equilibrium, requests, stiffness, work):
+    """Let the request of `delay` windows ago act, and shift the past requests by one window."""
     for side in range(2):
         for joint in range(2):
-            before, after = stiffness[side, joint], commands[delay, side, joint]
+            before, after = stiffness[side, joint], requests[delay, side, joint]
             deflection = equilibrium[side, joint] - angle[side, ANKLE + joint]
             stiffness[side, joint] = after
             work[side, joint] += 0.5 * (after - before) * deflection**2
-            for past in range(len(commands) - 1, 0, -1):
-                commands[past, side, joint] = commands[past - 1, side, joint]
+            for past in range(len(requests) - 1, 0, -1):
+                requests[past, side, joint] = requests[past - 1, side, joint]
 
 
 @kernel
-def _hold(control, angle, held, fresh, commands, stiffness, equilibrium, work_stiffness, work_equilibrium):
+def _hold(control, angle, held, fresh, requests, stiffness, equilibrium, work_stiffness, work_equilibrium):
     for i in range(len(held)):
         if not held[i]:
             continue
@@ -240,7 +240,7 @@ def _hold(control, angle, held, fresh, commands, stiffness, equilibrium, work_st
                 theta, before = angle[i, side, ANKLE + joint], stiffness[i, side, joint]
                 old, new = equilibrium[i, side, joint] - theta, drive / k - theta
                 stiffness[i, side, joint], equilibrium[i, side, joint] = k, drive / k
-                commands[i, :, side, joint] = k
+                requests[i, :, side, joint] = k
                 if not fresh[i]:
                     work_stiffness[i, side, joint] += 0.5 * (k - before) * old * old
                     work_equilibrium[i, side, joint] += 0.5 * k * (new * new - old * old)

@@ -82,13 +82,13 @@ class LegController:
         """
         _advance(self._gains, self._subjects.speed, m.com_velocity, m.force, running, self.phase)
 
-    def command(self, m: Measurement, control: NDArray) -> None:
+    def drive(self, m: Measurement, control: NDArray) -> None:
         """Put stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] of hips and knees into `control`,
         which is (N, side, joint, 2)."""
         subjects = self._subjects
         curves = self._table.at(self.phase, subjects.place)
         state = m.base, m.base_velocity, m.com_velocity
-        _command(self._gains, subjects.speed, subjects.scale, curves, *state, control)
+        _drive(self._gains, subjects.speed, subjects.scale, curves, *state, control)
         if subjects.slope.any():
             _incline(subjects.slope, self._gains, curves, self._incline.at(self.phase), control)
 
@@ -177,7 +177,7 @@ def _load(force):
 
 
 @kernel
-def _command(gains, speed, scale, curves, base, base_velocity, com_velocity, control):
+def _drive(gains, speed, scale, curves, base, base_velocity, com_velocity, control):
     for i in range(len(gains)):
         gain = gains[i]
         too_fast = com_velocity[i, 0] - speed[i]

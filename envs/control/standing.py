@@ -28,7 +28,7 @@ from ..settings import BipedSettings, body_of
 from ..timing import CONTROL_WINDOW
 from .subjects import Subjects
 
-STIFFNESS = (1200.0, 800.0, 350.0, 60.0)
+STANDING_STIFFNESS = (1200.0, 800.0, 350.0, 60.0)
 """Stiffness of hip, knee, ankle and toe [N m/rad]: two ankles must outdo gravity, body weight x CoM height (600)."""
 BALANCE = 2.0
 """Plantarflexion of the ankles' rest angle for each metre the CoM is ahead of its place [rad/m]."""
@@ -95,7 +95,7 @@ class Standing:
         self._stop_at = inf if settings.stop_at is None else settings.stop_at
         self._subjects = subjects
         self._held = np.zeros(len(subjects.place), HELD)
-        self._gains = np.array([(STIFFNESS, BALANCE, TRUNK_STIFFNESS, TRUNK_DAMPING)], GAINS)[0]
+        self._gains = np.array([(STANDING_STIFFNESS, BALANCE, TRUNK_STIFFNESS, TRUNK_DAMPING)], GAINS)[0]
 
     @property
     def mode(self) -> NDArray:
@@ -156,10 +156,10 @@ class Standing:
         held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]
         held["place"][ids] = STOP_COM * held["length"][ids]
 
-    def command(self, m: Measurement, standing: NDArray, control: NDArray) -> None:
+    def drive(self, m: Measurement, standing: NDArray, control: NDArray) -> None:
         """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into `control`."""
         _draw(self._gains, standing, m.ankle, m.force, self._held)
-        _command(self._gains, standing, m.base, m.base_velocity, m.com, m.ankle, self._held, control)
+        _drive(self._gains, standing, m.base, m.base_velocity, m.com, m.ankle, self._held, control)
 
 
 def steady_walk(settings: BipedSettings) -> tuple[float, float]:
@@ -227,7 +227,7 @@ def _switch(running, time, stop_at, com_velocity, speed, target, leg_phase, held
 
 
 @kernel
-def _command(gains, standing, base, base_velocity, com, ankle, held, control):
+def _drive(gains, standing, base, base_velocity, com, ankle, held, control):
     for i in range(len(held)):
         if not standing[i]:
             continue
