@@ -20,8 +20,8 @@ Each takes --help."""
 
 STUDIES = {
     "compare": ("comparison.Compare", "Does a policy walk better than every baseline?"),
-    "best-factor": ("constant_search.BestFactor", "Which factor on the tuned schedule earns most?"),
     "best-constant": ("constant_search.BestConstant", "Which constant stiffness earns most?"),
+    "best-factor": ("constant_search.BestFactor", "Which factor on the tuned schedule earns most?"),
     "seeds": ("seeds.Seeds", "How far apart are several policies, as one training from several seeds?"),
     "bodies": ("body_sweep.Bodies", "Does a policy walk with any body at any speed?"),
     "criteria": ("criteria_met.CriteriaMet", "Which criteria of a human-like walk does a policy meet?"),
