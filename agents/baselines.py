@@ -72,13 +72,16 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
         stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
         return _follow(factor * stiffness[None], speeds[:1], settings, body)
     time_scale = sqrt(body.length_scale)
-    tuned = [leg_constants(settings.equilibrium, settings.cadence, speed / time_scale) for speed in speeds]
+    tuned = [
+        leg_constants(settings.equilibrium, settings.cadence, speed / time_scale, settings.feedforward)
+        for speed in speeds
+    ]
     stiffness = np.stack([fixed_stiffness(constants, body) for constants in tuned])
     return _follow(factor * stiffness, speeds, settings, body)
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
-    """People's ankle quasi-stiffness over the stride, as measured (K_ref), and `TOE_STIFFNESS`: nothing is tuned."""
+    """People's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and `TOE_STIFFNESS`, as K."""
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)
     stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale

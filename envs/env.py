@@ -26,7 +26,7 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     ## Description
     Trunk, thighs, shanks, feet and toes of a person of given height and mass. Hips and knees follow a phase controller
     with human-like curves; ankles and toes are springs, torque = K (equilibrium - angle - beta x angular rate). The
-    policy sets K and nothing else, 50 times a second (see `decisions`). The equilibrium follows the plan (see
+    policy sets K and nothing else, 50 times a second (see `decisions`). The equilibrium follows people's ankle (see
     `equilibrium`).
 
     ## Action space
@@ -86,8 +86,8 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | 35  | last_action_toe_left    | 1           | -1   | 1   | action of the step before                 |
     | 36  | last_action_ankle_right | 1           | -1   | 1   | action of the step before                 |
     | 37  | last_action_toe_right   | 1           | -1   | 1   | action of the step before                 |
-    | 38  | planned_ankle_left      | rad         | -3.2 | 3.2 | plan, dorsiflexion positive               |
-    | 39  | planned_ankle_right     | rad         | -3.2 | 3.2 | plan, dorsiflexion positive               |
+    | 38  | planned_ankle_left      | rad         | -3.2 | 3.2 | people's ankle angle at the leg's phase    |
+    | 39  | planned_ankle_right     | rad         | -3.2 | 3.2 | people's ankle angle at the leg's phase    |
     | 40  | leading_leg             | 1           | -1   | 1   | stance that began last: +1 left, -1 right |
     | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
     | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |

@@ -99,8 +99,8 @@ class BipedSettings:
     cadence: Cadence = field(default="people", metadata=_REFERENCE)
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
-    """Equilibrium angle of ankle and toe: the planned angle with the planned moment fed forward, the planned
-    angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
+    """Equilibrium angle of ankle and toe: people's ankle angle with the moment of `feedforward` fed forward (planned),
+    that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     feedforward: Feedforward = field(default="people", metadata=_SPRINGS)
     """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
     that inverse dynamics give for the plan. Either way the constants they go with were tuned on people's walk."""

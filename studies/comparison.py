@@ -1,6 +1,6 @@
-"""A policy held against every spring that needs no learning, on the same seeds, hence starts and pushes.
+"""A policy held against springs that need no learning, on the same seeds, hence starts and pushes.
 
-    springfoot study compare --constant 363 79.5 --factor 1.2 --page docs/results.md
+    springfoot study compare --constant 363 79.5 --factor 1.07 --page docs/results.md
 
 Every row walks in the policy's environment, earns its reward and is measured as by `evaluate.py`. Returns are compared
 episode by episode (paired bootstrap), falls by McNemar's test.
@@ -154,7 +154,7 @@ def verdict(rows: Sequence[Row]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Compare(WalkingStudy):
-    """Hold a policy against every spring that needs no learning, under pushes: falls, returns, speed, joint angles."""
+    """Hold a policy against springs that need no learning, under pushes: falls, returns, speed, joint angles."""
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
     """Any policy of evaluate.py; all rows walk in its environment and earn its reward."""

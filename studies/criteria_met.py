@@ -29,7 +29,7 @@ def criteria_table(name: str, metrics: dict[str, Any], criteria: Sequence[Criter
     cells = [[each.label or each.name, each.text, _number(each, values)] for each in criteria]
     half = (len(cells) + 1) // 2
     left, right = cells[:half], cells[half:] + [["", "", ""]] * (2 * half - len(cells))
-    head = ["", "limit", f"`{name}`"]
+    head = ["", "criterion", f"`{name}`"]
     return table(head + head, [one + other for one, other in zip(left, right, strict=True)])
 
 

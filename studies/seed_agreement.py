@@ -130,7 +130,7 @@ def _stretches(mask: NDArray) -> str:
     return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
 
 
-def limits_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str:
+def criteria_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str:
     """Markdown: every criterion and its number in each evaluation; in bold what is missed even when loosened.
 
     A number in brackets meets the loosened criterion alone. The last row counts.
@@ -146,7 +146,7 @@ def limits_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str
         loose = criterion.loosened()
         lines.append([criterion.name, criterion.text, loose.text if loose != criterion else "", *cells])
     lines.append(["missed", "", "", *map(str, missed)])
-    return table(["", "limit", "loosened", *(f"`{name}`" for name in names)], lines)
+    return table(["", "criterion", "loosened", *(f"`{name}`" for name in names)], lines)
 
 
 def _state(criterion: Criterion, values: dict[str, Any]) -> str:
@@ -222,7 +222,7 @@ class SeedAgreement(WalkingStudy):
         text = "\n\n".join(
             [
                 agreement_table(found),
-                limits_table(labels, [gait.metrics for gait in gaits]),
+                criteria_table(labels, [gait.metrics for gait in gaits]),
                 f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened criterion alone; "
                 "**bold**: missed.",
             ]

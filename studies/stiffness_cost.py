@@ -2,8 +2,8 @@
 
     springfoot study stiffness-cost --page docs/results.md
 
-Without disturbance the stiffness of a gait is not identified (`springfoot.studies.identifiability`): a cost on K picks
-the softest springs that still walk like people and stand pushes. A seed that is finished is not trained again, so the
+Without disturbance the stiffness of a gait is not identified (`springfoot.studies.identifiability`): a cost on K shows
+what softer springs cost in likeness and under pushes. A seed that is finished is not trained again, so the
 command may be stopped and begun anew, with more weights or seeds, or with `--no-train` to measure what there is.
 """
 

@@ -5,6 +5,7 @@ episodes) gives the flags, their defaults and their `QUICK` values, and answers 
 `springfoot.studies.command.STUDIES` gives it its name on the command line. Nothing else is needed.
 """
 
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -71,7 +72,7 @@ class Study:
     def write_page(self, page: Path, answer: Answer) -> None:
         """Write the answer's sections, each with the command that made it."""
         for name, text in answer.sections.items():
-            write_section(page, name, f"{text}\n\nMade by `{self.command}`.")
+            write_section(page, name, f"{text}\n\nMade by `{_without_places(self.command)}`.")
 
     def run(self, name: str) -> int:
         """Do the study, print its answer, write its files and its page; `name` is that of its command.
@@ -106,6 +107,16 @@ class Study:
                     _write(study.page.parent / file, content)
         print(f"\nResults: {out} ({', '.join(answer.files)})")
         return 1 if answer.failed else 0
+
+
+def _without_places(command: str) -> str:
+    """A command without the folder and the page it writes to, which are somebody's own."""
+    words = shlex.split(command)
+    for flag in ("--out", "--page"):
+        if flag in words:
+            place = words.index(flag)
+            del words[place : place + 2]
+    return shlex.join(words)
 
 
 def _write(path: Path, content: str | Callable[[Path], object]) -> None:

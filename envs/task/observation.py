@@ -64,7 +64,10 @@ def _entries() -> tuple[Entry, ...]:
         Entry("com_z_error", "leg length", -2.0, 2.0, "CoM minus plan, up positive"),
         Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
         *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before", False) for name in ACTIONS),
-        *(Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "plan, dorsiflexion positive", False) for side in SIDES),
+        *(
+            Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "people's ankle angle at the leg's phase", False)
+            for side in SIDES
+        ),
         Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right", False),
         Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)", False),
         Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m", False),
