@@ -179,9 +179,9 @@ def schedule_from_curves(
 THESIS_SWING = ((45.0, 0.0), (25.0, 10.0))
 """Swing springs of ankle and toe, (K [N m/rad] for 1.70 m and 63 kg, rest angle [deg]), that complete its lines.
 
-The toe joint rests 10 deg up, as people hold it; so it clears the floor, with an ankle of 20 as of 45 N m/rad and a toe
-of 5 as of 25. Resting at 0 it catches the floor, as a drop foot does, with springs up to 200 and 50 N m/rad as well: it
-is posture that helps, not K (tests/test_baselines.py).
+The toe joint rests 10 deg up, as people hold it; with an ankle of 45 or a toe of 25 N m/rad it then clears the floor,
+with the lowest of both it does so in about half of the walks. Resting at 0 it catches the floor, as a drop foot does,
+with springs of 200 and 50 N m/rad as well: K alone does not help (tests/test_baselines.py).
 """
 PRINTED_SWING = tuple((k, 0.0) for k in LOWEST_STIFFNESS)
 """As printed: the thesis gives swing no stiffness; the lowest that an ankle and a toe can have, resting at 0."""

@@ -20,6 +20,8 @@ COPIED_PHASES = 50
 """Of a copy's K over the stride: each its mean over 2 % of the stride around the knot, and linear between them."""
 EPISODES, SECONDS = 20, 12.0
 """Undisturbed walking whose mean K is taken."""
+WALKED_IN = ("height", "mass", "leg_ratio", "foot_ratio", "carried_ratio", "speed", "slope_deg", "friction")
+"""Settings of that walking which are those asked for: a policy's K goes with body, speed and ground."""
 
 
 def frozen_schedule(springs: MeanSprings, settings: BipedSettings) -> StiffnessSchedule:
@@ -42,10 +44,11 @@ def frozen_schedule(springs: MeanSprings, settings: BipedSettings) -> StiffnessS
 def frozen(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> tuple[PolicyFunction, BipedSettings]:
     """The open-loop copy of the policy `name` and its environment, that of the policy in all but the action's mode.
 
-    `given`: settings asked for, as in `prepare`. K is that of `EPISODES` undisturbed walks, whatever is given; the
-    equilibrium stays the policy's own.
+    `given`: settings asked for, as in `prepare`. K is that of `EPISODES` undisturbed walks of that body at that speed on
+    that slope; the equilibrium stays the policy's own.
     """
-    policy, alone = prepare(name, {"episode_seconds": SECONDS}, seed)
+    where = {key: value for key, value in given.items() if key in WALKED_IN}
+    policy, alone = prepare(name, where | {"episode_seconds": SECONDS}, seed)
     springs = mean_springs(record(policy, alone, name=name, episodes=EPISODES, threads=threads))
     _, settings = prepare(name, given, seed)
     copy = frozen_schedule(springs, settings).to_json()

@@ -104,7 +104,7 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
         (((45.0, 0.0), (25.0, 0.0)), 4),
     ],
 )
-def test_the_thesis_falls_by_the_posture_of_its_toe_in_swing_whatever_its_stiffness(swing, falls):
+def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, falls):
     lines = thesis_schedule(Body(), swing=swing)
     settings = BipedSettings(equilibrium="phase", schedule=lines.to_json(), episode_seconds=8.0)
     assert np.count_nonzero(record(schedule(settings), settings, name="", episodes=4).fall_reason) == falls

@@ -1,8 +1,8 @@
 """Torque, work and energy of N bodies over every physics step of a window; recorded only where someone reads it.
 
 MuJoCo computes each force at the beginning of a physics step. The work of a force in a step is that force times the
-mean of the velocities before and after it, times the step: with this rule the energies of a walk close to 0.003 J/kg a
-stride (the velocity before alone leaves 0.028, the one after 0.024).
+mean of the velocities before and after it, times the step. With this rule the energies of `pretrained` close to 0.003
+J/kg a stride; the velocity before alone leaves 0.028, the one after 0.024.
 """
 
 from dataclasses import dataclass
