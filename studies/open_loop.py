@@ -44,8 +44,8 @@ def frozen_schedule(springs: MeanSprings, settings: BipedSettings) -> StiffnessS
 def frozen(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> tuple[PolicyFunction, BipedSettings]:
     """The open-loop copy of the policy `name` and its environment, that of the policy in all but the action's mode.
 
-    `given`: settings asked for, as in `prepare`. K is that of `EPISODES` undisturbed walks of that body at that speed on
-    that slope; the equilibrium stays the policy's own.
+    `given`: settings asked for, as in `prepare`. K is the mean over `EPISODES` undisturbed walks of that body at that
+    speed on that slope. The equilibrium stays the policy's own.
     """
     where = {key: value for key, value in given.items() if key in WALKED_IN}
     policy, alone = prepare(name, where | {"episode_seconds": SECONDS}, seed)
