@@ -37,8 +37,8 @@ def test_a_finer_timestep_walks_the_same_windows_a_little_otherwise():
 
 def test_costs_are_of_the_same_states_and_grow_with_the_number_of_steps():
     models = [physics.edited(physics.ROWS[name]) for name in ("0.25 ms (reference)", physics.DEFAULT)]
-    spent = physics.costs(models, record_walk(2, 3), rounds=1)
-    assert spent.shape == (2, 3) and (spent[0] > spent[1]).all()
+    spent = physics.costs(models, record_walk(2, 9), rounds=1)
+    assert spent.shape == (2, 9) and np.median(spent[0]) > np.median(spent[1])  # eight times the steps
 
 
 def test_the_reference_is_the_finest_and_apart_from_itself_by_nothing(monkeypatch, capsys):
