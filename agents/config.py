@@ -8,8 +8,8 @@ from typing import Any
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
-TRAINED_ON = BipedSettings(action_mode="residual", episode_seconds=10.0, push_newton=150.0)
-"""The default task: pushes of 150 N, and an action that multiplies the stiffness of the fixed schedule."""
+TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
+"""The default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range where it is 0."""
 
 
 @dataclass(frozen=True, kw_only=True)

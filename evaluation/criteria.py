@@ -174,12 +174,48 @@ LOADS_LIKE_PEOPLE = (
         pattern=".0f",
     ),
     _r("ankle moment r", ("moments", "ankle", "r"), 0.95),
-    _r("knee moment r", ("moments", "knee", "r"), 0.7),
-    Criterion(name="ankle work +", path=("ankle_work_J_kg", "positive"), low=0.25, high=0.45, unit=" J/kg"),
-    Criterion(name="ankle work −", path=("ankle_work_J_kg", "negative"), low=0.08, high=0.20, unit=" J/kg"),
+    _r("knee moment r", ("moments", "knee", "r"), 0.8),
+    _r("hip moment r", ("moments", "hip", "r"), 0.9),
+    Criterion(
+        name="hip moment within 2 SD",
+        path=("moments", "hip", "within_2sd_percent"),
+        low=80.0,
+        unit=" %",
+        pattern=".0f",
+    ),
+    Criterion(
+        name="hip moment in late swing",
+        path=("moments", "hip", "late_swing_peak_Nm_kg"),
+        high=0.35,
+        unit=" N·m/kg",
+        loosen="share",
+    ),
 )
-"""Human-like in force: ground reaction forces, joint moments and ankle work."""
-HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE)
+"""Human-like in force: ground reaction forces and joint moments."""
+
+
+def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
+    name = f"{joint} work {'+' if sign == 'positive' else '−'}"
+    return Criterion(name=name, path=("joint_work_J_kg", joint, sign), low=low, high=high, unit=" J/kg", loosen="share")
+
+
+def _near_people(joint: str, sign: str, theirs: float) -> Criterion:
+    """Within the larger of 30 % and 0.05 J/kg of people's work in a stride [J/kg]."""
+    band = max(0.3 * theirs, 0.05)
+    return _work(joint, sign, round(max(theirs - band, 0.0), 3), round(theirs + band, 3))
+
+
+WORKS_LIKE_PEOPLE = (
+    _near_people("hip", "positive", 0.18),
+    _near_people("hip", "negative", 0.13),
+    _near_people("knee", "positive", 0.04),
+    _near_people("knee", "negative", 0.24),
+    _work("ankle", "positive", 0.25, 0.45),
+    _work("ankle", "negative", 0.08, 0.20),
+    Criterion(name="cost of transport", path=("cost_of_transport",), high=0.115, pattern=".3f", loosen="share"),
+)
+"""Human-like in energy: work of each leg's joints in a stride; people's from their mean power at 1.2 m/s."""
+HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE, *WORKS_LIKE_PEOPLE)
 
 FOLLOWS_THE_PLAN = (
     Criterion(name="CoM x off by", path=("com", "x_rmse_m"), high=0.02, unit=" m", pattern=".4f"),
@@ -187,6 +223,11 @@ FOLLOWS_THE_PLAN = (
     _r("CoM z r", ("com", "z_r"), 0.9),
     _r("forward speed r", ("com", "vx_r"), 0.9),
     Criterion(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
+    Criterion(
+        name="CoP off in single support", path=("zmp", "cop_rmse_single_support_m"), high=0.02, unit=" m", pattern=".3f"
+    ),
+    Criterion(name="CoP off", path=("zmp", "cop_rmse_m"), high=0.04, unit=" m", pattern=".3f"),
+    _r("CoP r", ("zmp", "r"), 0.95),
     Criterion(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
     Criterion(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
 )

@@ -88,9 +88,15 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     def moment(name: str) -> dict[str, Any]:
         curve = both.mean(MOMENT_CURVES[name])
         peak, percent = score.largest(curve)
-        people = human.mean(f"{name}_moment", phase) if name != "toe" else None
-        r = None if people is None else score.correlation(curve, people)
-        return {"peak_Nm_kg": peak, "peak_percent": percent, "r": r}
+        late = score.largest(curve[LATE_SWING_PERCENT:])[0]
+        entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late}
+        if name == "toe":
+            return entry | {"r": None, "within_2sd_percent": None}
+        people, sd = human.mean(f"{name}_moment", phase), human.sd(f"{name}_moment", phase)
+        return entry | {
+            "r": score.correlation(curve, people),
+            "within_2sd_percent": score.share_within_sd(curve, people, 2 * sd),
+        }
 
     def force_r(name: str) -> float | None:
         return score.correlation(both.mean(f"{name}_bw"), human.mean(name, phase))
@@ -161,6 +167,8 @@ def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
     }
 
 
+LATE_SWING_PERCENT = 80
+"""Percent of the stride from which the hip holds the leg back before it lands."""
 SPRING_SOURCES = ("stiffness_changes", "equilibrium_changes", "spring_damping")
 """What gives a spring its energy, and takes it, between the plan and the joint (`springfoot.envs.physics.energy`)."""
 

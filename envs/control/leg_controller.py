@@ -33,6 +33,8 @@ TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
 """Vertical force of a foot that counts as touchdown [body weights]; chosen: 30 N at 63 kg, as of force plates."""
 TOUCHDOWN_PHASE = 0.80
 """A touchdown before this stride phase of the leg is a scuff, not a step; chosen."""
+PLANNED_SPEED = 5
+"""Column of `leg_curves`."""
 HOLD = 0.001
 """A leg's phase waits at 1 minus this until its foot touches down; chosen, small against a window's 0.009."""
 
@@ -65,6 +67,7 @@ class LegController:
         self._gains = np.zeros(len(subjects.place), GAINS)
         self.phase = leg_phases(np.zeros(len(subjects.place)))
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
+        self._curves = self._table.at(self.phase, subjects.place)  # of the window that runs
         self.follow()
 
     def follow(self) -> None:
@@ -80,13 +83,13 @@ class LegController:
 
         The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
         """
-        _advance(self._gains, self._subjects.speed, m.com_velocity, m.force, running, self.phase)
+        _advance(self._gains, self._subjects.speed, self._curves, m.com_velocity, m.force, running, self.phase)
 
     def drive(self, m: Measurement, control: NDArray) -> None:
         """Put stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] of hips and knees into `control`,
         which is (N, side, joint, 2)."""
         subjects = self._subjects
-        curves = self._table.at(self.phase, subjects.place)
+        self._curves = curves = self._table.at(self.phase, subjects.place)
         state = m.base, m.base_velocity, m.com_velocity
         _drive(self._gains, subjects.speed, subjects.scale, curves, *state, control)
         if subjects.slope.any():
@@ -155,12 +158,12 @@ def _between(low, high, weight):
 
 
 @kernel
-def _advance(gains, speed, com_velocity, force, running, phase):
+def _advance(gains, speed, curves, com_velocity, force, running, phase):
     for i in range(len(phase)):
         if not running[i]:
             continue
         gain, left = gains[i], phase[i, LEFT]
-        rate = gain.rate * (1.0 + gain.rate_gain * (com_velocity[i, 0] - speed[i]))
+        rate = gain.rate * (1.0 + gain.rate_gain * (com_velocity[i, 0] - speed[i] * curves[i, LEFT, PLANNED_SPEED]))
         waiting = (0.5 if left < 0.5 else 1.0) - HOLD
         left = min(left + max(rate, 0.0), max(waiting, left))
         right = (left + 0.5) % 1.0
@@ -180,11 +183,11 @@ def _load(force):
 def _drive(gains, speed, scale, curves, base, base_velocity, com_velocity, control):
     for i in range(len(gains)):
         gain = gains[i]
-        too_fast = com_velocity[i, 0] - speed[i]
+        too_fast = com_velocity[i, 0] - speed[i] * curves[i, LEFT, PLANNED_SPEED]
         torque = scale[i].torque
         trunk = -gain.trunk_stiffness * (base[i, 2] - gain.pitch) - gain.trunk_damping * base_velocity[i, 2]
         on_trunk = trunk + gain.speed_torque * too_fast
-        aim = gain.swing_gain * too_fast  # negative in every live set: the thigh of a body too fast aims less far ahead
+        aim = gain.swing_gain * too_fast
         for side in range(2):
             stance, hip, knee = curves[i, side, 0], torque * curves[i, side, 1], torque * curves[i, side, 2]
             own = stance * on_trunk + (1.0 - stance) * hip * aim
@@ -193,7 +196,8 @@ def _drive(gains, speed, scale, curves, base, base_velocity, com_velocity, contr
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 5) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m]."""
+    """(SAMPLES, 6) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], and the planned
+    CoM's forward speed over its mean."""
     body, human = walk.body, walk.human
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
@@ -211,4 +215,5 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
         drives.append(stiffness * target + feed)
-    return np.stack(columns + drives, axis=-1)
+    planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
+    return np.stack([*columns, *drives, planned_speed], axis=-1)

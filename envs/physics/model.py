@@ -43,11 +43,11 @@ ARMATURE = (0.02, 0.01, 0.005, 0.002)
 
 Chosen, people have none: light segments on stiff springs are fast (the toe has 0.0003 kg m^2 about its joint).
 """
-PASSIVE_DAMPING = (0.5, 0.5, 0.5, 0.1)
+PASSIVE_DAMPING = (0.1, 0.1, 0.1, 0.1)
 """Damping of each joint beside its spring's [N m s/rad] at 1.70 m and 63 kg, in the order of `JOINTS`.
 
-Chosen, of the order of the whole damping, muscles included, in people's swing: 1.9 to 4.6 in the hip and 0.02 to 0.14
-in the knee (van der Kooij et al. 2022, arXiv:2112.05564, at 0.5 m/s).
+That of all joints in predictive simulations of human gait (Falisse et al. 2019, J. R. Soc. Interface 16:20190402; the
+default of their code, PredSim, `damping_coefficient_all_dofs`).
 """
 JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
 """Stops of the joints [deg], in the order of `JOINTS`; chosen, as walking never reaches them (docs/physics.md)."""
