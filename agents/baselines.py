@@ -70,14 +70,14 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
     body, speeds = body_of(settings), tabulated_speeds(settings)
     if settings.schedule is not None:
         stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
-        return _follow(factor * stiffness[None], speeds[:1], settings, body)
+        return follow(factor * stiffness[None], speeds[:1], settings, body)
     time_scale = sqrt(body.length_scale)
     tuned = [
         leg_constants(settings.equilibrium, settings.cadence, speed / time_scale, settings.feedforward)
         for speed in speeds
     ]
     stiffness = np.stack([fixed_stiffness(constants, body) for constants in tuned])
-    return _follow(factor * stiffness, speeds, settings, body)
+    return follow(factor * stiffness, speeds, settings, body)
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
@@ -85,10 +85,10 @@ def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)
     stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
-    return _follow(stiffness[None], tabulated_speeds(settings)[:1], settings, body)
+    return follow(stiffness[None], tabulated_speeds(settings)[:1], settings, body)
 
 
-def _follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
+def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
     """The policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
 
     It reads phase and Froude speed from the observation; between two of `speeds` [m/s, of `body`] it is linear.
@@ -114,6 +114,9 @@ def _require_absolute(settings: BipedSettings) -> None:
 BASELINES = ("untrained", "random", "constant", "schedule", "quasi_stiffness", "thesis", "thesis_printed")
 """Names of the baselines. `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad], `schedule:FACTOR` the
 schedule times a factor."""
+FROZEN = "frozen"
+"""`frozen:POLICY` is the mean stiffness of a trained policy over the stride, played open loop
+(`springfoot.evaluation.open_loop`)."""
 SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
 """Swing springs of the thesis's lines: completed, and as printed."""
 
@@ -136,6 +139,11 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
             return quasi_stiffness(settings)
         case _:
             return schedule(settings, _factor_from(numbers) if colon else 1.0)
+
+
+def has_feedback(name: str) -> bool:
+    """Whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop copy."""
+    return name.partition(":")[0] not in (*BASELINES, FROZEN)
 
 
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from springfoot.gait.errors import SpringfootError
 
+from .baselines import FROZEN
+
 
 def exit_code(name: str, work: Callable[[], int | None]) -> int:
     """Run the `work` of the command `name` and return its exit code.
@@ -26,6 +28,9 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
 
 def policy_label(name: str) -> str:
     """What results call a policy: its own name, that of its run or that of its file, without folders."""
+    kind, _, other = name.partition(":")
+    if kind == FROZEN and other:
+        return f"{FROZEN}-{policy_label(other)}"
     path = Path(name)
     if path.suffix != ".safetensors":
         return path.resolve().name.replace(":", "-").replace(",", "-")

@@ -28,7 +28,8 @@ from springfoot.envs.physics.model import JOINTS, build_model
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.timing import CONTROL_WINDOW, PHYSICS_STEP, WINDOWS_PER_STEP
 from springfoot.evaluation.metrics import Gait, measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait.body import Body
 from springfoot.gait.errors import require_count
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from .criteria import HUMAN_LIKE, WALKS, Criterion, unmet
 from .metrics import Gait, measure
-from .recording import Recording, load_recording, prepare, record, record_each
+from .open_loop import open_loop_copy
+from .policies import prepare
+from .recording import Recording, load_recording, record, record_each
 from .stride_curves import StrideCurves
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ __all__ = [
     "StrideCurves",
     "load_recording",
     "measure",
+    "open_loop_copy",
     "prepare",
     "print_table",
     "record",

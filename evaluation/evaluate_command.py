@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
+from springfoot.agents.baselines import FROZEN, has_feedback
 from springfoot.agents.command_line import exit_code, policy_label
 from springfoot.agents.files import next_free, whole_folder
 from springfoot.agents.flags import SettingsFlags, given
@@ -23,7 +24,9 @@ class EvaluateFlags:
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
     """A .safetensors file, a run folder (its best policy), or one of: pretrained, untrained, random,
-    constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule), thesis."""
+    constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule;
+    schedule:FACTOR for a multiple), quasi_stiffness, thesis, thesis_printed. frozen:POLICY is a trained policy's mean
+    stiffness over the stride, played open loop at the same equilibrium."""
     episodes: int = 20
     """How many episodes."""
     seconds: float = 20.0
@@ -47,10 +50,10 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
     flags = tyro.cli(EvaluateFlags, args=arguments, prog=program)
-    return exit_code(program, lambda: run_evaluation(flags))
+    return exit_code(program, lambda: run_evaluation(flags, program))
 
 
-def run_evaluation(flags: EvaluateFlags) -> None:
+def run_evaluation(flags: EvaluateFlags, program: str) -> None:
     """Evaluate, write the results, then print the table and where the results are."""
     for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
         require_count(name, getattr(flags, name), least)
@@ -58,10 +61,15 @@ def run_evaluation(flags: EvaluateFlags) -> None:
     out = flags.out or next_free(Path("runs"), f"eval-{label}")
     if out.exists():
         raise SpringfootError(f"{out} exists already; give --out a new folder")
-    from . import metrics, recording, report  # not above: Matplotlib takes a while, and bad flags need not wait for it
+    from . import (
+        metrics,
+        policies,
+        recording,
+        report,
+    )  # not above: Matplotlib takes a while, and bad flags need not wait for it
 
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
-    policy, environment = recording.prepare(flags.policy, settings, flags.seed)
+    policy, environment = policies.prepare(flags.policy, settings, flags.seed, flags.threads)
 
     with whole_folder(out) as folder:
         total = flags.episodes * environment.episode_seconds
@@ -78,4 +86,6 @@ def run_evaluation(flags: EvaluateFlags) -> None:
         gait = metrics.measure(episodes)
         report.write_report(folder, episodes, gait)
     report.print_table(gait.metrics)
+    if has_feedback(flags.policy):
+        print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{flags.policy}, with the same flags")
     print(f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif)")

@@ -17,6 +17,7 @@ from springfoot.envs.settings import body_of, reference_gait, settings_to_json
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
 
+from .open_loop import feedback
 from .recording import TICK, Recording
 from .stride_curves import StrideCurves
 from .stride_tally import StrideTally, tally_strides
@@ -152,6 +153,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "zmp": _zmp(recording.plan_zmp, tally),
         "cost_of_transport": score.cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
         "stiffness_Nm_rad": {name: stiffness(name) for name in ("ankle", "toe")},
+        "feedback": feedback(recording),
         "contact_travel_m": _mean(tally.travel),
         "toe_clearance_m": float(np.median(tally.clearance)) if tally.clearance else None,
     }

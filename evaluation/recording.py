@@ -12,8 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from springfoot.agents.baselines import BASELINES, PolicyFunction, baseline, own_settings
-from springfoot.agents.policy import load_policy
+from springfoot.agents.baselines import PolicyFunction
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.leg_constants import LegConstants
@@ -23,7 +22,6 @@ from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.settings import (
-    CONDITION_SETTINGS,
     DRAWN_SETTINGS,
     BipedSettings,
     settings_from,
@@ -34,8 +32,6 @@ from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.plan import WalkPlan
 
-CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
-"""The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
 BATCH = 32
@@ -101,28 +97,6 @@ class Recording:
             name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com", "plan_zmp")
         }
         np.savez(path, header=np.array(json.dumps(header)), **(arrays | dict[str, Any](self.series)))
-
-
-def prepare(name: str, given: dict[str, Any], seed: int = 0) -> tuple[PolicyFunction, BipedSettings]:
-    """A policy by name and the environment it is evaluated in.
-
-    Args:
-        name: a .safetensors file, a run folder (its best policy), `pretrained`, or a baseline of `agents.baselines`.
-        given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
-        seed: of the baseline `random`.
-
-    Raises `SpringfootError` for an unknown name or a bad setting.
-    """
-    wanted = CONDITIONS | given
-    if name.partition(":")[0] in BASELINES:
-        conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
-        settings = settings_from(**(own_settings(name, conditions) | wanted))
-        return baseline(name, settings, seed), settings
-    if name != "pretrained" and not Path(name).exists():
-        known = ", ".join(["pretrained", *BASELINES])
-        raise SpringfootError(f"no policy {name!r}: give a .safetensors file, a run folder, or one of {known}")
-    policy = load_policy(name)
-    return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
 
 
 def load_recording(path: str | Path) -> Recording:

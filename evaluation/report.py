@@ -91,7 +91,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         console.print(f"own: {people['condition']}; people's instead: {borrowed}", soft_wrap=True)
     console.print(
         f"{who} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean curves,\n"
-        "the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing",
+        "the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing;\n"
+        "feedback: share of its variance that the phase does not explain / its SD at equal phase",
         soft_wrap=True,
     )
 
@@ -120,6 +121,9 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             "" if r is None else f"{r:.2f}",
             share,
         )
+
+    def percent(value: float | None) -> str:
+        return text_of(None if value is None else 100 * value, ".0f")
 
     def mm(label: str, value: float | None, r: float | None = None) -> TableRow:
         return row(label, "mm", None if value is None else 1000 * value, ".0f", None, r)
@@ -181,6 +185,10 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         [
             (f"{name} stiffness", "N·m/rad", "/".join(text_of(v, ".0f") for v in values.values()), "", "", "")
             for name, values in metrics["stiffness_Nm_rad"].items()
+        ]
+        + [
+            (f"{name} feedback", "%", "/".join(percent(values[key]) for key in ("share", "spread")), "", "", "")
+            for name, values in metrics["feedback"].items()
         ],
     ]
 

@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from .comparison import contenders
     from .constant_search import best_constant
     from .identifiability import any_stiffness, mean_springs, rebuilt
-    from .open_loop import frozen
     from .push_experiment import identified
     from .seed_agreement import agreements
     from .study import Answer, Study, WalkingStudy
@@ -22,7 +21,6 @@ __all__ = [
     "best_constant",
     "contenders",
     "draw_pairs",
-    "frozen",
     "identified",
     "mean_springs",
     "rebuilt",
@@ -38,7 +36,6 @@ _MODULE = {
     "best_constant": "constant_search",
     "contenders": "comparison",
     "draw_pairs": "body_sweep",
-    "frozen": "open_loop",
     "identified": "push_experiment",
     "mean_springs": "identifiability",
     "rebuilt": "identifiability",

@@ -24,7 +24,8 @@ from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.subjects import DRAWN, Subjects
 from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import BATCH, Recording, prepare, record_each
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import BATCH, Recording, record_each
 from springfoot.gait.errors import require_count
 
 from .quantities import COMPARED_JOINTS

@@ -13,15 +13,15 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import tyro
 from numpy.typing import NDArray
 
-from springfoot.agents.baselines import PolicyFunction, own_settings
+from springfoot.agents.baselines import FROZEN, PolicyFunction, has_feedback, own_settings
 from springfoot.agents.flags import SettingsFlags, given, optional_flags
 from springfoot.agents.markdown import table, text_of
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 from .intervals import RESAMPLES, mean_interval, paired_p, share_interval
-from .open_loop import FROZEN, frozen
 from .quantities import rmse_text, walks_csv
 from .study import Answer, OnProgress, WalkingStudy
 
@@ -102,8 +102,9 @@ def contenders(
     """
     policy, settings = prepare(name, given, seed)
     found = [Contender(name, policy, settings)]
-    if settings.equilibrium in ("planned", "angle", "neutral"):
-        found.append(Contender(f"{FROZEN}:{name}", *frozen(name, given, seed, threads)))
+    if has_feedback(name):
+        copy = f"{FROZEN}:{name}"
+        found.append(Contender(copy, *prepare(copy, given, seed, threads)))
     names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
     names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
     names += ["constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]

@@ -14,7 +14,8 @@ from springfoot.agents.flags import given
 from springfoot.agents.markdown import table, text_of
 from springfoot.evaluation.evaluate_command import EvaluateFlags
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 from .quantities import falls_text, rmse_text, walks_csv
 from .study import Answer, OnProgress, WalkingStudy

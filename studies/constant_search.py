@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from springfoot.agents.baselines import constant, schedule
 from springfoot.agents.files import csv_text
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 from .comparison import PushedFlags, pushed
 from .intervals import RESAMPLES, mean_interval

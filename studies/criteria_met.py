@@ -15,7 +15,8 @@ from springfoot.agents.flags import SettingsFlags, given
 from springfoot.agents.markdown import table
 from springfoot.evaluation.criteria import FOLLOWS_THE_PLAN, HUMAN_LIKE, Criterion, number_text, numbers
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 from .study import Answer, OnProgress, WalkingStudy
 

@@ -28,7 +28,8 @@ from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import TICK, Recording, prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import TICK, Recording, record
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
@@ -148,7 +149,7 @@ def any_stiffness(
     """The policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
 
     Args:
-        name: any policy of `recording.prepare`.
+        name: any policy of `policies.prepare`.
         given: environment settings that differ from the evaluation's standard conditions and the policy's own.
         stiffnesses: as in `STIFFNESSES`; values beyond the action's range are the nearer end's.
         disturbances: more conditions, by name: settings that differ from the undisturbed one's.

@@ -16,10 +16,10 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.baselines import BASELINES
+from springfoot.agents.baselines import has_feedback
 from springfoot.agents.files import csv_text
 from springfoot.agents.markdown import MISSING, table
-from springfoot.evaluation.recording import prepare
+from springfoot.evaluation.policies import prepare
 from springfoot.gait.body import REFERENCE_HEIGHT
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
@@ -62,14 +62,14 @@ INFLUENCE_CONDITIONS = (
 def walk_under(condition: str, policy: str, change: float, unevenness: float, seed: int = 0) -> tuple[Any, Any, float]:
     """Policy, settings and change of K of one of `INFLUENCE_CONDITIONS`, from those of the first one.
 
-    A baseline decides at 100 Hz, as the body is controlled; at 50 Hz a level walk falls in step with the decisions, in
-    one of two strides.
+    What has no feedback decides at 100 Hz, as the body is controlled; at 50 Hz a level walk falls in step with the
+    decisions, in one of two strides.
     """
     if condition not in INFLUENCE_CONDITIONS:
         raise SpringfootError(f"conditions must be of {', '.join(map(repr, INFLUENCE_CONDITIONS))}, got {condition!r}")
     name = condition if condition == "pretrained" else policy
     given: dict[str, Any] = {"unevenness_m": 0.0 if condition == "level ground" else unevenness}
-    if name.partition(":")[0] in BASELINES:
+    if not has_feedback(name):
         given["decisions"] = "100hz"
     if condition in BODIES:
         height, mass = BODIES[condition]

@@ -20,7 +20,8 @@ from springfoot.agents.policy import RUN
 from springfoot.evaluation.criteria import WALKS, unmet
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait.errors import SpringfootError
 
 from .quantities import walks_csv

@@ -8,7 +8,8 @@ from typing import Any
 
 from springfoot.agents.files import write_atomically
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 from .study import OnProgress
 

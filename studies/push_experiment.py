@@ -12,19 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from springfoot.agents.baselines import BASELINES, PolicyFunction
+from springfoot.agents.baselines import PolicyFunction, has_feedback
 from springfoot.envs.control.equilibrium import PLATEAUS
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.model import ANKLE
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.recording import TICK, Recording, prepare
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import TICK, Recording
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.identification import PhaseSpring, identify
 from springfoot.gait.perturbation import PushedSpring, identify_pushed
 from springfoot.gait.stiffness import SPRINGS
-
-from .open_loop import FROZEN, frozen
 
 BOUNDS = (*PLATEAUS, 1.0)
 """Phases: the plateaus of the fixed schedule, on which its K is constant, and the ramps between them."""
@@ -46,16 +45,8 @@ REFLEX_DELAY = 0.02
 def prepare_pushed(
     name: str, given: dict[str, Any], seed: int = 0, threads: int = 2
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """As `recording.prepare`, and `frozen:POLICY` too.
-
-    Baselines and copies decide at `DECISIONS` unless `given` says otherwise: their K follows the phase alone.
-    """
-    kind, _, other = name.partition(":")
-    if kind == FROZEN and not other:
-        raise SpringfootError(f"{FROZEN} is the copy of a policy, as in {FROZEN}:pretrained, got {name!r}")
-    if kind == FROZEN or kind in BASELINES:
-        given = {"decisions": DECISIONS} | given
-    return frozen(other, given, seed, threads) if kind == FROZEN else prepare(name, given, seed)
+    """As `policies.prepare`, but what has no feedback decides at `DECISIONS` unless `given` says otherwise."""
+    return prepare(name, given if has_feedback(name) else {"decisions": DECISIONS} | given, seed, threads)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

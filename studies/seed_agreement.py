@@ -26,7 +26,8 @@ from springfoot.agents.markdown import table
 from springfoot.evaluation.criteria import HUMAN_LIKE, Criterion, number_text, numbers
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import Gait, measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 

@@ -11,7 +11,7 @@ import tyro
 
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.agents.markdown import plus_minus, table, text_of
-from springfoot.evaluation.recording import prepare
+from springfoot.evaluation.policies import prepare
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 

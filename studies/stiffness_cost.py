@@ -28,7 +28,8 @@ from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
 from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
 from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
 from springfoot.evaluation.metrics import Gait, measure
-from springfoot.evaluation.recording import TICK, Recording, prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import TICK, Recording, record
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd

@@ -120,7 +120,7 @@ def paired_walks(
     """Walk without and with the change in each of `CELLS`, from the same start for each of `seeds`.
 
     Args:
-        policy, settings: as `springfoot.evaluation.recording.prepare` gives them.
+        policy, settings: as `springfoot.evaluation.policies.prepare` gives them.
         change: of K, as a share of it: 0.1 for 10 % more.
         seeds: S of them; each draws the phase at which the walk starts.
         strides: K, from the left foot's first heel strike after `WARM_UP` on.

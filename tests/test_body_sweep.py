@@ -9,7 +9,8 @@ import pytest
 from springfoot.agents.config import PRESETS
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait.errors import SpringfootError
 from springfoot.studies import body_sweep as bodies
 from springfoot.studies.command import study_main

@@ -9,7 +9,8 @@ import pytest
 
 from springfoot.agents.baselines import BASELINES, constant
 from springfoot.envs.settings import BipedSettings, settings_from
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.studies import comparison, intervals, quantities
 from springfoot.studies.command import study_main
 from springfoot.studies.constant_search import best_constant

@@ -8,7 +8,8 @@ from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.evaluation.criteria import HUMAN_LIKE, WALKS, Criterion, numbers, unmet
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 PLAN = reference_walk_at(BipedSettings(), 1.2).plan
 METRICS = {

@@ -8,7 +8,7 @@ from springfoot.envs import Biped
 from springfoot.envs.physics.energy import LEDGER, StepRecord, parts_of, window_work
 from springfoot.envs.physics.model import ANKLE, JOINTS, SIDES, build_model
 from springfoot.envs.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
-from springfoot.evaluation.recording import prepare
+from springfoot.evaluation.policies import prepare
 from springfoot.gait import GRAVITY, Body
 
 BODIES = (Body(), Body(height=1.9, mass=100.0, carried_ratio=0.2), Body(height=1.5, mass=45.0, leg_ratio=1.04))

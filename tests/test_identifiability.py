@@ -7,7 +7,8 @@ import pytest
 
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.model import damping_times
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait import SpringfootError
 from springfoot.studies import identifiability as identified
 from springfoot.studies.command import study_main

@@ -9,7 +9,8 @@ from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import SERIES, Recording, load_recording, prepare, record, record_each
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import SERIES, Recording, load_recording, record, record_each
 from springfoot.evaluation.stride_tally import GAIT_CYCLE_COLUMNS
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait
 from springfoot.gait.cycle import PERCENT

@@ -9,7 +9,8 @@ from benchmarks import physics
 from benchmarks.walking import record_walk
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.timing import CONTROL_WINDOW
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 
 @pytest.mark.parametrize("name", physics.ROWS)

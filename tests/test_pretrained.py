@@ -6,7 +6,8 @@ import pytest
 from springfoot.agents.policy import find_policy
 from springfoot.evaluation.criteria import WALKS, unmet
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 
 
 def walked(name, **settings):

@@ -9,7 +9,8 @@ from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings import body_of
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait import SpringfootError
 from springfoot.gait.perturbation import REACTS, SPRING
 from springfoot.gait.stiffness import StiffnessSchedule

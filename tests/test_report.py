@@ -19,7 +19,8 @@ from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.settings import reference_gait, settings_from
 from springfoot.evaluation.evaluate_command import evaluate_main
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import load_recording, prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import load_recording, record
 from springfoot.evaluation.report import people_metrics, print_table, write_report
 from springfoot.evaluation.stride_tally import GAIT_CYCLE_COLUMNS
 from springfoot.gait import SpringfootError, human_gait

@@ -24,7 +24,8 @@ from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait import scores as score
 from springfoot.gait.body import GRAVITY, Body

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from springfoot.envs.biped_batch import Biped
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.studies import stiffness_cost as tradeoff
 from springfoot.studies.command import study_main

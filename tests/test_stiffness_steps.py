@@ -13,7 +13,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
 from springfoot.envs.physics.model import JOINTS, SIDES, damping_times
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.recording import prepare
+from springfoot.evaluation.policies import prepare
 from springfoot.gait import Body, SpringfootError
 from springfoot.studies.stiffness_steps import (
     CELLS,

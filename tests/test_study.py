@@ -10,7 +10,8 @@ from springfoot.agents.files import csv_text, whole_folder
 from springfoot.agents.markdown import plus_minus
 from springfoot.evaluation.criteria import FOLLOWS_THE_PLAN, HUMAN_LIKE, numbers
 from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 from springfoot.studies.command import STUDIES, main, study_class, study_main

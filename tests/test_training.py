@@ -16,7 +16,7 @@ from springfoot.agents.ppo import Learner
 from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.recording import prepare
+from springfoot.evaluation.policies import prepare
 from springfoot.gait.errors import SpringfootError
 
 SHORT = TrainingConfig(

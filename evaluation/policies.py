@@ -1,0 +1,62 @@
+"""A policy by its name, and the environment it is evaluated in: the one place where names of policies are understood.
+
+A name is a .safetensors file, a run folder (its best policy), `pretrained`, a baseline (`springfoot.agents.baselines`),
+or `frozen:POLICY`, the open-loop copy of one that was trained.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from springfoot.agents.baselines import BASELINES, FROZEN, PolicyFunction, baseline, has_feedback, own_settings
+from springfoot.agents.policy import load_policy
+from springfoot.envs.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
+from springfoot.gait.errors import SpringfootError
+
+from .open_loop import open_loop_copy
+
+CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
+"""The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
+
+
+def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> tuple[PolicyFunction, BipedSettings]:
+    """A policy by name and the environment it is evaluated in.
+
+    Args:
+        name: a .safetensors file, a run folder (its best policy), `pretrained`, a baseline of `agents.baselines`, or
+            `frozen:POLICY`, the mean K of one of the first three, which first walks for it (`open_loop_copy`).
+        given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
+        seed: of the baseline `random`.
+        threads: of the physics where a copy is made; any number gives the same bits.
+
+    Raises `SpringfootError` for an unknown name or a bad setting.
+    """
+    wanted, kind = CONDITIONS | given, name.partition(":")[0]
+    if kind == FROZEN:
+        return _prepare_copy(name, given, threads)
+    if kind in BASELINES:
+        conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
+        settings = settings_from(**(own_settings(name, conditions) | wanted))
+        return baseline(name, settings, seed), settings
+    if name != "pretrained" and not Path(name).exists():
+        known = ", ".join(["pretrained", *BASELINES])
+        raise SpringfootError(
+            f"no policy {name!r}: give a .safetensors file, a run folder, or one of {known}, or {FROZEN}:POLICY"
+        )
+    policy = load_policy(name)
+    return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
+
+
+def _prepare_copy(name: str, given: dict[str, Any], threads: int) -> tuple[PolicyFunction, BipedSettings]:
+    """`frozen:POLICY`: its K is of the policy's own decisions, whenever the copy decides."""
+    other = name.partition(":")[2]
+    if not other:
+        raise SpringfootError(f"{FROZEN} is the copy of a policy, as in {FROZEN}:pretrained, got {name!r}")
+    if other.partition(":")[0] == FROZEN:
+        raise SpringfootError(f"a copy has no copy of its own: give {other}, got {name!r}")
+    if not has_feedback(other):
+        raise SpringfootError(f"{other} has no feedback to leave out, it is its own copy: give {other}, got {name!r}")
+    policy, settings = prepare(other, {key: value for key, value in given.items() if key != "decisions"})
+    decisions = given.get("decisions", settings.decisions)
+    copy, absolute = open_loop_copy(policy, settings, name=other, threads=threads)
+    return copy, replace(absolute, decisions=decisions)
