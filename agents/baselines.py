@@ -146,6 +146,11 @@ def has_feedback(name: str) -> bool:
     return name.partition(":")[0] not in (*BASELINES, FROZEN)
 
 
+def and_copy(name: str) -> tuple[str, ...]:
+    """What a table that judges a policy walks: the policy and, unless it has no feedback, its open-loop copy."""
+    return (name, f"{FROZEN}:{name}") if has_feedback(name) else (name,)
+
+
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
     """The environment settings that a baseline needs, for the body and speed of `settings`.
 

@@ -26,8 +26,8 @@ KNOTS = 50
 schedule lie, and at 50 Hz a decision or so to each."""
 SMOOTHING = 0.01
 """Weight of the curvature at a knot against one decision on it: nothing, but where a leg skips phases."""
-EPISODES, SECONDS = 20, 12.0
-"""Undisturbed walking whose mean K is taken, at each speed; seeds 0 to 19."""
+EPISODES, SECONDS = 8, 12.0
+"""Undisturbed walking whose mean K is taken, at each speed; seeds 0 to 7: some 150 decisions to a knot."""
 UNDISTURBED: dict[str, Any] = {
     name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS if THEME_OF[name] in ("episode", "disturbance")
 } | {"unevenness_m": 0.0, "episode_seconds": SECONDS}

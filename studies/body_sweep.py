@@ -6,7 +6,7 @@ Heights, masses and speeds are drawn independently and evenly over the ranges of
 height and a mass that make no body (`springfoot.gait.body.BMI_RANGE`) are drawn again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from springfoot.agents.baselines import PolicyFunction
+from springfoot.agents.baselines import PolicyFunction, and_copy
 from springfoot.agents.command_line import policy_label
 from springfoot.agents.config import PRESETS
 from springfoot.agents.files import csv_text
@@ -28,20 +28,24 @@ from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import BATCH, Recording, record_each
 from springfoot.gait.errors import require_count
 
-from .quantities import COMPARED_JOINTS
+from .quantities import COMPARED_JOINTS, OPEN_LOOP, open_loop_note
 from .study import Answer, OnProgress, Study
 
 RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
 """What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
 PAIRS = "pairs.csv"
 """Name of the file with a row for each pair."""
+PAIRS_OPEN_LOOP = "pairs_open_loop.csv"
+"""Name of the file with a row for each pair as walked by the policy's open-loop copy."""
+FORCES = "grf_vertical_r"
+"""The one column that is not told of the copy."""
 WORST_FALLS = 10
 """Falls that are told one by one."""
 
 QUANTITIES = (
     ("speed error %", "speed_error_percent", ".1f", abs),
     *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
-    ("vertical force r", "grf_vertical_r", ".3f", lambda r: -r),
+    ("vertical force r", FORCES, ".3f", lambda r: -r),
 )
 """Label, column, format, and how bad a value is."""
 
@@ -97,21 +101,41 @@ def _row(recording: Recording) -> dict[str, Any]:
     }
 
 
-def pairs_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst."""
-    fallen = [row for row in rows if row["fall"]]
-    lines: list[tuple[str, ...]] = [("falls", f"{len(fallen)} of {len(rows)}", "", "", "")]
+def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, Any]] = ()) -> str:
+    """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst.
+
+    The same pairs walked by the policy's open-loop `copy` stand beside, falls, speed and angles.
+    """
+    lines: list[list[str]] = [["falls", _falls(rows), "", "", "", *([_falls(copy), "", ""] if copy else [])]]
     for label, column, pattern, badness in QUANTITIES:
-        standing = [row for row in rows if not row["fall"] and row[column] is not None]
-        standing.sort(key=lambda row, column=column, badness=badness: badness(row[column]))
-        if standing:
-            size = [abs(row[column]) for row in standing]
-            most = size[int(np.ceil(0.95 * len(size))) - 1]
-            numbers = [format(value, pattern) for value in (np.median(size), most, size[-1])]
-            lines.append((label, *numbers, _who(standing[-1])))
-    text = table(("", "median", "95 % within", "worst", "worst pair"), lines)
+        if standing := _standing(rows, column, badness):
+            line = [label, *_spread(standing, column, pattern), _who(standing[-1])]
+            if copy:
+                beside = _standing(copy, column, badness) if column != FORCES else []
+                line += _spread(beside, column, pattern) if beside else ["", "", ""]
+            lines.append(line)
+    columns = ("median", "95 % within", "worst")
+    text = table(["", *columns, "worst pair", *(f"{OPEN_LOOP}: {each}" for each in columns if copy)], lines)
+    fallen = [row for row in rows if row["fall"]]
     told = [f"{_who(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
     return "\n".join([text, "", *told]).rstrip("\n")
+
+
+def _falls(rows: Sequence[Mapping[str, Any]]) -> str:
+    return f"{sum(bool(row['fall']) for row in rows)} of {len(rows)}"
+
+
+def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
+    """The pairs that did not fall, the worst last."""
+    return sorted(
+        (row for row in rows if not row["fall"] and row[column] is not None), key=lambda row: badness(row[column])
+    )
+
+
+def _spread(standing: Sequence[Mapping[str, Any]], column: str, pattern: str) -> list[str]:
+    size = [abs(row[column]) for row in standing]
+    most = size[int(np.ceil(0.95 * len(size))) - 1]
+    return [format(value, pattern) for value in (np.median(size), most, size[-1])]
 
 
 def _who(row: Mapping[str, Any]) -> str:
@@ -120,7 +144,10 @@ def _who(row: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Bodies(Study):
-    """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs."""
+    """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs.
+
+    A trained policy stands beside its open-loop copy, whose mean stiffness goes with the speed and scales with body.
+    """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
     """Any policy of evaluate.py."""
@@ -145,22 +172,26 @@ class Bodies(Study):
     @property
     def total(self) -> float:
         """Simulated seconds without falls."""
-        return self.pairs * self.seconds
+        return len(and_copy(self.policy)) * self.pairs * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every pair."""
         conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
-        policy, settings = prepare(self.policy, conditions, self.seed)
+        settings = prepare(self.policy, conditions, self.seed)[1]
         who, how = draw_pairs(settings, self.pairs, self.seed), {"seed": self.seed, "threads": self.threads}
-        rows = walk_pairs(policy, settings, who, name=policy_label(self.policy), progress=progress, **how)
-        clamped = sum(row["people_clamped"] for row in rows)
+        walks = []
+        for name in and_copy(self.policy):
+            prepared = prepare(name, conditions, self.seed, self.threads)
+            walks.append(walk_pairs(*prepared, who, name=policy_label(name), progress=progress, **how))
+        clamped = sum(row["people_clamped"] for row in walks[0])
         text = (
-            f"{pairs_table(rows)}\n\n`{self.policy}`, {self.pairs} pairs × {settings.episode_seconds:g} s, seed "
+            f"{pairs_table(*walks)}\n\n`{self.policy}`, {self.pairs} pairs × {settings.episode_seconds:g} s, seed "
             f"{self.seed}: {_ranges(settings)}, independent and even. Of the pairs that did not fall; {clamped} of all "
-            f"lie beyond people's measured speeds, and are held against the nearest."
+            f"lie beyond people's measured speeds, and are held against the nearest.{open_loop_note(self.policy)}"
         )
-        numbers = csv_text(list(rows[0]), (list(row.values()) for row in rows))
-        return Answer(text=text, files={PAIRS: numbers}, sections={"BODIES": text})
+        numbers = [csv_text(list(rows[0]), (list(row.values()) for row in rows)) for rows in walks]
+        files = dict(zip([PAIRS, PAIRS_OPEN_LOOP], numbers, strict=False))
+        return Answer(text=text, files={**files}, sections={"BODIES": text})
 
 
 def _ranges(settings: BipedSettings) -> str:

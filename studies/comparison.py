@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import tyro
 from numpy.typing import NDArray
 
-from springfoot.agents.baselines import FROZEN, PolicyFunction, has_feedback, own_settings
+from springfoot.agents.baselines import PolicyFunction, and_copy, own_settings
 from springfoot.agents.flags import SettingsFlags, given, optional_flags
 from springfoot.agents.markdown import table, text_of
 from springfoot.envs.settings import BipedSettings, settings_to_json
@@ -102,9 +102,7 @@ def contenders(
     """
     policy, settings = prepare(name, given, seed)
     found = [Contender(name, policy, settings)]
-    if has_feedback(name):
-        copy = f"{FROZEN}:{name}"
-        found.append(Contender(copy, *prepare(copy, given, seed, threads)))
+    found += [Contender(copy, *prepare(copy, given, seed, threads)) for copy in and_copy(name)[1:]]
     names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
     names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
     names += ["constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]

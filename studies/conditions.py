@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import tyro
 
+from springfoot.agents.baselines import and_copy
 from springfoot.agents.flags import given
 from springfoot.agents.markdown import table, text_of
 from springfoot.evaluation.evaluate_command import EvaluateFlags
@@ -17,7 +18,7 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 
-from .quantities import falls_text, rmse_text, walks_csv
+from .quantities import OPEN_LOOP, falls_text, open_loop_note, rmse_text, walks_csv
 from .study import Answer, OnProgress, WalkingStudy
 
 WORLD = (
@@ -49,16 +50,22 @@ UNTRAINED_ROWS = (
 """Untrained policies and their flags, each on leg constants of its own."""
 
 
-def conditions_table(head: str, rows: Sequence[tuple[str, dict[str, Any]]]) -> str:
-    """Markdown: a line for each row of flags and its metrics."""
+def conditions_table(head: str, rows: Sequence[tuple[str, Sequence[dict[str, Any]]]]) -> str:
+    """Markdown: a line for each row of flags, with the metrics of the policy and, where there are any, of its copy."""
     lines = []
-    for words, m in rows:
-        rest = "" if m["came_to_rest"] is None else f", {m['came_to_rest']} at rest"
+    for words, (m, *copies) in rows:
         peaks = " / ".join(text_of(m["grf"][f"vertical_peak{peak}_bw"], ".2f") for peak in (1, 2))
-        largest, speed = text_of(m["grf"]["vertical_max_bw"], ".2f"), text_of(m["speed_m_s"]["mean"], ".3f")
-        lines.append([f"`{words or '(none)'}`", falls_text(m) + rest, speed, rmse_text(m), peaks, largest])
-    columns = ["falls", "speed m/s", "RMSE thigh / knee / ankle °", "peaks 1 / 2 BW", "largest 10 ms BW"]
-    return table([head, *columns], lines)
+        largest = text_of(m["grf"]["vertical_max_bw"], ".2f")
+        walked = [cell for copy in copies for cell in _walked(copy)]
+        lines.append([f"`{words or '(none)'}`", *_walked(m), peaks, largest, *walked])
+    columns = ["falls", "speed m/s", "RMSE thigh / knee / ankle °"]
+    beside = [f"{OPEN_LOOP}: {column}" for column in columns] * (len(rows[0][1]) - 1)
+    return table([head, *columns, "peaks 1 / 2 BW", "largest 10 ms BW", *beside], lines)
+
+
+def _walked(m: dict[str, Any]) -> list[str]:
+    rest = "" if m["came_to_rest"] is None else f", {m['came_to_rest']} at rest"
+    return [falls_text(m) + rest, text_of(m["speed_m_s"]["mean"], ".3f"), rmse_text(m)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +73,8 @@ class Conditions(WalkingStudy):
     """Walk under one condition after the other, each a row of evaluate.py's flags, all else as evaluate.py has it.
 
     Rows `world`: pushes, slopes, uneven and slippery ground, delayed stiffness, standing starts, other proportions,
-    loads. Rows `springs`: policies that nobody trained, on other equilibria, moments and cadences.
+    loads; a trained policy beside its open-loop copy, whose mean stiffness is that of the row's body, speed and slope.
+    Rows `springs`: policies that nobody trained, on other equilibria, moments and cadences.
     """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
@@ -81,18 +89,19 @@ class Conditions(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every row."""
         sections, lines = {}, []
-        if self.rows != "springs":
-            world = [*WORLD, *([LONG] if self.long else [])]
-            found = [(words, self._walk([self.policy, *shlex.split(words)], progress)) for words in world]
-            sections["WORLD"] = conditions_table(f"`{self.policy}` with", found)
-            lines += [({"policy": self.policy, "flags": words}, metrics) for words, metrics in found]
-        if self.rows != "world":
-            found = [(words, self._walk(shlex.split(words), progress)) for words in UNTRAINED_ROWS]
-            sections["SPRINGS-UNTRAINED"] = conditions_table("", found)
-            split = [(*words.partition(" "), metrics) for words, metrics in found]
-            lines += [({"policy": name, "flags": words}, metrics) for name, _, words, metrics in split]
         ran = f"`springfoot evaluate` with these flags, {self.what_ran} where the row says no other."
-        sections = {name: f"{text}\n\n{ran}" for name, text in sections.items()}
+        if self.rows != "springs":
+            world, names = [*WORLD, *([LONG] if self.long else [])], and_copy(self.policy)
+            found = [(words, [self._walk([name, *shlex.split(words)], progress) for name in names]) for words in world]
+            text = conditions_table(f"`{self.policy}` with", found)
+            sections["WORLD"] = f"{text}\n\n{ran}{open_loop_note(self.policy)}"
+            for words, walks in found:
+                lines += [({"policy": name, "flags": words}, m) for name, m in zip(names, walks, strict=True)]
+        if self.rows != "world":
+            found = [(words, [self._walk(shlex.split(words), progress)]) for words in UNTRAINED_ROWS]
+            sections["SPRINGS-UNTRAINED"] = f"{conditions_table('', found)}\n\n{ran}"
+            split = [(*words.partition(" "), metrics) for words, (metrics,) in found]
+            lines += [({"policy": name, "flags": words}, metrics) for name, _, words, metrics in split]
         text = "\n\n".join(sections.values())
         return Answer(text=text, files={"conditions.csv": walks_csv(lines)}, sections=sections)
 
@@ -101,8 +110,7 @@ class Conditions(WalkingStudy):
         counts = {"episodes": self.episodes, "seconds": self.seconds, "seed": self.seed, "threads": self.threads}
         ours = [str(word) for name, count in counts.items() for word in (f"--{name}", count)]
         flags = tyro.cli(EvaluateFlags, args=[*ours, *words])
-        policy, settings = prepare(
-            flags.policy, {"episode_seconds": flags.seconds} | given(flags.environment), flags.seed
-        )
+        conditions = {"episode_seconds": flags.seconds} | given(flags.environment)
+        policy, settings = prepare(flags.policy, conditions, flags.seed, flags.threads)
         how: dict[str, Any] = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
         return measure(record(policy, settings, name=flags.policy, progress=progress, **how)).metrics

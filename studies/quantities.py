@@ -6,11 +6,22 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
+from springfoot.agents.baselines import and_copy
 from springfoot.agents.files import csv_text
 from springfoot.agents.markdown import text_of
 
 COMPARED_JOINTS = ("thigh", "knee", "ankle")
 """Whose angles are compared; people's toe is that of other people."""
+
+
+OPEN_LOOP = "open loop"
+"""What tables call a policy's open-loop copy."""
+
+
+def open_loop_note(name: str) -> str:
+    """The sentence under a table that has the open-loop copy of a policy; empty where it has none."""
+    copies = ", ".join(f"`{copy}`" for copy in and_copy(name)[1:])
+    return copies and f" Open loop: {copies}, the policy's mean K over the stride at the same θ_eq, without feedback."
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from springfoot.agents.baselines import and_copy
+from springfoot.agents.command_line import policy_label
 from springfoot.agents.files import csv_text
-from springfoot.agents.markdown import table
+from springfoot.agents.markdown import MISSING, table
 from springfoot.evaluation.criteria import HUMAN_LIKE, Criterion, number_text, numbers
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import Gait, measure
@@ -31,7 +33,7 @@ from springfoot.evaluation.recording import record
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 
-from .quantities import walks_csv
+from .quantities import OPEN_LOOP, falls_text, rmse_text, walks_csv
 from .study import Answer, OnProgress, WalkingStudy
 
 SECTION = "AGREEMENT"
@@ -131,10 +133,13 @@ def _stretches(mask: NDArray) -> str:
     return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
 
 
-def criteria_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> str:
+def criteria_table(
+    names: Sequence[str], metrics: Sequence[dict[str, Any]], copies: Sequence[dict[str, Any] | None] = ()
+) -> str:
     """Markdown: every criterion and its number in each evaluation; in bold what is missed even when loosened.
 
-    A number in brackets meets the loosened criterion alone. The last row counts.
+    A number in brackets meets the loosened criterion alone. The row `missed` counts. Falls and angles of the policies'
+    open-loop `copies` follow, unless none has one.
     """
     measured = [numbers(each) for each in metrics]
     lines, missed = [], [0] * len(measured)
@@ -147,6 +152,10 @@ def criteria_table(names: Sequence[str], metrics: Sequence[dict[str, Any]]) -> s
         loose = criterion.loosened()
         lines.append([criterion.name, criterion.text, loose.text if loose != criterion else "", *cells])
     lines.append(["missed", "", "", *map(str, missed)])
+    if any(copies):
+        falls = [MISSING if copy is None else falls_text(copy) for copy in copies]
+        angles = [MISSING if copy is None else rmse_text(copy) for copy in copies]
+        lines += [[f"{OPEN_LOOP}: falls", "", "", *falls], [f"{OPEN_LOOP}: thigh / knee / ankle °", "", "", *angles]]
     return table(["", "criterion", "loosened", *(f"`{name}`" for name in names)], lines)
 
 
@@ -213,22 +222,23 @@ class SeedAgreement(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every policy."""
-        prepared = [(name, *prepare(name, {"episode_seconds": self.seconds}, self.seed)) for name in self.policies]
-        gaits = [
-            measure(record(policy, settings, name=name, progress=progress, **self.how))
-            for name, policy, settings in prepared
-        ]
+        walked = [[self._walk(each, progress) for each in and_copy(name)] for name in self.policies]
+        gaits, copies = [first for first, *_ in walked], [rest[0].metrics if rest else None for _, *rest in walked]
         found = agreements(gaits)
-        labels = [Path(name).name for name in self.policies]
-        text = "\n\n".join(
-            [
-                agreement_table(found),
-                criteria_table(labels, [gait.metrics for gait in gaits]),
-                f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened criterion alone; "
-                "**bold**: missed.",
-            ]
+        labels = [policy_label(name) for name in self.policies]
+        ran = (
+            f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened criterion alone; "
+            "**bold**: missed."
         )
-        walks = walks_csv([({"policy": name}, gait.metrics) for name, gait in zip(labels, gaits, strict=True)])
+        if any(copies):
+            ran += " Open loop: each policy's mean K over the stride at the same θ_eq, without feedback."
+        table_of_criteria = criteria_table(labels, [gait.metrics for gait in gaits], copies)
+        text = "\n\n".join([agreement_table(found), table_of_criteria, ran])
+        walks = walks_csv([({"policy": gait.metrics["policy"]}, gait.metrics) for each in walked for gait in each])
         draw = partial(save_figure, found=found)
         files = {"agreement.csv": curves_csv(found), "policies.csv": walks, "agreement.png": draw}
         return Answer(text=text, files=files, sections={SECTION: text})
+
+    def _walk(self, name: str, progress: OnProgress) -> Gait:
+        policy, settings = prepare(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
+        return measure(record(policy, settings, name=policy_label(name), progress=progress, **self.how))

@@ -110,7 +110,7 @@ def test_a_csv_file_holds_six_digits_and_nothing_for_what_is_missing():
 def test_the_criteria_table_has_every_criterion_once_and_in_bold_what_is_missed():
     policy, settings = prepare("constant:250,30", {"episode_seconds": 6.0})
     metrics = measure(record(policy, settings, name="springs", episodes=1)).metrics
-    head, _, *lines = criteria_table("springs", metrics).splitlines()
+    head, _, *lines = criteria_table({"`springs`": metrics}).splitlines()
     assert head == "|  | criterion | `springs` |  | criterion | `springs` |"
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
     names = [row[0] for row in cells] + [row[3] for row in cells]
