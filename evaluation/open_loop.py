@@ -22,8 +22,8 @@ from .recording import TICK, Recording, record
 from .stride_tally import WARM_UP
 
 KNOTS = 50
-"""Phases at which a mean K is given, linear between them: every 2 % of the stride, on which the knots of the tuned
-schedule lie, and at 50 Hz a decision or so to each."""
+"""Phases at which a mean K is given, linear between them: every 2 % of the stride, on which all corners of the tuned
+schedule but one lie, and at 50 Hz a decision or so to each."""
 SMOOTHING = 0.01
 """Weight of the curvature at a knot against one decision on it: nothing, but where a leg skips phases."""
 EPISODES, SECONDS = 8, 12.0

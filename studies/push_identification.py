@@ -4,7 +4,7 @@
     springfoot study identify schedule frozen:pretrained pretrained --page docs/results.md
     springfoot study identify schedule frozen:pretrained --repeats 200 --page docs/results.md
 
-`frozen:POLICY` is a policy's mean K over the phase, played open loop.
+`frozen:POLICY` is a policy's mean K over the phase, played open loop (`springfoot.evaluation.open_loop`).
 """
 
 from collections.abc import Sequence
@@ -173,7 +173,7 @@ class Identify(WalkingStudy):
     """Find the springs of ankle and toe from walking under random pushes, and whether they are springs at all."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("pretrained",)
-    """Any policies of evaluate.py, and frozen:POLICY: its mean K over the phase, played open loop."""
+    """Any policies of evaluate.py, as frozen:POLICY, its mean K over the phase played open loop."""
     episodes: int = 128
     """Episodes of each policy, each a trial of its own."""
     push_newton: float = 100.0

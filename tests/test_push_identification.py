@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from springfoot.envs.control.foot_springs import FEET
-from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings import body_of
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 from springfoot.gait import SpringfootError
 from springfoot.gait.perturbation import REACTS, SPRING
-from springfoot.gait.stiffness import StiffnessSchedule
 from springfoot.studies.command import study_main
-from springfoot.studies.identifiability import mean_springs
-from springfoot.studies.open_loop import COPIED_PHASES, frozen
 from springfoot.studies.push_experiment import Row, identified, prepare_pushed, samples
 
 PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}
