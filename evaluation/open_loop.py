@@ -21,16 +21,16 @@ from springfoot.gait.stiffness import SPRINGS
 from .recording import TICK, Recording, record
 from .stride_tally import WARM_UP
 
-KNOTS = 50
+MEAN_KNOTS = 50
 """Phases at which a mean K is given, linear between them: every 2 % of the stride, on which all corners of the tuned
 schedule but one lie, and at 50 Hz a decision or so to each."""
 SMOOTHING = 0.01
 """Weight of the curvature at a knot against one decision on it: nothing, but where a leg skips phases."""
-EPISODES, SECONDS = 8, 12.0
+COPY_EPISODES, COPY_SECONDS = 8, 12.0
 """Undisturbed walking whose mean K is taken, at each speed; seeds 0 to 7: some 150 decisions to a knot."""
 UNDISTURBED: dict[str, Any] = {
     name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS if THEME_OF[name] in ("episode", "disturbance")
-} | {"unevenness_m": 0.0, "episode_seconds": SECONDS}
+} | {"unevenness_m": 0.0, "episode_seconds": COPY_SECONDS}
 """Settings of that walking; body, speed, slope, friction and all else are those asked for."""
 SAME_K = 1e-9
 """Variance of log K below which K is constant and has no share of anything."""
@@ -52,16 +52,20 @@ def decided(recording: Recording) -> tuple[NDArray, NDArray]:
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """(KNOTS, C) the periodic curve, linear between knots, of least squares from `values` (n, C) at `phase` (n,)."""
-    normal, circle = np.zeros((KNOTS, KNOTS)), np.arange(KNOTS)
-    knot = np.minimum((phase * KNOTS).astype(int), KNOTS - 1)
-    following, way = (knot + 1) % KNOTS, phase * KNOTS - knot
-    normal[circle, circle] = np.bincount(knot, (1 - way) ** 2, KNOTS) + np.bincount(following, way**2, KNOTS)
-    beside = np.bincount(knot, (1 - way) * way, KNOTS)
-    normal[circle, (circle + 1) % KNOTS] = beside
-    normal[(circle + 1) % KNOTS, circle] = beside
-    curvature = np.roll(np.eye(KNOTS), 1, axis=1) + np.roll(np.eye(KNOTS), -1, axis=1) - 2 * np.eye(KNOTS)
-    sums = [np.bincount(knot, (1 - way) * v, KNOTS) + np.bincount(following, way * v, KNOTS) for v in values.T]
+    """(MEAN_KNOTS, C) the periodic curve, linear between knots, of least squares from `values` (n, C) at `phase` (n,)."""
+    normal, circle = np.zeros((MEAN_KNOTS, MEAN_KNOTS)), np.arange(MEAN_KNOTS)
+    knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
+    following, way = (knot + 1) % MEAN_KNOTS, phase * MEAN_KNOTS - knot
+    normal[circle, circle] = np.bincount(knot, (1 - way) ** 2, MEAN_KNOTS) + np.bincount(following, way**2, MEAN_KNOTS)
+    beside = np.bincount(knot, (1 - way) * way, MEAN_KNOTS)
+    normal[circle, (circle + 1) % MEAN_KNOTS] = beside
+    normal[(circle + 1) % MEAN_KNOTS, circle] = beside
+    curvature = (
+        np.roll(np.eye(MEAN_KNOTS), 1, axis=1) + np.roll(np.eye(MEAN_KNOTS), -1, axis=1) - 2 * np.eye(MEAN_KNOTS)
+    )
+    sums = [
+        np.bincount(knot, (1 - way) * v, MEAN_KNOTS) + np.bincount(following, way * v, MEAN_KNOTS) for v in values.T
+    ]
     return np.linalg.solve(normal + SMOOTHING * curvature.T @ curvature, np.stack(sums, -1))
 
 
@@ -90,7 +94,7 @@ def open_loop_copy(
 
     Args:
         policy: observations to actions.
-        settings: in which it walks; its body on its ground, `UNDISTURBED`, is where the mean is taken, of `EPISODES`.
+        settings: in which it walks; its body on its ground, `UNDISTURBED`, is where the mean is taken, of `COPY_EPISODES`.
         name: what the policy is called in errors.
         threads: of the physics; any number gives the same bits.
 
@@ -102,11 +106,11 @@ def open_loop_copy(
     alone = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     means: dict[float, NDArray] = {}
     for speed in tabulated_speeds(settings).tolist():
-        recording = record(policy, replace(alone, speed=speed), name=name, episodes=EPISODES, threads=threads)
+        recording = record(policy, replace(alone, speed=speed), name=name, episodes=COPY_EPISODES, threads=threads)
         phase, stiffness = decided(recording)
         if len(phase):
             knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
-            at = np.arange(KNOTS) / KNOTS
+            at = np.arange(MEAN_KNOTS) / MEAN_KNOTS
             means[speed] = np.stack([np.interp(GRID, at, curve, period=1.0) for curve in knots.T], -1)
     if not means:
         raise SpringfootError(f"{name} walks no strides after {WARM_UP:g} s whose mean stiffness could be taken")

@@ -37,7 +37,7 @@ PAIRS = "pairs.csv"
 """Name of the file with a row for each pair."""
 PAIRS_OPEN_LOOP = "pairs_open_loop.csv"
 """Name of the file with a row for each pair as walked by the policy's open-loop copy."""
-FORCES = "grf_vertical_r"
+VERTICAL_R = "grf_vertical_r"
 """The one column that is not told of the copy."""
 WORST_FALLS = 10
 """Falls that are told one by one."""
@@ -45,7 +45,7 @@ WORST_FALLS = 10
 QUANTITIES = (
     ("speed error %", "speed_error_percent", ".1f", abs),
     *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
-    ("vertical force r", FORCES, ".3f", lambda r: -r),
+    ("vertical force r", VERTICAL_R, ".3f", lambda r: -r),
 )
 """Label, column, format, and how bad a value is."""
 
@@ -111,7 +111,7 @@ def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, A
         if standing := _standing(rows, column, badness):
             line = [label, *_spread(standing, column, pattern), _who(standing[-1])]
             if copy:
-                beside = _standing(copy, column, badness) if column != FORCES else []
+                beside = _standing(copy, column, badness) if column != VERTICAL_R else []
                 line += _spread(beside, column, pattern) if beside else ["", "", ""]
             lines.append(line)
     columns = ("median", "95 % within", "worst")
