@@ -52,7 +52,7 @@ def decided(recording: Recording) -> tuple[NDArray, NDArray]:
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """(MEAN_KNOTS, C) the periodic curve, linear between knots, of least squares from `values` (n, C) at `phase` (n,)."""
+    """(MEAN_KNOTS, C) periodic curve, linear between knots, of least squares from `values` (n, C) at `phase` (n,)."""
     normal, circle = np.zeros((MEAN_KNOTS, MEAN_KNOTS)), np.arange(MEAN_KNOTS)
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
     following, way = (knot + 1) % MEAN_KNOTS, phase * MEAN_KNOTS - knot
@@ -94,7 +94,7 @@ def open_loop_copy(
 
     Args:
         policy: observations to actions.
-        settings: in which it walks; its body on its ground, `UNDISTURBED`, is where the mean is taken, of `COPY_EPISODES`.
+        settings: in which it walks; the mean is of its body on its ground, `UNDISTURBED`.
         name: what the policy is called in errors.
         threads: of the physics; any number gives the same bits.
 

