@@ -1,12 +1,13 @@
-"""What leg constants pay in the search of `leg_tuning`: how far their simulated walks are from people's.
+"""What leg constants pay in the search of `leg_tuning`: how far their simulated walks are from people's and the plan's.
 
-Every candidate walks from random starts with the fixed schedule, with and without pushes, and with two constant
-stiffnesses. It pays for falls, and on its unpushed scheduled walks for the distance from people in speed, joint angles,
-ground reaction force and ankle and knee moment.
+`misses` is the one ruler: a vector of what a walk with the fixed schedule misses, each in units of its tolerance.
+`cost`, which generations are ranked by, is its length, and a price for falls: every candidate walks from random starts
+with and without pushes, and with two constant stiffnesses. `all_misses`, which the refinement squares, is the vector
+itself, on one walk and on pushed ones.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,46 +25,56 @@ from springfoot.envs.step_result import Tick
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
 from springfoot.gait.human import HumanGait
-from springfoot.gait.scores import stride_work, travel
+from springfoot.gait.scores import force_features, stride_work, travel
 
 SECONDS = 6.5
 """Length of each walk [s]."""
 SETTLED = 2.5
 """Strides that begin later [s] are measured."""
-SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 3
+SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 2
 """Walks of each candidate: with the schedule; with constant ankle and toe stiffness [N m/rad]; pushed."""
-TOLERANCE = {
-    "speed": 0.03,  # m/s
-    "period": 0.03,  # share of the plan's stride time
-    "thigh": np.deg2rad(1.2),
-    "knee": np.deg2rad(2.0),
-    "ankle": np.deg2rad(1.4),
-    "toe": np.deg2rad(6.0),
-    "grf_vertical": 0.06,  # body weights
-    "grf_forward": 0.015,
-    "force_peak": 0.08,  # largest 10 ms value of a stride beyond 1.2 body weights
-    "hip_moment": 0.10,  # N m/kg
-    "knee_moment": 0.10,
-    "ankle_moment": 0.08,
-    "late_hip_moment": 0.1,  # the largest of the hip's from LATE_SWING on, beyond people's
-    "work": 0.03,  # J/kg a stride, of hip, knee, ankle, positive and negative: farther from people's than WORK_BAND
-    "effort": 0.1,  # J/kg a stride: positive work of the whole leg beyond people's
-    "com_x": 0.015,  # m, against the plan
-    "com_z": 0.006,
-    "com_speed": 0.05,  # m/s, forward, against the plan over the step
-    "cop": 0.02,  # m, against the plan's ZMP
-    "double_support": 0.02,  # s, against people's
-    "travel": 0.008,  # m a stance, of the sole on the floor
-    "unsteady": 0.06,  # SD of the vertical force over strides [body weights]
-    "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
-}
-"""Error e at which sqrt(1 + (e / tolerance)^2) - 1 costs 0.41; far beyond, it costs e / tolerance."""
+REFINED = ((0.25, 7, 0.0, 1.0), (0.75, 11, 1.0, 0.25), (0.25, 13, 1.0, 0.25), (0.45, 17, 1.0, 0.25))
+"""Walks of `all_misses`: phase at the start, seed, share of the push, weight."""
+REFINED_SECONDS, REFINED_SETTLED = 10.0, 4.0
+"""Their length, and when the strides that are measured begin [s]."""
 CURVES = ("thigh", "knee", "ankle", "toe", "grf_vertical", "grf_forward", "hip_moment", "knee_moment", "ankle_moment")
 """People's curves that a walk is held against."""
+PLANNED = ("com_x", "com_z", "com_speed")
+"""What of the CoM is held against the plan."""
+TOLERANCE = {
+    "thigh": np.deg2rad(1.1),
+    "knee": np.deg2rad(2.2),
+    "ankle": np.deg2rad(1.2),
+    "toe": np.deg2rad(8.0),
+    "grf_vertical": 0.07,  # body weights
+    "grf_forward": 0.02,
+    "hip_moment": 0.11,  # N m/kg
+    "knee_moment": 0.11,
+    "ankle_moment": 0.09,
+    "com_x": 0.02,  # m, against the plan
+    "com_z": 0.008,
+    "com_speed": 0.06,  # m/s, forward, against the plan over the step
+    "cop": 0.025,  # m, against the plan's ZMP
+    "beyond_sd": 0.1,  # N m/kg, of the hip moment beyond 1.9 SD from people's
+    "late_hip_moment": 0.16,  # N m/kg, from LATE_SWING on, beyond LATE_HIP_MOMENT
+    "speed": 0.02,  # m/s
+    "period": 0.02,  # share of the plan's stride time
+    "double_support": 0.02,  # s, against people's
+    "vertical": 0.03,  # body weights, each of the two peaks and the valley farther from people's than 0.05
+    "fore_aft": 0.01,  # body weights, braking and forward peak farther from people's than 0.03
+    "peak_moment": 0.05,  # N m/kg, of the ankle farther from people's than 0.07
+    "work": 0.03,  # J/kg a stride, of hip, knee, ankle, positive and negative: farther from people's than 0.045
+    "effort": 0.04,  # J/kg a stride: positive work of the leg beyond 1.24 of people's
+    "force_peak": 0.08,  # body weights, the largest 10 ms of a stride beyond 1.2
+    "travel": 0.01,  # m a stance, of the sole on the floor
+    "unsteady": 0.05,  # SD of the vertical force over strides [body weights]
+    "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
+}
+"""What counts as one, root mean square over the stride for a curve."""
 LATE_SWING = 0.8
 """Stride phase from which the hip holds the leg back before it lands."""
-WORK_BAND = 0.03
-"""Difference from people's work that costs nothing [J/kg a stride]."""
+LATE_HIP_MOMENT = 0.30
+"""Largest hip moment then that costs nothing [N m/kg]: people's is 0.15, SD 0.07; less takes the thigh farther off."""
 FALL_COST = 30.0
 """Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
 further costs proportionally less, down to a third."""
@@ -75,7 +86,8 @@ def cost(
     """(C,) what each candidate pays; `push` [N], `ease` as in `_walk`."""
     walks = SCHEDULED + len(CONSTANT)
     total = np.zeros(len(candidates))
-    missing, biped, ticks = _walk(settings, candidates, walks, seed, threads, ease)
+    seeds = [seed + index % walks for index in range(walks * len(candidates))]
+    missing, biped, ticks = _walk(settings, candidates, seeds, threads, ease)
     records = _record(biped, ticks)
     scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
     speed = _speed(records)
@@ -84,44 +96,67 @@ def cost(
         if missing[index] > 0:
             total[candidate] += missing[index] * (3 * FALL_COST / SCHEDULED if scheduled[index] else FALL_COST / walks)
         elif scheduled[index]:
-            total[candidate] += _distance(records, index, biped, speed[index]) / SCHEDULED
+            missed = misses(records, index, biped, SETTLED)
+            total[candidate] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / SCHEDULED
         else:
             total[candidate] += min(((speed[index] - settings.speed) / TOLERANCE["constant_speed"]) ** 2, 3.0)
     pushed = replace(settings, push_newton=push, push_interval=2.5)
-    missing = _walk(pushed, candidates, PUSHED, seed, threads, ease, watched=False)[0]
+    seeds = [seed + index % PUSHED for index in range(PUSHED * len(candidates))]
+    missing = _walk(pushed, candidates, seeds, threads, ease, constant=(), watched=False)[0]
     return total + FALL_COST * missing.reshape(len(candidates), PUSHED).mean(1)
+
+
+def all_misses(
+    settings: BipedSettings, candidates: Sequence[LegConstants], threads: int, push: float
+) -> list[NDArray | None]:
+    """The misses of each candidate on the walks of `REFINED`, weighted; None if it falls in one of them."""
+    found: list[list[NDArray] | None] = [[] for _ in candidates]
+    for start, seed, share, weight in REFINED:
+        own = replace(settings, start=start, push_newton=share * push, push_interval=2.0)
+        seeds = [seed] * len(candidates)
+        missing, biped, ticks = _walk(own, candidates, seeds, threads, constant=(), seconds=REFINED_SECONDS)
+        records = _record(biped, ticks)
+        for index, own_misses in enumerate(found):
+            missed = None if missing[index] > 0 else misses(records, index, biped, REFINED_SETTLED)
+            if missed is None or own_misses is None:
+                found[index] = None
+            else:
+                own_misses.append(weight * missed)
+    return [None if each is None else np.concatenate(each) for each in found]
 
 
 def _walk(
     settings: BipedSettings,
     candidates: Sequence[LegConstants],
-    walks: int,
-    seed: int,
+    seeds: Sequence[int],
     threads: int,
-    ease: float,
+    ease: float = 0.0,
+    constant: Sequence[tuple[float, float]] = CONSTANT,
+    seconds: float = SECONDS,
     watched: bool = True,
 ) -> tuple[NDArray, Biped, list[Tick]]:
-    """Walk every candidate `walks` times, at an equilibrium that is the share `ease` planned.
+    """Walk candidates equally often, one walk for each of `seeds`, at an equilibrium that is the share `ease` planned.
+
+    The last walks of each have the stiffnesses `constant`, the others the schedule.
 
     Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end, and standing
     still counts as one; the core; and, if `watched`, every tick.
     """
-    num = len(candidates) * walks
+    num, walks = len(seeds), len(seeds) // len(candidates)
     variant = np.repeat(np.arange(len(candidates)), walks)
     rest = _eased(settings, candidates, ease) if ease else None
     biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest)
-    biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
-    fixed = action_of(np.array(CONSTANT), settings, biped.body)
-    role = np.tile(np.arange(walks), len(candidates)) - SCHEDULED
+    biped.reset(np.arange(num), seeds)
+    role = np.tile(np.arange(walks), len(candidates)) - (walks - len(constant))
     ticks: list[Tick] = []
     biped.on_tick = ticks.append if watched else None
     active, walked = np.ones(num, bool), np.zeros(num)
-    for _ in range(round(SECONDS / biped.dt)):
+    for _ in range(round(seconds / biped.dt)):
         action = action_of(biped.scheduled_stiffness(), settings, biped.body)
-        for index in range(len(CONSTANT) if walks > PUSHED else 0):
-            action[role == index] = fixed[index]
+        for index, stiffness in enumerate(constant):
+            action[role == index] = action_of(stiffness, settings, biped.body)
         result = biped.step(action.reshape(num, -1), active)
-        walked = np.where(active, biped.measurement.com[:, 0] / (settings.speed * SECONDS), walked)
+        walked = np.where(active, biped.measurement.com[:, 0] / (settings.speed * seconds), walked)
         active &= ~result.terminated
         if not active.any():
             break
@@ -171,17 +206,17 @@ def _speed(record: dict[str, NDArray]) -> NDArray:
     return way / max((last - first) * Biped.tick_dt, Biped.tick_dt)
 
 
-def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float) -> float:
-    """Distance of one walk from people."""
+def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float) -> NDArray | None:
+    """What walk `index` misses in strides that begin after `settled` [s], in tolerances; None if it takes too few."""
     human, weight, tick = biped.human, biped.body.mass * GRAVITY, Biped.tick_dt
     phase = PERCENT / 100
     curves, periods, supports, travels = [], [], [], []
     off_plan = record["com"][:, index] - record["planned_com"][:, index]
     for side in range(len(SIDES)):
         angle, moment, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
-        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(SETTLED)
+        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
         if len(strides) < 2:
-            return FALL_COST / 2
+            return None
         thigh = angle[:, HIP] - record["pitch"][:, index]
         series = np.column_stack(
             [
@@ -196,41 +231,45 @@ def _distance(record: dict[str, NDArray], index: int, biped: Biped, speed: float
         )
         curves.append(on_percent(series, strides[:, 0], strides[:, 2], tick))
         periods.append(strides[:, 2] - strides[:, 0])
-        supports.append((strides[:, 1] - strides[:, 0]) - 0.5 * (strides[:, 2] - strides[:, 0]))
+        supports.append(strides[:, 1] - strides[:, 0] - 0.5 * periods[-1])
         for start, leave, _ in np.floor(strides / tick).astype(int):
             sole = slice(start, leave + 1), index, side
             travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
     stride = np.concatenate(curves)
-    mean = stride.mean(0)
+    mean, period = stride.mean(0), np.mean(np.concatenate(periods))
     theirs, their_work = _people(human)
-    errors = dict(zip(CURVES, _rms(mean[:, : len(CURVES)] - theirs), strict=True))
-    late = phase > LATE_SWING, CURVES.index("hip_moment")
-    errors["late_hip_moment"] = max(mean[late].max() - theirs[late].max(), 0.0)
-    off = mean[:, len(CURVES) : len(CURVES) + 3]
-    off = off - np.array([0.0, 0.0, 1.0]) * biped.plan.com_velocity((2 * phase) % 1.0)[0][:, None]
-    errors |= zip(("com_x", "com_z", "com_speed"), _rms(off), strict=True)
+    off = dict(zip(CURVES, (mean[:, : len(CURVES)] - theirs).T, strict=True))
+    speed = mean[:, len(CURVES) + 2].copy()
+    planned = np.array([0.0, 0.0, 1.0]) * biped.plan.com_velocity((2 * phase) % 1.0)[0][:, None]
+    off |= zip(PLANNED, (mean[:, len(CURVES) : len(CURVES) + len(PLANNED)] - planned).T, strict=True)
     step = phase < 0.5
-    errors["cop"] = _rms(mean[step, len(CURVES) + 3] - biped.plan.zmp(2 * phase[step]))
-    period = np.mean(np.concatenate(periods))
-    errors["travel"] = np.mean(travels)
-    errors["speed"] = speed - biped.settings.speed
-    errors["period"] = period / (2 * biped.plan.step_time) - 1
-    errors["double_support"] = np.mean(np.concatenate(supports)) - (human.toe_off - 0.5) * human.stride_time
-    errors["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
-    errors["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - 1.2, 0.0))
-    work = np.abs(mean[:-1, len(CURVES) + 4 :].mean(0).reshape(len(JOINTS), 2)) * period
-    beyond = np.maximum(np.abs(work[: len(their_work)] - their_work) - WORK_BAND, 0.0)
-    errors["effort"] = max(work[:, 0].sum() - their_work[:, 0].sum(), 0.0)
-    total = sum(_price(error, name) for name, error in errors.items())
-    return float(total + sum(_price(error, "work") for error in beyond.ravel()))
+    off["cop"] = mean[step, len(CURVES) + len(PLANNED)] - biped.plan.zmp(2 * phase[step])
+    off["beyond_sd"] = _beyond(off["hip_moment"], 1.9 * human.sd("hip_moment", phase))
+    off = {name: values / np.sqrt(len(values)) for name, values in off.items()}
+    hip = mean[phase > LATE_SWING, CURVES.index("hip_moment")]
+    off["late_hip_moment"] = np.maximum(hip - LATE_HIP_MOMENT, 0.0)
+    off["speed"] = speed.mean() - biped.settings.speed
+    off["period"] = period / (2 * biped.plan.step_time) - 1
+    off["double_support"] = np.mean(np.concatenate(supports)) - (human.toe_off - 0.5) * human.stride_time
+    own, people = (astuple(force_features(*each[:, 4:6].T)) for each in (mean, theirs))
+    peaks, fore_aft = slice(0, 3), slice(3, 5)
+    off["vertical"], off["fore_aft"] = (
+        _beyond(np.subtract(own[part], people[part]), band) for part, band in ((peaks, 0.05), (fore_aft, 0.03))
+    )
+    ankle = CURVES.index("ankle_moment")
+    off["peak_moment"] = _beyond(mean[:, ankle].max() - theirs[:, ankle].max(), 0.07)
+    work = np.abs(mean[:-1, len(CURVES) + len(PLANNED) + 1 :].mean(0).reshape(len(JOINTS), 2)) * period
+    off["work"] = _beyond(work[: len(their_work)] - their_work, 0.045)
+    off["effort"] = max(work[:, 0].sum() - 1.24 * their_work[:, 0].sum(), 0.0)
+    off["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - 1.2, 0.0))
+    off["travel"] = np.mean(travels)
+    off["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
+    return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
 
 
-def _rms(error: NDArray) -> NDArray:
-    return np.sqrt(np.mean(error**2, axis=0))
-
-
-def _price(error: float, name: str) -> float:
-    return float(np.hypot(1.0, error / TOLERANCE[name]) - 1.0)
+def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
+    """What of a difference lies beyond a band about 0."""
+    return np.sign(difference) * np.maximum(np.abs(difference) - band, 0.0)
 
 
 @lru_cache(maxsize=16)

@@ -3,10 +3,12 @@
     springfoot study leg-tuning --equilibrium planned --cadence people
     springfoot study leg-tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
 
-What a candidate pays stands in `leg_cost`. The result is a fit to people's curves, not a prediction.
+Least squares on the same ruler then refine the best of the search. What a candidate pays stands in `leg_cost`. The
+result is a fit to people's curves, not a prediction.
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -15,6 +17,7 @@ import cma
 import numpy as np
 import tyro
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from tqdm import tqdm
 
 from springfoot.agents.files import csv_text
@@ -24,7 +27,7 @@ from springfoot.gait.errors import SpringfootError, require_count, require_numbe
 from springfoot.gait.plan import Cadence
 
 from .constants_file import CONSTANTS, read_constants, write_constants
-from .leg_cost import SECONDS, cost
+from .leg_cost import FALL_COST, REFINED_SECONDS, all_misses, cost
 from .study import Answer, OnProgress, Study
 
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
@@ -37,6 +40,12 @@ ADDITIVE_STEP = {
     "period_speed_gain": 0.03,
 }
 """One unit of the search for constants that may change sign or vanish, in their own units."""
+DIFFERENCE = 0.08
+"""Step of the refinement's differences [units of the search]; chosen: less drowns in what a walk changes by itself."""
+STEEPEST = 5.0
+"""Largest derivative it believes [tolerances per unit]; beyond, the walk tipped over."""
+KEPT = 0.17
+"""What a constant pays in the refinement for each unit that it leaves its start [tolerances]."""
 
 
 class Search:
@@ -80,6 +89,8 @@ class LegTuning(Study):
     """Generations of the search."""
     population: int = 20
     """Candidates in each."""
+    refinements: int = 0
+    """Steps of least squares after the generations, from where these end."""
     sigma: float = 0.5
     """First spread, in units of the search."""
     ease: int = 0
@@ -93,20 +104,23 @@ class LegTuning(Study):
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
 
-    QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2}
+    QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2, "refinements": 0}
     PAGED: ClassVar[bool] = False
-    UNIT: ClassVar[str] = " generations"
+    UNIT: ClassVar[str] = " steps"
 
     def check(self) -> None:
         """Refuse counts out of range."""
-        for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0), ("ease", 0)):
+        for count, least in (
+            *(("generations", 1), ("population", 2), ("refinements", 0)),
+            *(("threads", 1), ("seed", 0), ("ease", 0)),
+        ):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
 
     @property
     def total(self) -> float:
-        """Generations."""
-        return self.generations
+        """Generations and steps of refinement."""
+        return self.generations + self.refinements
 
     def ask(self, progress: OnProgress) -> Answer:
         """Search.
@@ -126,7 +140,7 @@ class LegTuning(Study):
             cadence=self.cadence,
             speed=self.speed,
             feedforward=self.feedforward,
-            episode_seconds=SECONDS + 1,
+            episode_seconds=REFINED_SECONDS + 1,
         )
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
@@ -143,8 +157,48 @@ class LegTuning(Study):
                 self._keep(name, search.constants(strategy.mean))
                 tqdm.write(_told(*lines[-1]))
         found = search.constants(strategy.mean)
-        text = f"{json.dumps({name: asdict(found)})}\n\n{_told(*lines[-1])}"
+        told = _told(*lines[-1])
+        if self.refinements:
+            found, misses = self._refined(found, settings, lambda better: self._keep(name, better), progress)
+            told += f"; then misses {misses[0]:.2f} to {misses[-1]:.2f}"
+        text = f"{json.dumps({name: asdict(found)})}\n\n{told}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
+
+    def _refined(
+        self,
+        start: LegConstants,
+        settings: BipedSettings,
+        keep: Callable[[LegConstants], None],
+        progress: OnProgress,
+    ) -> tuple[LegConstants, list[float]]:
+        """The constants with the least squares of `leg_cost.all_misses` near `start`, and the length after each step.
+
+        Derivatives are differences, all constants side by side; a candidate that falls is as far off as can be.
+        """
+        search, lengths = Search(start), []
+
+        def missed(vectors: NDArray) -> list[NDArray | None]:
+            return all_misses(settings, [search.constants(v) for v in vectors], self.threads, self.push_newton)
+
+        def own(vector: NDArray) -> NDArray:
+            (found,) = missed(vector[None])
+            far = np.full(size, FALL_COST) if found is None else found
+            return np.concatenate([far, KEPT * vector])
+
+        def slopes(vector: NDArray) -> NDArray:
+            here, *there = missed(vector + DIFFERENCE * np.eye(search.size + 1, search.size, -1))
+            keep(search.constants(vector))
+            lengths.append(float(np.linalg.norm(here)) if here is not None else FALL_COST)
+            progress(1)
+            columns = [np.zeros(size) if each is None or here is None else (each - here) / DIFFERENCE for each in there]
+            return np.concatenate([np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST), KEPT * np.eye(search.size)])
+
+        (first,) = missed(np.zeros((1, search.size)))
+        if first is None:
+            raise SpringfootError("the constants that the generations end with fall, so that they cannot be refined")
+        size = len(first)
+        result = least_squares(own, np.zeros(search.size), slopes, max_nfev=self.refinements)
+        return search.constants(result.x), [*lengths, float(np.linalg.norm(result.fun[:size]))]
 
     def _keep(self, name: str, found: LegConstants) -> None:
         """Write what was found so far, and the command that does, into the file of constants; with --quick nothing."""
