@@ -28,9 +28,9 @@ from springfoot.envs.settings import (
     settings_to_json,
 )
 from springfoot.envs.step_result import Tick
+from springfoot.gait.com_plan import ComPlan
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.plan import WalkPlan
 
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -250,7 +250,7 @@ def _walk(
     return ticks, returns, reason, series
 
 
-def _planned(plan: WalkPlan) -> dict[str, NDArray]:
+def _planned(plan: ComPlan) -> dict[str, NDArray]:
     """`plan_com` and `plan_zmp` of a `Recording`."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)

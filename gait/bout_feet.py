@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
+from .com_plan import Point
 from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
-from .plan import Point, WalkPlan
+from .plan import WalkPlan
 from .posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_angle
 
 

@@ -17,13 +17,13 @@ from scipy.interpolate import PchipInterpolator
 
 from .body import GRAVITY, Body
 from .cart_table import ComMotion, periodic_com
+from .com_plan import ComPlan, Point
 from .errors import SpringfootError, require_within
 from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
 from .human import ANGLES, HumanGait, human_gait
 from .posture import POSTURE_SAMPLES, LegPostures, highest_legs, legs_under_com, refuse_impossible_legs
 
 Cadence = Literal["people", "thesis"]
-Point = tuple[NDArray, NDArray]
 
 PLAN_SPEED_RANGE = (0.4, 2.0)
 """Accepted speeds [m/s]; chosen: people's data reach from 0.85 to 1.96."""
@@ -48,62 +48,19 @@ speeds."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WalkPlan:
-    """A periodic walk; made by `plan_walk`.
+class WalkPlan(ComPlan):
+    """A periodic walk, CoM, feet and legs; made by `plan_walk`.
 
-    Step phase 0..1 runs from the heel strike of the leading foot to that of the other one. Its frame has x [m]
-    forward of the leading (stance) foot's ankle when flat, z [m] up from the floor. Stride phase 0..1 belongs to one
-    leg, from its heel strike to its next, in that foot's frame. Phases may have any shape and are taken modulo 1.
-    On a slope x is along the ground and z at right angles to it; angles stay as they are: the thigh's to the true
-    vertical, knee, ankle and toe between segments.
+    Stride phase 0..1 belongs to one leg, from its heel strike to its next, in that foot's frame. On a slope angles
+    stay as they are: the thigh's to the true vertical, knee, ankle and toe between segments.
     """
 
-    body: Body
-    """The body that walks."""
-    speed: float
-    """Mean forward speed along the ground [m/s] = step_length / step_time."""
-    step_time: float
-    """Heel strike to heel strike of the other foot [s]."""
-    step_length: float
-    """Heel strike to heel strike of the other foot [m]."""
-    double_support: float
-    """Heel strike to toe-off of the other foot [s]."""
-    motion: ComMotion
-    """The CoM over the time of a step, lowest in the middle of double support."""
     feet: FootPath
     """The path of either foot over its stride, with the phases of foot flat, heel-off and toe-off."""
-    human: HumanGait
-    """People's gait at this speed and height, or what `plan_walk` was given in its place."""
     joint_table: PchipInterpolator = field(repr=False)
     """thigh, knee, ankle, toe [rad] over stride phase, a little beyond 0..1."""
     hip_table: PchipInterpolator = field(repr=False)
     """Hip x, z [m] in the foot's frame over stride phase, a little beyond 0..1."""
-
-    @property
-    def slope(self) -> float:
-        """Slope of the ground [rad], uphill positive."""
-        return self.motion.slope
-
-    @property
-    def stride_time(self) -> float:
-        """Time of two steps [s]."""
-        return 2 * self.step_time
-
-    def com(self, step_phase: ArrayLike) -> Point:
-        """CoM (x from the stance ankle, z from the floor) [m]."""
-        return self.motion.position(self._time(step_phase))
-
-    def com_velocity(self, step_phase: ArrayLike) -> Point:
-        """CoM velocity (forward, up) [m/s]."""
-        return self.motion.velocity(self._time(step_phase))
-
-    def com_acceleration(self, step_phase: ArrayLike) -> Point:
-        """CoM acceleration (forward, up) [m/s^2], continuous through the steps."""
-        return self.motion.acceleration(self._time(step_phase))
-
-    def zmp(self, step_phase: ArrayLike) -> NDArray:
-        """ZMP [m] from the stance ankle, by equation (1) from the planned motion itself."""
-        return self.motion.zmp(self._time(step_phase))
 
     def support(self, step_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Rear and front end [m] of the hull of what is on the ground of both feet, in the step's frame."""
@@ -136,9 +93,6 @@ class WalkPlan:
     def toe_joint_position(self, stride_phase: ArrayLike) -> Point:
         """Toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat to toe-off."""
         return self.feet.toe_joint(stride_phase)
-
-    def _time(self, step_phase: ArrayLike) -> NDArray:
-        return np.mod(np.asarray(step_phase, float), 1.0) * self.step_time
 
 
 def plan_walk(

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.gait.body import Body
+from springfoot.gait.com_plan import ComPlan, over_peoples_zmp
 from springfoot.gait.human import HumanGait
 from springfoot.gait.kinetics import planned_moments
 from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
@@ -45,8 +46,8 @@ class ReferenceWalk:
     """Walking speed [m/s]."""
     human: HumanGait
     """The gait that the body is held to."""
-    plan: WalkPlan
-    """The planned motion of the CoM, and the time of a stride."""
+    plan: ComPlan
+    """The planned motion of the CoM over people's ZMP, and the time of a stride."""
     constants: tuple[LegConstants, ...]
     """Leg constants: one set, or several variants."""
     moments: NDArray
@@ -79,7 +80,7 @@ def reference_walk_at(
         body=body,
         speed=speed,
         human=human,
-        plan=plan,
+        plan=over_peoples_zmp(plan),
         constants=tuple(legs),
         moments=_plans_moments(plan) if settings.feedforward == "plan" else _peoples_moments(human, body),
     )

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.com_plan import ComPlan
 from springfoot.gait.human import ANGLES, HumanGait
-from springfoot.gait.plan import WalkPlan
 
 from ..control.phase_table import GRID
 from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
@@ -65,7 +65,7 @@ def body_scales(body: Body) -> NDArray:
     return scales
 
 
-def reference_curves(plan: WalkPlan, human: HumanGait, step_seconds: float) -> NDArray:
+def reference_curves(plan: ComPlan, human: HumanGait, step_seconds: float) -> NDArray:
     """People and plan over the stride, (SAMPLES,) of dtype `REFERENCE`, for steps of `step_seconds` [s]."""
     curves = np.zeros(len(GRID), REFERENCE)
     curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
