@@ -3,8 +3,8 @@
     springfoot study leg-tuning --equilibrium planned --cadence people
     springfoot study leg-tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
 
-Least squares on the same ruler then refine the best of the search. What a candidate pays stands in `leg_cost`. The
-result is a fit to people's curves, not a prediction.
+Least squares on the same ruler may come first: they find the walk, the generations make it stand pushes. What a
+candidate pays stands in `leg_cost`. The result is a fit to people's curves, not a prediction.
 """
 
 import json
@@ -17,7 +17,6 @@ import cma
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from tqdm import tqdm
 
 from springfoot.agents.files import csv_text
@@ -27,7 +26,7 @@ from springfoot.gait.errors import SpringfootError, require_count, require_numbe
 from springfoot.gait.plan import Cadence
 
 from .constants_file import CONSTANTS, read_constants, write_constants
-from .leg_cost import FALL_COST, REFINED_SECONDS, all_misses, cost
+from .leg_cost import REFINED_SECONDS, all_misses, cost
 from .study import Answer, OnProgress, Study
 
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
@@ -44,6 +43,10 @@ DIFFERENCE = 0.08
 """Step of the refinement's differences [units of the search]; chosen: less drowns in what a walk changes by itself."""
 STEEPEST = 5.0
 """Largest derivative it believes [tolerances per unit]; beyond, the walk tipped over."""
+DAMPINGS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
+"""Dampings that a step of the refinement tries, over the last that served [-]; chosen."""
+LONGEST = 1.5
+"""Largest change of a constant in one of its steps [units of the search]; chosen."""
 KEPT = 0.17
 """What a constant pays in the refinement for each unit that it leaves its start [tolerances]."""
 
@@ -90,7 +93,7 @@ class LegTuning(Study):
     population: int = 20
     """Candidates in each."""
     refinements: int = 0
-    """Steps of least squares after the generations, from where these end."""
+    """Steps of least squares before the generations."""
     sigma: float = 0.5
     """First spread, in units of the search."""
     ease: int = 0
@@ -134,7 +137,7 @@ class LegTuning(Study):
             raise SpringfootError(
                 f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
             )
-        search = Search(constants_from(known[start]))
+        begin = constants_from(known[start])
         settings = BipedSettings(
             equilibrium=self.equilibrium,
             cadence=self.cadence,
@@ -142,6 +145,11 @@ class LegTuning(Study):
             feedforward=self.feedforward,
             episode_seconds=REFINED_SECONDS + 1,
         )
+        told = ""
+        if self.refinements:
+            begin, misses = self._refined(begin, settings, lambda better: self._keep(name, better), progress)
+            told = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
+        search = Search(begin)
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
@@ -157,11 +165,7 @@ class LegTuning(Study):
                 self._keep(name, search.constants(strategy.mean))
                 tqdm.write(_told(*lines[-1]))
         found = search.constants(strategy.mean)
-        told = _told(*lines[-1])
-        if self.refinements:
-            found, misses = self._refined(found, settings, lambda better: self._keep(name, better), progress)
-            told += f"; then misses {misses[0]:.2f} to {misses[-1]:.2f}"
-        text = f"{json.dumps({name: asdict(found)})}\n\n{told}"
+        text = f"{json.dumps({name: asdict(found)})}\n\n{told}{_told(*lines[-1])}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
     def _refined(
@@ -173,32 +177,44 @@ class LegTuning(Study):
     ) -> tuple[LegConstants, list[float]]:
         """The constants with the least squares of `leg_cost.all_misses` near `start`, and the length after each step.
 
-        Derivatives are differences, all constants side by side; a candidate that falls is as far off as can be.
+        Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
+        the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
         """
-        search, lengths = Search(start), []
+        search = Search(start)
 
         def missed(vectors: NDArray) -> list[NDArray | None]:
-            return all_misses(settings, [search.constants(v) for v in vectors], self.threads, self.push_newton)
+            found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)
+            return [None if each is None else np.append(each, KEPT * v) for each, v in zip(found, vectors, strict=True)]
 
-        def own(vector: NDArray) -> NDArray:
-            (found,) = missed(vector[None])
-            far = np.full(size, FALL_COST) if found is None else found
-            return np.concatenate([far, KEPT * vector])
-
-        def slopes(vector: NDArray) -> NDArray:
-            here, *there = missed(vector + DIFFERENCE * np.eye(search.size + 1, search.size, -1))
-            keep(search.constants(vector))
-            lengths.append(float(np.linalg.norm(here)) if here is not None else FALL_COST)
+        place, identity = np.zeros(search.size), np.eye(search.size)
+        (here,) = missed(place[None])
+        if here is None:
+            raise SpringfootError(
+                "the constants to start from fall, so that they cannot be refined: refinements must be 0"
+            )
+        lengths, damping = [float(np.linalg.norm(here))], 1.0
+        for _ in range(self.refinements):
+            there = missed(place + DIFFERENCE * identity)
+            columns = [np.zeros(len(here)) if each is None else (each - here) / DIFFERENCE for each in there]
+            slopes = np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST)
+            normal, downhill = slopes.T @ slopes, -slopes.T @ here
+            tried = []
+            for each in damping * DAMPINGS:
+                step = np.linalg.solve(normal + each * (identity + np.diag(np.diag(normal))), downhill)
+                step *= min(1.0, LONGEST / np.abs(step).max())
+                tried += [(each, place + part * step) for part in (1.0, 0.4)]
+            found = missed(np.array([vector for _, vector in tried]))
+            paid = [np.inf if each is None else float(np.linalg.norm(each)) for each in found]
+            best = int(np.argmin(paid))
+            better = found[best]
+            if better is not None and paid[best] < lengths[-1]:
+                (damping, place), here = tried[best], better
+                keep(search.constants(place))
+            else:
+                damping *= 10.0
+            lengths.append(float(np.linalg.norm(here)))
             progress(1)
-            columns = [np.zeros(size) if each is None or here is None else (each - here) / DIFFERENCE for each in there]
-            return np.concatenate([np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST), KEPT * np.eye(search.size)])
-
-        (first,) = missed(np.zeros((1, search.size)))
-        if first is None:
-            raise SpringfootError("the constants that the generations end with fall, so that they cannot be refined")
-        size = len(first)
-        result = least_squares(own, np.zeros(search.size), slopes, max_nfev=self.refinements)
-        return search.constants(result.x), [*lengths, float(np.linalg.norm(result.fun[:size]))]
+        return search.constants(place), lengths
 
     def _keep(self, name: str, found: LegConstants) -> None:
         """Write what was found so far, and the command that does, into the file of constants; with --quick nothing."""
