@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
 from .com_plan import Point
-from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp
+from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, ROLL_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp, pitch_at
 from .plan import WalkPlan
 from .posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_angle
 
@@ -30,8 +30,8 @@ class BoutFoot:
 
     @property
     def events(self) -> NDArray:
-        """Heel-offs, toe-offs, heel strikes and foot flats [s]."""
-        after_landing = [(f.heel_off - 1, f.toe_off - 1, 0.0, f.foot_flat) for f in self.strides]
+        """Heel-offs, starts of rolling over the toe tip, toe-offs, heel strikes and foot flats [s]."""
+        after_landing = [(f.heel_off - 1, f.tip_off - 1, f.toe_off - 1, 0.0, f.foot_flat) for f in self.strides]
         return (self.landing[:, None] + self.stride_time * np.array(after_landing)).ravel()
 
     def at(self, time: NDArray) -> Iterator[tuple[NDArray, FootPath, NDArray, NDArray]]:
@@ -80,19 +80,29 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
     and more where a swing beside or past the other foot would be in the ground.
     """
     body, times, points = plan.body, *zmp_of_walk(plan)
-    walks = [feet_under_zmp(body, s, times, np.array([points[2] - s, *points[1:]]), clearance) for s in step_lengths]
+    walks = [
+        feet_under_zmp(body, s, times, np.array([points[2] - s, *points[1:]]), plan.feet.roll, clearance)
+        for s in step_lengths
+    ]
     holds = np.concatenate([[0.0, 0.0], np.cumsum(step_lengths), [step_lengths.sum()]])
     strides = []
     for k, travel in enumerate(holds[2:] - holds[:-2]):
         leaves, lands = walks[max(k - 1, 0)], walks[min(k, len(walks) - 1)]
         # A step that starts or ends beside the other foot rolls as in a walk whose swing travels as far.
-        ratio = travel / 2 / body.leg_length
+        ratio, roll = travel / 2 / body.leg_length, plan.feet.roll
+        toe_off, on_tip, heel_strike = leaves.toe_off_pitch, leaves.roll_pitch, lands.heel_strike_pitch
+        if k == 0:
+            toe_off = pitch_at(TOE_OFF_PITCH, ratio, roll)
+            on_tip = min(on_tip, pitch_at(ROLL_PITCH, ratio, roll))
+        if k == len(walks):
+            heel_strike = pitch_at(HEEL_STRIKE_PITCH, ratio, roll)
         stride = replace(
             leaves,
             step_length=travel / 2,
             foot_flat=lands.foot_flat,
-            toe_off_pitch=TOE_OFF_PITCH * ratio**1.5 if k == 0 else leaves.toe_off_pitch,
-            heel_strike_pitch=HEEL_STRIKE_PITCH * ratio**2 if k == len(walks) else lands.heel_strike_pitch,
+            toe_off_pitch=toe_off,
+            roll_pitch=on_tip,
+            heel_strike_pitch=heel_strike,
         )
         strides.append(_out_of_ground(stride))
     landing = plan.step_time * (BEFORE + np.arange(len(strides)))

@@ -1,8 +1,8 @@
 """A planned CoM over one step, without legs; and the one over people's zero-moment point (ZMP).
 
-The planned legs of `plan_walk` stand on a flat toe to the end of double support, so they cannot have people's long one;
-people roll over the tip of their toe. What walks on people's legs (`envs`) follows this CoM instead: same steps, time
-and height, over a ZMP that is where people's is.
+The planned legs of `plan_walk` stand on a flat toe to the end of a double support shorter than people's: under an
+upright trunk people's ZMP would take them from people's angles. What walks on people's legs (`envs`) follows this CoM
+instead: same steps, time and height, over a ZMP that is where people's is.
 """
 
 from dataclasses import dataclass

@@ -93,9 +93,9 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
 
     In single support it is all of equation (2), at the ZMP; in double support `share_forces` gives it. There the centre
     of pressure of the front foot waits at the heel until the foot is flat, and then goes to where the ZMP starts along
-    that foot as the other one leaves. That of the rear foot goes on from where the ZMP left it to the tip of the toe.
-    So the force of each foot starts and ends at zero. In swing the force is 0, and the centre of pressure stays at the
-    tip of the toe.
+    that foot as the other one leaves. That of the rear foot goes on from where the ZMP left it to the tip of the toe,
+    and waits there while the toe rolls over it. So the force of each foot starts and ends at zero. In swing the force
+    is 0, and the centre of pressure stays at the tip of the toe.
     In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat: there the rear foot
     bears it all until then, and both centres of pressure stand still while the load passes over.
     """
@@ -121,7 +121,8 @@ def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, 
     at_start, at_flat, at_end = (float(plan.zmp(each)) for each in (0.0, flat, end))
     if at_flat > heel or tip >= at_end:
         return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
-    rear = np.interp(step_phase, [0.0, end], [at_start, tip])
+    rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)
+    rear = np.interp(step_phase, [0.0, end - rolls], [at_start, tip])
     return rear, np.interp(step_phase, [flat, end], [heel, at_end])
 
 

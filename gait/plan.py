@@ -1,9 +1,10 @@
 """A walk planned by the zero-moment point (ZMP): CoM, feet, leg inverse kinematics -> joint angles over the stride.
 
 The ZMP runs straight from the rear foot to the front one in double support and along the stance foot in single
-support. The feet follow it: the foot is flat as the ZMP passes its heel, and the heel rises as the ZMP passes its toe
-joint, so that the ZMP never leaves what is on the ground. The hip is placed so that the CoM of the whole planned body,
-trunk upright, is the planned CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
+support. The feet follow it: the foot is flat as the ZMP passes its heel, the heel rises as the ZMP passes its toe
+joint, and in a long double support the toe rolls over its tip once the ZMP has passed that, so that the ZMP never
+leaves what is on the ground. The hip is placed so that the CoM of the whole planned body, trunk upright, is the planned
+CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
 """
 
 from collections.abc import Sequence
@@ -17,9 +18,9 @@ from scipy.interpolate import PchipInterpolator
 
 from .body import GRAVITY, Body
 from .cart_table import ComMotion, periodic_com
-from .com_plan import ComPlan, Point
+from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point
 from .errors import SpringfootError, require_within
-from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
+from .feet import FootPath, between, feet_under_zmp, refuse_swing_in_ground
 from .human import ANGLES, HumanGait, human_gait
 from .posture import POSTURE_SAMPLES, LegPostures, highest_legs, legs_under_com, refuse_impossible_legs
 
@@ -34,11 +35,18 @@ STEP_TIME_RANGE = (0.25, 1.2)
 THESIS_STEP_TIME = 0.5
 """Step time of the thesis (T_c) [s], at 1.70 m."""
 DOUBLE_SUPPORT = 0.12
-"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. People's is 0.26 at 1.2 m/s, but they roll over
-their toe tips."""
-ZMP_FROM, ZMP_TO = -0.020, 0.140
-"""ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m]; chosen: of the travels tried,
-this one brings the knee nearest to people's at 1.2 m/s."""
+"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. To its end the toe lies flat; the longer a given
+one, the further the toe rolls over its tip, as people's does in their 0.26 at 1.2 m/s."""
+LEAST_FULL_ROLL = 0.18
+"""The roll is whole, as people's, in a double support of `PEOPLES_SHARE`, but of not less than this over step time [-];
+chosen: people's own at the fastest, 1.96 m/s."""
+ROLLING_STEP = (1.0, 1.5)
+"""Steps up to the first are too short for a roll, from the second on it is whole [foot lengths]; chosen: in short ones
+the tip of the rear foot lies beside the front foot."""
+ZMP_TRAVEL = ((-0.020, 0.140), PEOPLES_ZMP)
+"""ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m], over a flat toe and at a whole
+roll; in between along the straight line. The former is chosen: of the travels tried, it brings the knee nearest to
+people's at 1.2 m/s."""
 RISE = 0.65
 """Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]; chosen: 39
 mm at 1.2 m/s, where people's is 36 to 39 mm."""
@@ -91,7 +99,7 @@ class WalkPlan(ComPlan):
         return self.feet.ankle(stride_phase)
 
     def toe_joint_position(self, stride_phase: ArrayLike) -> Point:
-        """Toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat to toe-off."""
+        """Toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat until the toe rolls over."""
         return self.feet.toe_joint(stride_phase)
 
 
@@ -122,7 +130,9 @@ def plan_walk(
     rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
     `human` takes the place of people (`human_gait`): its step length and time, and its toe in swing.
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
-    is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's.
+    is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. In a longer one
+    the toe rolls over its tip, the further the longer, and the default `zmp_travel` lies further forward: 0.12 s leave
+    0.23 g, and angles 5.6, 7.0 and 9.3 deg off.
     Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
     swing foot in the ground.
     """
@@ -147,10 +157,13 @@ def plan_walk(
     if com_height is not None:
         com_height = require_within("com_height", com_height, (0.5 * body.height, 0.7 * body.height), "m")
 
-    zmp_from, zmp_to = _zmp_travel(body, zmp_travel)
+    full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
+    roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
+    roll *= float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
+    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, roll)
     zmp_times = np.array([0.0, double_support, step_time])
     zmp_points = np.array([zmp_to - step_length, zmp_from, zmp_to])
-    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, clearance)
+    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance)
 
     def legs_at(height: float) -> tuple[ComMotion, LegPostures]:
         motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, double_support / 2, slope)
@@ -186,10 +199,11 @@ def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[flo
     return human.stride_time / 2 / share, human.step_length * share
 
 
-def _zmp_travel(body: Body, given: tuple[float, float] | None) -> tuple[float, float]:
+def _zmp_travel(body: Body, given: tuple[float, float] | None, roll: float) -> tuple[float, float]:
     """ZMP [m] from the stance ankle at the start and end of single support."""
     if given is None:
-        return ZMP_FROM * body.length_scale, ZMP_TO * body.length_scale
+        zmp_from, zmp_to = between(ZMP_TRAVEL, roll) * body.length_scale
+        return float(zmp_from), float(zmp_to)
     if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
         raise SpringfootError(f"zmp_travel must be 2 numbers (start, end of single support) [m], got {given!r}")
     bounds = (-body.foot_length, body.foot_length)
@@ -201,7 +215,7 @@ def _zmp_travel(body: Body, given: tuple[float, float] | None) -> tuple[float, f
 def _refuse_zmp_outside(plan: WalkPlan) -> None:
     feet = plan.feet
     # What is on the ground changes at the events: both sides of each are looked at.
-    events = 2 * np.array([feet.foot_flat, feet.heel_off, feet.toe_off - 0.5])
+    events = 2 * np.array([feet.foot_flat, feet.heel_off, feet.tip_off - 0.5, feet.toe_off - 0.5])
     phase = np.concatenate([np.arange(2000) / 2000, events - 1e-9, events + 1e-9])
     rear, front = plan.support(phase)
     zmp = plan.zmp(phase)

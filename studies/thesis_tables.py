@@ -15,6 +15,7 @@ from springfoot.gait.kinetics import (
     planned_moments,
     projection_table,
 )
+from springfoot.gait.plan import DOUBLE_SUPPORT
 from springfoot.gait.quasi_stiffness import ankle_quasi_stiffness
 from springfoot.gait.scores import correlation, force_features, positive_work
 from springfoot.gait.stiffness import schedule_from_curves
@@ -26,7 +27,7 @@ BODY, THESIS_SPEED = Body(), 1.2
 DOUBLE_SUPPORTS = (0.03, 0.06, 0.09, 0.12, 0.15)
 """T_d of the cart-table's table [s]."""
 TRAVELS = ((0.0, 0.11), (-0.02, 0.14), (-0.08, 0.165))
-"""Its ZMP travels: start and end of single support, forward of the stance ankle [m]; the planner's own in the
+"""Its ZMP travels: start and end of single support, forward of the stance ankle [m]; the default plan's in the
 middle."""
 ANGLE_NOISE = np.radians(0.5)
 """Of a good gait laboratory [rad]."""
@@ -128,36 +129,40 @@ def claims() -> str:
 
 def cart_table() -> str:
     """What forces a cart-table plan can have."""
-    human = human_gait(THESIS_SPEED)
-    step_time = human.stride_time / 2
+    step_time = human_gait(THESIS_SPEED).stride_time / 2
+    own = [plan_walk(BODY, THESIS_SPEED, double_support=each) for each in DOUBLE_SUPPORTS]
     rows, push_off = [], []
-    for double_support in DOUBLE_SUPPORTS:
+    for double_support, shifted in zip(DOUBLE_SUPPORTS, own, strict=True):
         plans = [plan_walk(BODY, THESIS_SPEED, double_support=double_support, zmp_travel=travel) for travel in TRAVELS]
         push_off.append(_features(plans[1])[1])
         cells = [_five(_features(plan)) for plan in plans]
-        rows.append((f"{double_support:.2f}", *cells, f"{_rms_deg(plans[1], 'knee'):.0f}°"))
+        rows.append((f"{double_support:.2f}", *cells, *(f"{_rms_deg(p, 'knee'):.0f}°" for p in (plans[1], shifted))))
     people = _people_features()
-    rows.append((f"people, {_people_double_support():.3f}", _five(people), "", "", "–"))
+    rows.append((f"people, {_people_double_support():.3f}", _five(people), "", "", "–", "–"))
     # Valley of a cosine: 1 - a (2 pi / T)^2 / g.
     amplitude = (1 - people[3]) * GRAVITY * (step_time / (2 * np.pi)) ** 2
     shallow = _features(plan_walk(BODY, THESIS_SPEED, double_support=DOUBLE_SUPPORTS[-1], com_amplitude=amplitude))
     rise = 1000 * np.ptp(of_people(THESIS_SPEED, BODY).com_wave[1])
     enough = float(np.interp(-people[1], -np.array(push_off), DOUBLE_SUPPORTS))
     travels = [f"ZMP {100 * start:.3g} → {100 * end:.3g} cm" for start, end in TRAVELS]
-    head = ("T_d (s)", *travels, "knee")
+    behind = [100 * _hip_behind(plan) for plan in own]
+    head = ("T_d (s)", *travels, "knee", "knee, shifted")
     return f"""## What a cart-table model can reach
 
 One foot's fore-aft peaks and vertical hump/valley/hump, body weights, at people's step ({step_time:.2f} s), by double
-support and by the ZMP's travel in single support (from the stance ankle; the planner's own in the middle); last, RMSE
-of the middle plan's knee to people's.
+support and by the ZMP's travel in single support (from the stance ankle; the default plan's in the middle); then RMSE
+of the middle plan's knee to people's, and of the knee where the planner chooses the travel: the middle one up to
+{DOUBLE_SUPPORT * step_time:.2f} s, shifted forward in longer ones.
 
 {table(head, rows)}
 
 It **can** have people's fore-aft peaks: longer double support and longer travel of the ZMP both lower them, and at the
 middle travel people's {people[1]:.2f} takes T_d = {enough:.2f} s, about their own. It **cannot** have people's knees
-with it: its rear foot stays on a flat toe to the end of double support, and a long one is then reached by lowering the
-CoM on bent knees, where people roll over the tip of the toe. Braking and push-off come out alike, where people push
-harder than they brake.
+with it. In a long double support the rear toe rolls over its tip, as people's does, so that the CoM need not come down
+as far as over a flat toe; and the ZMP's travel shifts forward, near people's, and the hip with it. But people's angles
+and people's ZMP disagree under an upright trunk: over the shifted one the hip of mid-stance is {behind[-2]:.1f} (T_d =
+{DOUBLE_SUPPORTS[-2]:.2f} s) and {behind[-1]:.1f} cm ({DOUBLE_SUPPORTS[-1]:.2f} s) behind where people's angles put it,
+and knee and ankle make up for it. Braking and push-off come out alike, where people push harder than they brake.
 
 The height is one cosine, so valley and humps are one choice: people's valley of {people[3]:.2f} means a rise of
 {2000 * amplitude:.0f} mm and humps of {shallow[2]:.2f} and {shallow[4]:.2f} (T_d = {DOUBLE_SUPPORTS[-1]:.2f} s); people
@@ -260,6 +265,14 @@ def people_work() -> dict[str, float]:
 def _rms_deg(plan: WalkPlan, joint: str) -> float:
     error = plan.joint_angles(STRIDE)[joint] - human_gait(THESIS_SPEED).mean(joint, STRIDE)
     return float(np.degrees(np.sqrt(np.mean(error**2))))
+
+
+def _hip_behind(plan: WalkPlan) -> float:
+    """How far the hip is behind where people's angles put it over a flat foot, mean of mid-stance [m]."""
+    stance = np.linspace(0.1, 0.4, 100)
+    thigh, knee = (human_gait(THESIS_SPEED).mean(joint, stance) for joint in ("thigh", "knee"))
+    of_people = -BODY.thigh_length * np.sin(thigh) - BODY.shank_length * np.sin(thigh - knee)
+    return float(np.mean(of_people - plan.hip_position(stance)[0]))
 
 
 def _people_double_support() -> float:

@@ -73,7 +73,7 @@ def assert_valid(plan: WalkPlan) -> None:
     for name, angle in angles.items():
         assert np.abs(np.diff(angle, append=angle[0])).max() < 0.05, name
 
-    planted = np.linspace(feet.foot_flat, feet.toe_off, 500)
+    planted = np.linspace(feet.foot_flat, feet.tip_off, 500)
     _, toe_joint = plan.toe_joint_position(planted)
     assert np.ptp(toe_joint) == 0.0 and toe_joint[0] == body.toe_joint_height
     flat = np.linspace(feet.foot_flat, feet.heel_off, 102)[1:-1]
