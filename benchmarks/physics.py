@@ -3,6 +3,7 @@
     python -m benchmarks.physics
     python -m benchmarks.physics --policies schedule --episodes 4
     python -m benchmarks.physics --vary joints
+    python -m benchmarks.physics --vary stairs
 
 Every row walks the same policies from the same seeds, and differs from the default in what the row says. The walk is
 held against that of the first row: with `--vary settings` the finest timestep, with `--vary joints` the default. What
@@ -11,7 +12,7 @@ a physics setting costs is `mj_step` alone over a control window, on recorded wa
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -25,6 +26,7 @@ from springfoot.agents.baselines import PolicyFunction
 from springfoot.agents.command_line import exit_code
 from springfoot.envs.physics import model as physics_model
 from springfoot.envs.physics.model import JOINTS, build_model
+from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.timing import CONTROL_WINDOW, PHYSICS_STEP, WINDOWS_PER_STEP
 from springfoot.evaluation.metrics import Gait, measure
@@ -125,6 +127,38 @@ def joint_constant(name: str, joints: tuple[str, ...], factor: float) -> Iterato
         setattr(physics_model, name, default)
 
 
+@contextmanager
+def without_stairs() -> Iterator[None]:
+    """Within the context K theta_eq moves in every physics step, straight on at its last rate, in place of every 10 ms.
+
+    Its mean over a control window stays, so that nothing comes earlier or later.
+    """
+    roll, last = Simulation._roll, "_rest_before"
+
+    def smooth(self: Simulation, ids: NDArray | None, out: dict[str, NDArray]) -> None:
+        k, drive = np.moveaxis(self.control, -1, 0)
+        rest = drive / np.maximum(k, 1e-9)
+        ramp = k * (rest - getattr(self, last, rest))
+        setattr(self, last, rest)
+        place = (np.arange(self._substeps) + 0.5) / self._substeps - 0.5
+        control = np.repeat(self.control[:, None], self._substeps, 1)
+        control[..., 1] += ramp[:, None] * place[:, None, None]
+        control = control.reshape(self.num, self._substeps, -1)
+        who = slice(None) if ids is None else ids
+        if len(control[who]):
+            options = {"control": control[who], "control_spec": int(mujoco.mjtState.mjSTATE_CTRL), "ids": ids}
+            found = self._batch.rollout(self._substeps, record=list(out), **options)
+        for name, values in out.items():
+            values[:] = 0.0
+            values[who] = found[name] if len(control[who]) else 0.0
+
+    Simulation._roll = smooth
+    try:
+        yield
+    finally:
+        Simulation._roll = roll
+
+
 def edited(edit: Edit, body: Body | None = None) -> mujoco.MjModel:
     """The default model with one change."""
     model = build_model(body or Body())
@@ -193,8 +227,9 @@ def _text(values: list[float | None], pattern: str) -> str:
 class Flags:
     """Walk the same policies with other physics settings or joint constants; prints markdown tables."""
 
-    vary: Literal["settings", "joints"] = "settings"
-    """Settings of MuJoCo, or constants of the joints: damping time beta, torque limit, armature, joint damping."""
+    vary: Literal["settings", "joints", "stairs"] = "settings"
+    """Settings of MuJoCo; constants of the joints: damping time beta, torque limit, armature, joint damping; or whether
+    rest angles stand still in a control window."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY ...")] = ("schedule", "pretrained")
     """Any policies of evaluate.py."""
@@ -215,8 +250,8 @@ def run(flags: Flags) -> None:
     prepared = {name: prepare(name, {"episode_seconds": flags.seconds}) for name in flags.policies}
     about = machine()
     print(f"{about['processor']}, load {load():.2f}, MuJoCo {about['versions']['mujoco']}")
-    vary = _vary_settings if flags.vary == "settings" else _vary_joints
-    vary(flags, prepared)
+    vary = {"settings": _vary_settings, "joints": _vary_joints, "stairs": _vary_stairs}
+    vary[flags.vary](flags, prepared)
 
 
 def _vary_settings(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSettings]]) -> None:
@@ -242,6 +277,21 @@ def _vary_joints(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSe
                 gait = walked(policy, settings, None, flags.episodes, flags.threads)
             reference = reference or gait
             lines.append([name, *row(gait, reference)])
+        _print_table(flags, policy_name, lines)
+
+
+def _vary_stairs(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSettings]]) -> None:
+    for policy_name, (policy, settings) in prepared.items():
+        head = ("ankle moment N·m/kg", "ankle work J/kg", "cost of transport")
+        lines, reference = [["rest angles", *HEAD, *head]], None
+        for name, context in (("every 10 ms, the default", nullcontext), ("in every physics step", without_stairs)):
+            with context():
+                gait = walked(policy, settings, None, flags.episodes, flags.threads)
+            reference = reference or gait
+            m, work = gait.metrics, gait.metrics["ankle_work_J_kg"]
+            more = ([m["moments"]["ankle"]["peak_Nm_kg"]], [work["positive"], work["negative"]])
+            costs_ = _text([m["cost_of_transport"]], ".4f")
+            lines.append([name, *row(gait, reference), *(_text(each, ".3f") for each in more), costs_])
         _print_table(flags, policy_name, lines)
 
 

@@ -57,6 +57,7 @@ DEFAULT_WEIGHTS = {
     "speed": 0.50,
     "com_x": 0.15,
     "com_z": 0.10,
+    "zmp": 0.20,
     "pose": 0.60,
     "grf": 0.70,
     "stiffness_rate": -0.05,

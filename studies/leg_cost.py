@@ -9,6 +9,7 @@ itself.
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ TOLERANCE = {
     "com_speed": 0.06,  # m/s, forward, against the plan over the step
     "cop": 0.025,  # m, against the plan's ZMP
     "beyond_sd": 0.1,  # N m/kg, of the hip moment beyond 1.9 SD from people's
-    "late_hip_moment": 0.1,  # N m/kg, from LATE_SWING on, beyond LATE_HIP_MOMENT
+    "late_hip_moment": 0.1,  # N m/kg, from LATE_SWING on, beyond people's largest then by more than 0.1
     "speed": 0.02,  # m/s
     "period": 0.02,  # share of the plan's stride time
     "double_support": 0.02,  # s, against people's
@@ -67,7 +68,7 @@ TOLERANCE = {
     "peak_moment": 0.05,  # N m/kg, of the ankle farther from people's than 0.07
     "work": 0.02,  # J/kg a stride, of hip, knee, ankle, positive and negative: farther from people's than 0.045
     "effort": 0.04,  # J/kg a stride: positive work of the leg beyond 1.2 of people's
-    "force_peak": 0.08,  # body weights, the largest 10 ms of a stride beyond 1.2
+    "force_peak": 0.08,  # body weights, the largest 10 ms of a stride beyond people's peak by more than 0.07
     "travel": 0.01,  # m a stance, of the sole on the floor
     "unsteady": 0.05,  # SD of the vertical force over strides [body weights]
     "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
@@ -75,8 +76,6 @@ TOLERANCE = {
 """What counts as one, root mean square over the stride for a curve."""
 LATE_SWING = 0.8
 """Stride phase from which the hip holds the leg back before it lands."""
-LATE_HIP_MOMENT = 0.28
-"""Largest hip moment then that costs nothing [N m/kg]: people's is 0.15, SD 0.07; less takes the thigh farther off."""
 FALL_COST = 30.0
 """Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
 further costs proportionally less, down to a third."""
@@ -238,17 +237,18 @@ def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float)
             travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
     stride = np.concatenate(curves)
     mean, period = stride.mean(0), np.mean(np.concatenate(periods))
-    theirs, their_work = _people(human)
-    off = dict(zip(CURVES, (mean[:, : len(CURVES)] - theirs).T, strict=True))
+    theirs, their_work, band = _people(human)
+    off: dict[str, Any] = dict(zip(CURVES, (mean[:, : len(CURVES)] - theirs).T, strict=True))
     speed = mean[:, len(CURVES) + 2].copy()
     planned = np.array([0.0, 0.0, 1.0]) * biped.plan.com_velocity((2 * phase) % 1.0)[0][:, None]
-    off |= zip(PLANNED, (mean[:, len(CURVES) : len(CURVES) + len(PLANNED)] - planned).T, strict=True)
+    off_com = (mean[:, len(CURVES) : len(CURVES) + len(PLANNED)] - planned).T
+    off |= dict(zip(PLANNED, off_com, strict=True))
     step = phase < 0.5
     off["cop"] = mean[step, len(CURVES) + len(PLANNED)] - biped.plan.zmp(2 * phase[step])
-    off["beyond_sd"] = _beyond(off["hip_moment"], 1.9 * human.sd("hip_moment", phase))
+    off["beyond_sd"] = _beyond(off["hip_moment"], band)
     off = {name: values / np.sqrt(len(values)) for name, values in off.items()}
-    hip = mean[phase > LATE_SWING, CURVES.index("hip_moment")]
-    off["late_hip_moment"] = np.maximum(hip - LATE_HIP_MOMENT, 0.0)
+    late = phase > LATE_SWING, CURVES.index("hip_moment")
+    off["late_hip_moment"] = np.maximum(mean[late] - theirs[late].max() - 0.1, 0.0)
     off["speed"] = speed.mean() - biped.settings.speed
     off["period"] = period / (2 * biped.plan.step_time) - 1
     off["double_support"] = np.mean(np.concatenate(supports)) - (human.toe_off - 0.5) * human.stride_time
@@ -262,7 +262,7 @@ def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float)
     work = np.abs(mean[:-1, len(CURVES) + len(PLANNED) + 1 :].mean(0).reshape(len(JOINTS), 2)) * period
     off["work"] = _beyond(work[: len(their_work)] - their_work, 0.045)
     off["effort"] = max(work[:, 0].sum() - 1.2 * their_work[:, 0].sum(), 0.0)
-    off["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - 1.2, 0.0))
+    off["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - theirs[:, 4].max() - 0.07, 0.0))
     off["travel"] = np.mean(travels)
     off["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
     return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
@@ -274,10 +274,10 @@ def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
 
 
 @lru_cache(maxsize=16)
-def _people(human: HumanGait) -> tuple[NDArray, NDArray]:
-    """(101, len(CURVES)) people's mean curves over the stride, and (3, 2) positive and negative work of their hip, knee
-    and ankle in it [J/kg], from their mean power."""
+def _people(human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
+    """(101, len(CURVES)) people's mean curves over the stride, (3, 2) positive and negative work of their hip, knee and
+    ankle in it [J/kg], from their mean power, and (101,) 1.9 SD of their hip moment."""
     curves = np.stack([human.mean(name, PERCENT / 100) for name in CURVES], -1)
     power = [human.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
     work = [np.concatenate(stride_work(each, np.array([human.stride_time]))) for each in power]
-    return curves, np.stack(work)
+    return curves, np.stack(work), 1.9 * human.sd("hip_moment", PERCENT / 100)

@@ -45,7 +45,7 @@ STEEPEST = 5.0
 """Largest derivative it believes [tolerances per unit]; beyond, the walk tipped over."""
 DAMPINGS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 """Dampings that a step of the refinement tries, over the last that served [-]; chosen."""
-LONGEST = 1.5
+LONGEST_STEP = 1.5
 """Largest change of a constant in one of its steps [units of the search]; chosen."""
 KEPT = 0.17
 """What a constant pays in the refinement for each unit that it leaves its start [tolerances]."""
@@ -201,7 +201,7 @@ class LegTuning(Study):
             tried = []
             for each in damping * DAMPINGS:
                 step = np.linalg.solve(normal + each * (identity + np.diag(np.diag(normal))), downhill)
-                step *= min(1.0, LONGEST / np.abs(step).max())
+                step *= min(1.0, LONGEST_STEP / np.abs(step).max())
                 tried += [(each, place + part * step) for part in (1.0, 0.4)]
             found = missed(np.array([vector for _, vector in tried]))
             paid = [np.inf if each is None else float(np.linalg.norm(each)) for each in found]

@@ -121,7 +121,16 @@ def test_people_recorded_are_people_measured(gait):
     ankle = HUMAN.mean("ankle_moment", PERCENT / 100)
     assert metrics["moments"]["ankle"]["peak_Nm_kg"] == pytest.approx(ankle.max(), abs=0.01)
     assert metrics["moments"]["ankle"]["peak_percent"] == pytest.approx(ankle.argmax(), abs=1)
-    assert metrics["moments"]["toe"] == {"peak_Nm_kg": 0.0, "peak_percent": 0, "r": None}
+    assert metrics["moments"]["toe"] == {
+        "peak_Nm_kg": 0.0,
+        "peak_percent": 0,
+        "late_swing_peak_Nm_kg": 0.0,
+        "r": None,
+        "within_2sd_percent": None,
+    }
+    hip = HUMAN.mean("hip_moment", PERCENT / 100)
+    assert metrics["moments"]["hip"]["late_swing_peak_Nm_kg"] == pytest.approx(hip[80:].max(), abs=0.01)
+    assert all(metrics["moments"][name]["within_2sd_percent"] == 100 for name in ("hip", "knee", "ankle"))
 
 
 def test_distances_and_times_of_the_gait(gait):

@@ -18,6 +18,7 @@ from springfoot.envs.task.reward import (
     Task,
 )
 from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.com_plan import over_peoples_zmp
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.human import human_gait
 from springfoot.gait.plan import plan_walk
@@ -30,7 +31,7 @@ class Setup:
         self.settings = settings_from(**settings)
         self.body = Body(self.settings.height, self.settings.mass)
         self.human = human_gait(self.settings.speed, self.settings.height)
-        self.plan = plan_walk(self.body, self.settings.speed)
+        self.plan = over_peoples_zmp(plan_walk(self.body, self.settings.speed))
         self.walks = reference_walks(self.settings)
 
     def task(self, num) -> Task:
@@ -112,9 +113,28 @@ def test_planned_speed_is_the_derivative_of_the_planned_com(thesis_body):
     np.testing.assert_allclose(thesis_body.task(len(phase)).tracking(measured, leg_phases(phase)), 0.0, atol=2e-4)
 
 
+@pytest.mark.parametrize("height", [1.7, 1.3])
+def test_the_zmp_term_is_of_the_cop_of_both_feet_amid_the_step(height):
+    setup, heavy = Setup(height=height, mass=45, speed=1.0), 3.0
+    measured, loads = setup.measurement(PHASES), setup.people_force(PHASES)
+    phase = leg_phases(PHASES)
+    leader = np.where(phase[:, LEFT] < 0.5, LEFT, RIGHT)
+    earlier = 2 * phase[np.arange(len(PHASES)), leader] - 0.01 / setup.plan.step_time
+    planned = 10.0 + setup.plan.zmp(earlier) + setup.plan.step_length * np.floor(earlier)
+    loads[...] = 0.0
+    loads[0, :, LEFT, 0, 1], loads[1, :, RIGHT, 2, 1] = 100.0, 100.0 * heavy
+    for away, mark in ((0.0, 1.0), (0.04 * height / 1.7, np.exp(-1))):
+        contact = np.zeros_like(measured.contact)
+        contact[:, LEFT, 0, 0] = planned + away - heavy * 0.2
+        contact[:, RIGHT, 2, 0] = planned + away + 0.2
+        moved = setup.measurement(PHASES, contact=contact)
+        np.testing.assert_allclose(setup.terms(moved, PHASES, force_windows=loads)["zmp"], mark, atol=2e-2)
+    np.testing.assert_array_equal(setup.terms(measured, PHASES, force_windows=0.0 * loads)["zmp"], 0.0)
+
+
 @pytest.mark.parametrize(
     ("term", "field", "offset"),
-    [("com_x", "com", (0.1, 0)), ("com_z", "com", (0, -0.03)), ("speed", "com_velocity", (-0.1, 0))],
+    [("com_x", "com", (0.03, 0)), ("com_z", "com", (0, -0.01)), ("speed", "com_velocity", (-0.1, 0))],
 )
 @pytest.mark.parametrize("height", [1.7, 1.3])
 def test_tracking_falls_to_one_over_e_at_its_tolerance(term, field, offset, height):

@@ -40,9 +40,9 @@ FORCE_TOLERANCE = 0.15
 """Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen."""
 
 
-TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "pose", "grf", "stiffness_rate", "stiffness")
+TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf", "stiffness_rate", "stiffness")
 """The reward's terms, in the order in which they are summed."""
-ALIVE, SPEED, COM_X, COM_Z, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
+ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
 
 
 class Task:
@@ -113,8 +113,9 @@ class Task:
         """The reward's terms, unweighted and dimensionless, (N, len(TERMS)) in the order of `TERMS`.
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
-        the ZMP plan; `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance
-        [rad^2] of thigh (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
+        the ZMP plan; `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
+        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance [rad^2] of thigh
+        (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
         beyond 1.2 (fourfold), both components beyond mean +- SD at the leg's phase.
         Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
@@ -124,7 +125,7 @@ class Task:
         (W, N, 2, 3, 2) on the body [N] in the W control windows of the step; `curves` as in `observe`.
         """
         terms = np.empty((len(leg_phase), len(TERMS)))
-        state = m.base, m.angle, m.com, m.com_velocity, m.ankle, m.diverged
+        state = m.base, m.angle, m.com, m.com_velocity, m.ankle, m.contact, m.diverged
         curves = self.at(leg_phase) if curves is None else curves
         _judge(
             self._scales,
@@ -196,6 +197,7 @@ def _judge(
     com,
     com_velocity,
     ankle,
+    contact,
     diverged,
     leg_phase,
     action,
@@ -212,6 +214,7 @@ def _judge(
         x, z, speed = _error(ratios[i], curves[i], com[i], com_velocity[i], ankle[i], leg_phase[i])
         terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
         terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
+        terms[i, ZMP] = _near_zmp(scale, ratios[i], curves[i], ankle[i], contact[i], leg_phase[i], force_windows[:, i])
         terms[i, SPEED] = exp(-((speed / scale.tolerance[2]) ** 2))
         pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
         for side in range(2):
@@ -226,6 +229,23 @@ def _judge(
         terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
         terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
         terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
+
+
+@kernel
+def _near_zmp(scale, ratio, curves, ankle, contact, leg_phase, force_windows):
+    """exp(-(distance / tolerance)^2) of the CoP of both feet, mean over the windows of a step, from the planned ZMP."""
+    load = moment = 0.0
+    for window in range(len(force_windows)):
+        for side in range(2):
+            for point in range(3):
+                load += force_windows[window, side, point, 1]
+                moment += force_windows[window, side, point, 1] * contact[side, point, 0]
+    if load <= 0.0:
+        return 0.0
+    leader = LEFT if leg_phase[LEFT] < 0.5 else RIGHT
+    planned = curves[leader]
+    ahead = ratio.length * (planned.stride_length * leg_phase[leader] + planned.zmp)
+    return exp(-(((moment / load - ankle[leader, 0] - ahead) / scale.tolerance[3]) ** 2))
 
 
 @kernel

@@ -15,8 +15,10 @@ from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
 
 MIN_HIP_HEIGHT = 0.65
 """A hip lower than this is a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
-COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.1, 0.03
+COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.03, 0.01
 """Error of the CoM, forward and up, at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
+COP_TOLERANCE = 0.04
+"""Distance of the CoP from the planned ZMP at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 SPEED_TOLERANCE = 0.10
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen."""
 POSE_WEIGHTS = {HIP: 3.0, KNEE: 0.5, ANKLE: 2.0, TOE: 0.1}
@@ -33,15 +35,17 @@ REFERENCE = np.dtype(
         ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
         ("force_sd", float, 2),  # its standard deviation
         ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
+        ("zmp", float),  # the plan's ZMP at the middle of the step [m], x as of `com`
         ("speed", float),  # the plan's forward speed of the CoM [m/s]
         ("stride_length", float),  # of the plan [m], the same at every phase
     ]
 )
-"""What people and plan do at a phase of one leg's stride; `com`, `speed` are for the leg whose stance began last."""
+"""What people and plan do at a phase of one leg's stride; `com`, `zmp`, `speed` are for the leg whose stance began
+last."""
 SCALES = np.dtype(
     [
         ("min_hip_height", float),  # [m]
-        ("tolerance", float, 3),  # of the CoM's x, z [m] and forward speed [m/s]
+        ("tolerance", float, 4),  # of the CoM's x, z [m] and forward speed [m/s], of the CoP [m]
         ("pose_share", float, len(JOINTS)),
         ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
         ("stiffness_share", float, 2),
@@ -57,7 +61,8 @@ def body_scales(body: Body) -> NDArray:
     length = body.length_scale
     scales = np.zeros(1, SCALES)
     scales["min_hip_height"] = MIN_HIP_HEIGHT * length
-    scales["tolerance"] = COM_X_TOLERANCE * length, COM_Z_TOLERANCE * length, SPEED_TOLERANCE * sqrt(length)
+    lengths = np.array([COM_X_TOLERANCE, COM_Z_TOLERANCE, COP_TOLERANCE]) * length
+    scales["tolerance"] = *lengths[:2], SPEED_TOLERANCE * sqrt(length), lengths[2]
     scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
     scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
     scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
@@ -75,6 +80,8 @@ def reference_curves(plan: ComPlan, human: HumanGait, step_seconds: float) -> ND
     step = (2 * GRID) % 1.0
     x, z = plan.com(step)
     curves["com"] = np.stack((x - plan.step_length * step, z), -1)
+    earlier = 2 * GRID - 0.5 * step_seconds / plan.step_time  # the middle of the step, which may lie in the step before
+    curves["zmp"] = plan.zmp(earlier) + plan.step_length * (np.floor(earlier) - np.floor(2 * GRID) - step)
     curves["speed"], _ = plan.com_velocity(step)
     curves["stride_length"] = 2 * plan.step_length
     return curves
