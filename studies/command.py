@@ -34,6 +34,7 @@ STUDIES = {
     "influence": ("influence.Influence", "Does stiffness change torque, the CoM's acceleration and the walk?"),
     "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
     "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
+    "leg-sets": ("leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
     "slope-tuning": ("slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
     "thesis": ("thesis_page.Thesis", "How do the thesis's figures and claims stand against people?"),
 }

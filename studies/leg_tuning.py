@@ -104,6 +104,8 @@ class LegTuning(Study):
     """Seed of the search and of the walks."""
     threads: int = 2
     """Threads of the physics."""
+    second: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Keep what is found as that of a second search, beside the first, which the walk goes on using."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
 
@@ -221,8 +223,9 @@ class LegTuning(Study):
         if self.quick:
             return
         known = read_constants(self.constants)  # anew: another search may have written its own
-        known["constants"][name] = asdict(found)
-        known.setdefault("found_by", {})[name] = self.command
+        kept, label = ("second", f"{name}, second search") if self.second else ("constants", name)
+        known.setdefault(kept, {})[name] = asdict(found)
+        known.setdefault("found_by", {})[label] = self.command
         write_constants(self.constants, known)
 
 

@@ -130,7 +130,7 @@ def test_people_recorded_are_people_measured(gait):
     }
     hip = HUMAN.mean("hip_moment", PERCENT / 100)
     assert metrics["moments"]["hip"]["late_swing_peak_Nm_kg"] == pytest.approx(hip[80:].max(), abs=0.01)
-    assert all(metrics["moments"][name]["within_2sd_percent"] == 100 for name in ("hip", "knee", "ankle"))
+    assert all(metrics["moments"][name]["within_2sd_percent"] > 95 for name in ("hip", "knee", "ankle"))
 
 
 def test_distances_and_times_of_the_gait(gait):
