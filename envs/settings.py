@@ -58,9 +58,9 @@ DEFAULT_WEIGHTS = {
     "com_x": 0.15,
     "com_z": 0.10,
     "zmp": 0.20,
-    "pose": 0.60,
-    "grf": 0.70,
-    "stiffness_rate": -0.05,
+    "pose": 0.80,
+    "grf": 1.00,
+    "stiffness_rate": -0.10,
     "stiffness": -0.02,
 }
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, a negative one is a cost."""

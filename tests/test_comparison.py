@@ -65,10 +65,12 @@ def test_a_row_is_what_evaluate_would_find(rows):
 
 def test_untrained_is_where_the_policys_own_training_starts():
     found = {each.name: each for each in comparison.contenders("pretrained", {"episode_seconds": 1.0})}
-    assert found["untrained"].settings.action_mode == found["pretrained"].settings.action_mode == "residual"
-    assert found["schedule"].settings.action_mode == "absolute"
-    returns = [comparison.run_row(*found[name], episodes=1).returns[0] for name in ("untrained", "schedule")]
-    assert returns[0] == pytest.approx(returns[1], rel=5e-3)  # a factor of 1; its action does not change, so costs less
+    assert found["untrained"].settings.action_mode == found["pretrained"].settings.action_mode == "absolute"
+    own = found["untrained"]
+    returns = comparison.run_row(*own, episodes=1).returns
+    middle = [np.sqrt(np.prod(getattr(own.settings, f"{joint}_stiffness_range"))) for joint in ("ankle", "toe")]
+    held = record(constant(own.settings, middle), own.settings, name="", episodes=1)
+    assert returns[0] == pytest.approx(held.returns[0], rel=1e-6)
 
 
 def test_a_trained_policy_is_held_against_its_open_loop_copy():

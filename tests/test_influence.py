@@ -99,7 +99,7 @@ def test_conditions_change_what_they_say():
     assert settings["1.90 m, 95 kg"].speed == pytest.approx(1.2 * sqrt(1.90 / 1.70))
     assert (settings["1.55 m, 50 kg"].height, settings["1.55 m, 50 kg"].mass) == (1.55, 50.0)
     assert [settings[f"θ_eq {name}"].equilibrium for name in ("neutral", "by phase")] == ["neutral", "phase"]
-    assert settings["pretrained"].action_mode == "residual" and settings["as it is"].decisions == "100hz"
+    assert settings["pretrained"].action_mode == "absolute" and settings["as it is"].decisions == "100hz"
 
 
 @pytest.mark.parametrize(

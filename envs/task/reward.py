@@ -31,7 +31,7 @@ MAX_PITCH = 0.8
 TOO_LOW, TOO_TILTED = "fell: hip too low", "fell: trunk too tilted"
 
 POSE_TOLERANCE = 0.02
-"""Pose error E at which its reward is 1/e [rad^2]; chosen: 3.4 deg at every joint."""
+"""Pose error E at which its reward is 1/e [rad^2]; chosen: 3.0 deg at every joint."""
 MAX_FORCE = 1.2
 """Vertical force of one foot beyond which it costs more [body weights]; chosen: people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
@@ -114,7 +114,7 @@ class Task:
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
-        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 0.5, 2, 0.1) x squared distance [rad^2] of thigh
+        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 1, 3, 0.1) x squared distance [rad^2] of thigh
         (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
         beyond 1.2 (fourfold), both components beyond mean +- SD at the leg's phase.
