@@ -32,7 +32,7 @@ SETTINGS: tuple[Mapping[str, Any], ...] = (
 )
 """Settings whose constants were searched for."""
 PUSHED = {"push_newton": 150.0}
-COLUMNS = (
+WALKED = (
     Quantity("m/s", ".3f", ("speed_m_s", "mean")),
     *(Quantity(f"{joint} °", ".1f", ("joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
     Quantity("hip moment r", ".2f", ("moments", "hip", "r")),
@@ -67,17 +67,17 @@ class LegSets(WalkingStudy):
                     legs = constants_from(sets[name])
                     level, pushed = (self._walk(settings, legs, more, progress) for more in ({}, PUSHED))
                     falls = [f"{m['falls']} of {m['episodes']}" for m in (level, pushed)]
-                    values = [each.of(level) for each in COLUMNS]
+                    values = [each.of(level) for each in WALKED]
                     ankle = "/".join(f"{k:.0f}" for k in legs.ankle_schedule)
-                    texts = [text_of(value, each.pattern) for value, each in zip(values, COLUMNS, strict=True)]
+                    texts = [text_of(value, each.pattern) for value, each in zip(values, WALKED, strict=True)]
                     lines.append([f"{name}: {search}", *falls, *texts, ankle, f"{legs.toe_schedule:.0f}"])
                     numbers.append([name, search, level["falls"], pushed["falls"], *values])
-        head = ["set and search", "falls", "pushed", *(each.label for each in COLUMNS), "K ankle", "K toe"]
+        head = ["set and search", "falls", "pushed", *(each.label for each in WALKED), "K ankle", "K toe"]
         text = (
             f"{table(head, lines)}\n\n{self.what_ran} with the set's own fixed schedule; pushed by ±150 N. "
             "K in N·m/rad: loading / early stance / late stance / push-off / swing."
         )
-        columns = ["set", "search", "falls", "falls_pushed", *(each.column for each in COLUMNS)]
+        columns = ["set", "search", "falls", "falls_pushed", *(each.column for each in WALKED)]
         return Answer(text=text, files={"leg_sets.csv": csv_text(columns, numbers)}, sections={"LEG-SETS": text})
 
     def _walk(

@@ -94,20 +94,21 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
 
 
 @pytest.mark.parametrize(
-    ("swing", "falls"),
+    ("swing", "walks"),
     [
-        (((45.0, 0.0), (25.0, 10.0)), 0),  # (K, rest angle in degrees) of ankle and toe
-        (((20.0, 0.0), (25.0, 10.0)), 0),
-        (((45.0, 0.0), (5.0, 10.0)), 0),
-        (((20.0, 0.0), (5.0, 0.0)), 4),  # as printed
-        (((200.0, 0.0), (50.0, 0.0)), 4),
-        (((45.0, 0.0), (25.0, 0.0)), 4),
+        (((45.0, 0.0), (25.0, 10.0)), True),  # (K, rest angle in degrees) of ankle and toe
+        (((20.0, 0.0), (25.0, 10.0)), True),
+        (((45.0, 0.0), (5.0, 10.0)), True),
+        (((20.0, 0.0), (5.0, 0.0)), False),  # as printed
+        (((200.0, 0.0), (50.0, 0.0)), False),
+        (((45.0, 0.0), (25.0, 0.0)), False),
     ],
 )
-def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, falls):
+def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, walks):
     lines = thesis_schedule(Body(), swing=swing)
     settings = BipedSettings(equilibrium="phase", schedule=lines.to_json(), episode_seconds=8.0)
-    assert np.count_nonzero(record(schedule(settings), settings, name="", episodes=4).fall_reason) == falls
+    falls = np.count_nonzero(record(schedule(settings), settings, name="", episodes=8).fall_reason)
+    assert falls <= 2 if walks else falls >= 6
 
 
 def test_a_factor_multiplies_the_schedule():
@@ -116,7 +117,8 @@ def test_a_factor_multiplies_the_schedule():
         stiffness_of(baseline(name, biped.settings)(biped.observe()).reshape(20, 2, 2), biped.settings, Body())
         for name in ("schedule", "schedule:0.5")
     )
-    assert half == pytest.approx(0.5 * once, rel=1e-5)
+    least = [low for low, _ in (BipedSettings().ankle_stiffness_range, BipedSettings().toe_stiffness_range)]
+    assert half == pytest.approx(np.maximum(0.5 * once, least), rel=1e-5)
 
 
 def test_quasi_stiffness_is_peoples_on_its_plateaus():

@@ -51,7 +51,7 @@ def test_the_open_loop_copy_of_a_schedule_is_that_schedule_with_its_equilibrium(
     played, own = (record(each, settings, name="", episodes=3) for each in (copy, policy))
     begun = np.isfinite(own.series["phase"]) & np.isfinite(played.series["phase"])
     off = np.abs(played.series["stiffness"][begun] / own.series["stiffness"][begun] - 1)
-    assert off.max() < 0.1 and np.median(off, axis=0).max() < 1e-3  # largest where the last ramp begins, between knots
+    assert off.max() < 0.3 and np.median(off, axis=0).max() < 1e-3  # largest where the last ramp begins, between knots
     assert played.series["equilibrium"][begun] == pytest.approx(own.series["equilibrium"][begun], abs=1e-3)
     assert played.returns == pytest.approx(own.returns, rel=1e-3)
 
@@ -64,7 +64,7 @@ def test_a_copy_follows_speed_and_body_as_the_schedule_does():
     alone = settings_from(height=1.62, mass=55.0, speed=1.15, episode_seconds=1.0)
     observations = np.concatenate([_observed(alone), _observed(dataclasses.replace(alone, speed=1.2))])
     difference = np.abs(copy(observations) - policy(observations))
-    assert difference.max() < 0.04 and np.median(difference) < 1e-3  # largest where the last ramp begins
+    assert difference.max() < 0.12 and np.median(difference) < 1e-3  # largest where the last ramp begins
 
 
 def _observed(settings):

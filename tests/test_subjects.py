@@ -84,8 +84,8 @@ def test_a_body_is_the_same_drawn_or_set():
             result = biped.step(np.zeros((1, 4)))
     np.testing.assert_allclose(drawn.observe(), fixed.observe(), atol=1e-5)
     rows = [biped.step(np.zeros((1, 4))).values[0] for biped in (drawn, fixed)]
-    # people's forces are taken at the middle of a step of 20 ms, which is another share of the stride
-    np.testing.assert_allclose(rows[0], rows[1], rtol=2e-3, atol=2e-3)
+    # people's forces and the ZMP are taken at the middle of a step of 20 ms, which is another share of the stride
+    np.testing.assert_allclose(rows[0], rows[1], rtol=2e-3, atol=4e-3)
     assert not result.terminated.any()
 
 
@@ -280,7 +280,7 @@ def test_nothing_jumps_as_the_speed_changes():
         plan = 100 * task.tracking(m, phase)
         rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
     change = np.abs(np.diff(rows, axis=0))
-    assert change.max() < 1.0  # [N m, N m/rad, 0.01 rad, cm, cm/s] for 2 mm/s
+    assert change.max() < 2.0  # [N m, N m/rad, 0.01 rad, cm, cm/s] for 2 mm/s; knees' K differs by 310 in 400 mm/s
     assert (np.ptp(rows, axis=0) > 0.5).sum() >= 8
 
 

@@ -33,6 +33,9 @@ TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
 """Vertical force of a foot that counts as touchdown [body weights]; chosen: 30 N at 63 kg, as of force plates."""
 TOUCHDOWN_PHASE = 0.80
 """A touchdown before this stride phase of the leg is a scuff, not a step; chosen."""
+SLOWEST = -0.1
+"""Error of the speed below which gains see no more of it [m/s]; chosen: a body that sets off, or that its springs keep
+slow, is far slower than the plan for many steps, and with all of its error the legs would trip it."""
 PLANNED_SPEED = 5
 """Column of `leg_curves`."""
 HOLD = 0.001
@@ -163,7 +166,7 @@ def _advance(gains, speed, curves, com_velocity, force, running, phase):
         if not running[i]:
             continue
         gain, left = gains[i], phase[i, LEFT]
-        rate = gain.rate * (1.0 + gain.rate_gain * (com_velocity[i, 0] - speed[i] * curves[i, LEFT, PLANNED_SPEED]))
+        rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(com_velocity[i], speed[i], curves[i, LEFT]))
         waiting = (0.5 if left < 0.5 else 1.0) - HOLD
         left = min(left + max(rate, 0.0), max(waiting, left))
         right = (left + 0.5) % 1.0
@@ -175,6 +178,11 @@ def _advance(gains, speed, curves, com_velocity, force, running, phase):
 
 
 @kernel
+def _too_fast(com_velocity, speed, curves):
+    return max(com_velocity[0] - speed * curves[PLANNED_SPEED], SLOWEST)
+
+
+@kernel
 def _load(force):
     return force[0, 1] + force[1, 1] + force[2, 1]
 
@@ -183,7 +191,7 @@ def _load(force):
 def _drive(gains, speed, scale, curves, base, base_velocity, com_velocity, control):
     for i in range(len(gains)):
         gain = gains[i]
-        too_fast = com_velocity[i, 0] - speed[i] * curves[i, LEFT, PLANNED_SPEED]
+        too_fast = _too_fast(com_velocity[i], speed[i], curves[i, LEFT])
         torque = scale[i].torque
         trunk = -gain.trunk_stiffness * (base[i, 2] - gain.pitch) - gain.trunk_damping * base_velocity[i, 2]
         on_trunk = trunk + gain.speed_torque * too_fast
