@@ -117,7 +117,7 @@ def test_noise_on_the_angle_makes_the_spring_too_soft_as_errors_in_variables_do(
         for name in ("stiffness_bias_percent", "expected_percent")
     )
     assert np.all(np.diff(table, axis=0) < 0)
-    # Three parameters take their part of a few samples' noise: 6 in the shortest phase, a third of what many would show.
+    # Three parameters take their part of a few samples' noise: 6 in the shortest phase, a third of many samples'.
     assert np.all(table < 0.35 * expected) and np.all(table > expected)
     assert np.argmin(table[1]) == np.argmin([spring.angle_spread for spring in springs])
 
