@@ -36,7 +36,7 @@ three constants it is varied in docs/physics.md.
 TORQUE_LIMIT = (200.0, 200.0, 200.0, 60.0)
 """Largest actuator torque [N m] at 1.70 m and 63 kg, in the order of `JOINTS`.
 
-Chosen above what walking takes: `pretrained` reaches 67, 43, 159 and 22 N m in 20 episodes of 20 s.
+Chosen above what walking takes: `pretrained` reaches 57, 43, 83 and 24 N m in 20 episodes of 20 s.
 """
 ARMATURE = (0.02, 0.01, 0.005, 0.002)
 """Inertia added to each joint's own [kg m^2] at 1.70 m and 63 kg, in the order of `JOINTS`.
