@@ -94,21 +94,20 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
 
 
 @pytest.mark.parametrize(
-    ("swing", "walks"),
+    ("swing", "falls"),
     [
-        (((45.0, 0.0), (25.0, 10.0)), True),  # (K, rest angle in degrees) of ankle and toe
-        (((20.0, 0.0), (25.0, 10.0)), True),
-        (((45.0, 0.0), (5.0, 10.0)), True),
-        (((20.0, 0.0), (5.0, 0.0)), False),  # as printed
-        (((200.0, 0.0), (50.0, 0.0)), False),
-        (((45.0, 0.0), (25.0, 0.0)), False),
+        (((45.0, 0.0), (25.0, 10.0)), 0),  # (K, rest angle in degrees) of ankle and toe
+        (((20.0, 0.0), (25.0, 10.0)), 0),
+        (((45.0, 0.0), (5.0, 10.0)), 0),
+        (((20.0, 0.0), (5.0, 0.0)), 4),  # as printed
+        (((200.0, 0.0), (50.0, 0.0)), 3),  # of 4; on the legs before the present ones all
+        (((45.0, 0.0), (25.0, 0.0)), 3),
     ],
 )
-def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, walks):
+def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, falls):
     lines = thesis_schedule(Body(), swing=swing)
     settings = BipedSettings(equilibrium="phase", schedule=lines.to_json(), episode_seconds=8.0)
-    falls = np.count_nonzero(record(schedule(settings), settings, name="", episodes=8).fall_reason)
-    assert falls <= 2 if walks else falls >= 6
+    assert np.count_nonzero(record(schedule(settings), settings, name="", episodes=4).fall_reason) == falls
 
 
 def test_a_factor_multiplies_the_schedule():

@@ -59,7 +59,8 @@ def test_noise_on_the_torque_leaves_the_truth_within_intervals_and_the_undisturb
     assert len(held) == len(rows) and sum(held) >= len(rows) - 2
     stance = next(row for row in rows if (row.joint, row.start) == ("ankle", 0.30))
     assert stance.undisturbed and stance.undisturbed.stiffness
-    assert stance.undisturbed.stiffness.high < 0.7 * stance.applied[0]  # and its interval knows nothing of it
+    blind = stance.undisturbed.stiffness
+    assert stance.applied[0] - blind.value > 5 * (blind.high - blind.value)  # and its interval knows nothing of it
 
 
 def test_the_pretrained_policy_reacts_in_every_loaded_phase():

@@ -183,7 +183,8 @@ def test_the_impulse_is_acceleration_times_the_phase_and_foretells_the_velocity_
     seconds = period * np.array([end - begin for begin, end in (PHASES[name] for _, name in CELLS)])
     for direction in ("forward", "upward"):
         expected = fixed[f"{direction}_m_s2"] * seconds
-        assert fixed[f"{direction}_m_s"] == pytest.approx(expected, rel=0.2, abs=1e-4)
+        tick = 0.01 * np.abs(fixed[f"{direction}_m_s2"])  # a phase holds whole ticks, one more or less than its share
+        assert (np.abs(fixed[f"{direction}_m_s"] - expected) < tick + 1e-4).all()
     assert 0.7 < np.corrcoef(fixed["forward_m_s"], walks.velocity.mean(1))[0, 1] < 0.95
 
 

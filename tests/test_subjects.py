@@ -17,7 +17,7 @@ from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.envs.step_result import Tick
+from springfoot.envs.step_result import INFO, Tick
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.envs.task.reward import Task
 from springfoot.envs.vector_env import SegmentedFootBipedVector
@@ -85,7 +85,9 @@ def test_a_body_is_the_same_drawn_or_set():
     np.testing.assert_allclose(drawn.observe(), fixed.observe(), atol=1e-5)
     rows = [biped.step(np.zeros((1, 4))).values[0] for biped in (drawn, fixed)]
     # people's forces and the ZMP are taken at the middle of a step of 20 ms, which is another share of the stride
-    np.testing.assert_allclose(rows[0], rows[1], rtol=2e-3, atol=4e-3)
+    off = np.abs(rows[0] - rows[1])
+    within = np.where(np.array(INFO) == "reward/zmp", 4e-3, 2e-3)  # of a ZMP that moves 3 m/s in double support
+    assert (off <= within + 2e-3 * np.abs(rows[1])).all()
     assert not result.terminated.any()
 
 
@@ -271,7 +273,7 @@ def test_nothing_jumps_as_the_speed_changes():
     rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
     springs = FootSprings(settings, biped.body, rest, stiffness, subjects, incline)
     rows = []
-    for speed in np.linspace(0.8, 1.6, 401):
+    for speed in np.linspace(0.8, 1.6, 801):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         legs.follow()
         springs.move_equilibrium(phase, m.angle, control)
@@ -279,8 +281,8 @@ def test_nothing_jumps_as_the_speed_changes():
         equilibrium = 100 * springs.equilibrium
         plan = 100 * task.tracking(m, phase)
         rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
-    change = np.abs(np.diff(rows, axis=0))
-    assert change.max() < 2.0  # [N m, N m/rad, 0.01 rad, cm, cm/s] for 2 mm/s; knees' K differs by 310 in 400 mm/s
+    change = np.abs(np.diff(rows, axis=0)).max()  # N m, N m/rad, 0.01 rad, cm or cm/s for 1 mm/s
+    assert change < 1.0 and change < 0.6 * np.abs(np.diff(rows[::2], axis=0)).max()  # half as far, half the change
     assert (np.ptp(rows, axis=0) > 0.5).sum() >= 8
 
 
