@@ -2,8 +2,8 @@
 
 `misses` is the one ruler: a vector of what a walk with the fixed schedule misses, each in units of its tolerance.
 `cost`, which generations are ranked by, is its length, and a price for falls: every candidate walks from random starts
-with and without pushes, and with two constant stiffnesses. `all_misses`, which the refinement squares, is the vector
-itself.
+with and without pushes, and with springs that nobody tuned for it: constant stiffness, people's, the thesis's lines.
+`all_misses`, which the refinement squares, is the vector itself.
 """
 
 from collections.abc import Sequence
@@ -14,26 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from springfoot.agents.baselines import own_settings
 from springfoot.envs.biped_batch import Biped
-from springfoot.envs.control.equilibrium import foot_curves
-from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.reference_walk import FED, reference_walk_at
-from springfoot.envs.physics.measurement import Measurement
-from springfoot.envs.physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES, TOE, contact_material
+from springfoot.envs.control.reference_walk import FED
+from springfoot.envs.physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES, TOE
 from springfoot.envs.settings import BipedSettings
-from springfoot.envs.step_result import Tick
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
 from springfoot.gait.human import HumanGait
 from springfoot.gait.scores import force_features, stride_work, travel
 
-SECONDS = 6.5
-"""Length of each walk [s]."""
-SETTLED = 2.5
-"""Strides that begin later [s] are measured."""
-SCHEDULED, CONSTANT, PUSHED = 2, ((300.0, 40.0), (126.5, 31.6)), 3
-"""Walks of each candidate: with the schedule; with constant ankle and toe stiffness [N m/rad]; pushed."""
+from .leg_walks import FOREIGN, PUSHED_FOREIGN, SETTLED, series, speed_of, walk
+
+SCHEDULED, PUSHED = 2, 3
+"""Walks of each candidate with the schedule: undisturbed, pushed."""
 REFINED = ((0.25, 7), (0.75, 8), (0.25, 9))
 """Walks of `all_misses`: stride phase at the start, seed."""
 UNEVENNESS = 0.002
@@ -71,7 +66,8 @@ TOLERANCE = {
     "force_peak": 0.08,  # body weights, the largest 10 ms of a stride beyond people's peak by more than 0.07
     "travel": 0.01,  # m a stance, of the sole on the floor
     "unsteady": 0.05,  # SD of the vertical force over strides [body weights]
-    "constant_speed": 0.15,  # m/s, of the walks with constant stiffness
+    "ankle_r": 0.01,  # of the ankle's mean curve with people's, below 0.985
+    "foreign_speed": 0.15,  # m/s, of the walks with springs that nobody tuned
 }
 """What counts as one, root mean square over the stride for a curve."""
 LATE_SWING = 0.8
@@ -84,15 +80,15 @@ further costs proportionally less, down to a third."""
 def cost(
     settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int, push: float, ease: float
 ) -> NDArray:
-    """(C,) what each candidate pays; `push` [N], `ease` as in `_walk`."""
-    walks = SCHEDULED + len(CONSTANT)
+    """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`."""
+    walks = SCHEDULED + len(FOREIGN)
     settings = replace(settings, unevenness_m=UNEVENNESS)
     total = np.zeros(len(candidates))
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
-    missing, biped, ticks = _walk(settings, candidates, seeds, threads, ease)
-    records = _record(biped, ticks)
+    missing, biped, ticks = walk(settings, candidates, seeds, threads, ease)
+    records = series(biped, ticks)
     scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
-    speed = _speed(records)
+    speed = speed_of(records)
     for index in range(walks * len(candidates)):
         candidate = index // walks
         if missing[index] > 0:
@@ -101,11 +97,21 @@ def cost(
             missed = misses(records, index, biped, SETTLED)
             total[candidate] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / SCHEDULED
         else:
-            total[candidate] += min(((speed[index] - settings.speed) / TOLERANCE["constant_speed"]) ** 2, 3.0)
-    pushed = replace(settings, push_newton=push, push_interval=2.5)
-    seeds = [seed + index % PUSHED for index in range(PUSHED * len(candidates))]
-    missing = _walk(pushed, candidates, seeds, threads, ease, constant=(), watched=False)[0]
-    return total + FALL_COST * missing.reshape(len(candidates), PUSHED).mean(1)
+            total[candidate] += _paid_speed(speed[index], settings)
+    if settings.equilibrium == "planned":
+        lines = replace(settings, **own_settings("thesis", settings))
+        missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
+        for candidate, own in enumerate(speed_of(series(biped, ticks))):
+            fall = missing[candidate] * FALL_COST / walks
+            total[candidate] += fall if missing[candidate] > 0 else _paid_speed(own, settings)
+    pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(PUSHED_FOREIGN)
+    seeds = [seed + index % walks for index in range(walks * len(candidates))]
+    missing = walk(pushed, candidates, seeds, threads, ease, foreign=PUSHED_FOREIGN, watched=False)[0]
+    return total + FALL_COST * missing.reshape(len(candidates), walks).mean(1)
+
+
+def _paid_speed(speed: float, settings: BipedSettings) -> float:
+    return abs(speed - settings.speed) / TOLERANCE["foreign_speed"]
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
@@ -114,8 +120,8 @@ def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], thre
     for start, seed in REFINED:
         own = replace(settings, start=start, unevenness_m=UNEVENNESS)
         seeds = [seed] * len(candidates)
-        missing, biped, ticks = _walk(own, candidates, seeds, threads, constant=(), seconds=REFINED_SECONDS)
-        records = _record(biped, ticks)
+        missing, biped, ticks = walk(own, candidates, seeds, threads, foreign=(), seconds=REFINED_SECONDS)
+        records = series(biped, ticks)
         for index, own_misses in enumerate(found):
             missed = None if missing[index] > 0 else misses(records, index, biped, REFINED_SETTLED)
             if missed is None or own_misses is None:
@@ -123,87 +129,6 @@ def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], thre
             else:
                 own_misses.append(missed / np.sqrt(len(REFINED)))
     return [None if each is None else np.concatenate(each) for each in found]
-
-
-def _walk(
-    settings: BipedSettings,
-    candidates: Sequence[LegConstants],
-    seeds: Sequence[int],
-    threads: int,
-    ease: float = 0.0,
-    constant: Sequence[tuple[float, float]] = CONSTANT,
-    seconds: float = SECONDS,
-    watched: bool = True,
-) -> tuple[NDArray, Biped, list[Tick]]:
-    """Walk candidates equally often, one walk for each of `seeds`, at an equilibrium that is the share `ease` planned.
-
-    The last walks of each have the stiffnesses `constant`, the others the schedule.
-
-    Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end, and standing
-    still counts as one; the core; and, if `watched`, every tick.
-    """
-    num, walks = len(seeds), len(seeds) // len(candidates)
-    variant = np.repeat(np.arange(len(candidates)), walks)
-    rest = _eased(settings, candidates, ease) if ease else None
-    biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest)
-    biped.reset(np.arange(num), seeds)
-    role = np.tile(np.arange(walks), len(candidates)) - (walks - len(constant))
-    ticks: list[Tick] = []
-    biped.on_tick = ticks.append if watched else None
-    active, walked = np.ones(num, bool), np.zeros(num)
-    for _ in range(round(seconds / biped.dt)):
-        action = action_of(biped.scheduled_stiffness(), settings, biped.body)
-        for index, stiffness in enumerate(constant):
-            action[role == index] = action_of(stiffness, settings, biped.body)
-        result = biped.step(action.reshape(num, -1), active)
-        walked = np.where(active, biped.measurement.com[:, 0] / (settings.speed * seconds), walked)
-        active &= ~result.terminated
-        if not active.any():
-            break
-    return np.where(active & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0)), biped, ticks
-
-
-def _record(biped: Biped, ticks: Sequence[Tick]) -> dict[str, NDArray]:
-    """The ticks as arrays (T, N, ...)."""
-    measured = [tick.measurement for tick in ticks]
-    return {
-        "com": np.stack([m.com for m in measured]),
-        "planned_com": np.stack([tick.com_reference for tick in ticks]),
-        "material": np.stack([contact_material(biped.body, m.contact, m.base, m.angle) for m in measured]),
-        "load": np.stack([m.force[..., 1] for m in measured]),
-        "pitch": np.stack([m.base[:, 2] for m in measured]),
-        "angle": np.stack([m.angle for m in measured]),
-        "moment": np.stack([tick.work.torque for tick in ticks]),
-        "force": np.stack([m.force.sum(2) for m in measured]),
-        "work": np.stack([tick.work.work for tick in ticks]),
-        "cop": np.stack([_centre_of_pressure(m) for m in measured]),
-        "ankle": np.stack([m.ankle[..., 0] for m in measured]),
-    }
-
-
-def _centre_of_pressure(m: Measurement) -> NDArray:
-    """(N,) forward place of both feet's vertical force [m]; in flight the CoM's."""
-    load = m.force[..., 1]
-    total = load.sum((1, 2))
-    return np.where(total > 0.0, (load * m.contact[..., 0]).sum((1, 2)) / np.maximum(total, 1e-9), m.com[:, 0])
-
-
-def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
-    """(C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
-    walk = reference_walk_at(settings, settings.speed, candidates)
-    curves = [
-        [foot_curves(kind, c, walk)[0] for c in candidates]
-        for kind in (settings, replace(settings, equilibrium="planned"))
-    ]
-    own, planned = np.array(curves)
-    return own + ease * (planned - own)
-
-
-def _speed(record: dict[str, NDArray]) -> NDArray:
-    first = round(SETTLED / Biped.tick_dt)
-    last = len(record["com"]) - 1
-    way = record["com"][last, :, 0] - record["com"][min(first, last), :, 0]
-    return way / max((last - first) * Biped.tick_dt, Biped.tick_dt)
 
 
 def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float) -> NDArray | None:
@@ -261,6 +186,8 @@ def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float)
     off["peak_moment"] = _beyond(mean[:, ankle].max() - theirs[:, ankle].max(), 0.07)
     work = np.abs(mean[:-1, len(CURVES) + len(PLANNED) + 1 :].mean(0).reshape(len(JOINTS), 2)) * period
     off["work"] = _beyond(work[: len(their_work)] - their_work, 0.045)
+    ankle_r = np.corrcoef(mean[:, CURVES.index("ankle")], theirs[:, CURVES.index("ankle")])[0, 1]
+    off["ankle_r"] = max(0.985 - ankle_r, 0.0)
     off["effort"] = max(work[:, 0].sum() - 1.2 * their_work[:, 0].sum(), 0.0)
     off["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - theirs[:, 4].max() - 0.07, 0.0))
     off["travel"] = np.mean(travels)

@@ -14,6 +14,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.studies import leg_cost
 from springfoot.studies import leg_tuning as tuning
 from springfoot.studies.command import study_main
+from springfoot.studies.leg_walks import SECONDS
 
 COMMITTED = leg_constants("planned", "people")
 
@@ -38,7 +39,7 @@ def test_the_search_begins_at_its_start_and_steps_in_the_constants_own_units():
 def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_legs_that_fall():
     farther = replace(COMMITTED, hip_knots_deg=tuple(1.5 + knot for knot in COMMITTED.hip_knots_deg))
     limp = replace(COMMITTED, hip_stiffness=(20.0, 20.0), knee_stiffness=(20.0, 20.0))
-    settings = BipedSettings(episode_seconds=leg_cost.SECONDS + 1)
+    settings = BipedSettings(episode_seconds=SECONDS + 1)
     paid = leg_cost.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=150.0, ease=0.0)
     assert paid[1] < paid[2] < paid[0]
 
