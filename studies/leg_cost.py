@@ -72,6 +72,9 @@ TOLERANCE = {
 """What counts as one, root mean square over the stride for a curve."""
 LATE_SWING = 0.8
 """Stride phase from which the hip holds the leg back before it lands."""
+FOREIGN_SHARE = 0.3
+"""Weight of what is paid with springs that nobody tuned; chosen: with all of it legs stand nearly any spring, and the
+knee of the walk with the schedule goes 5 degrees off people's."""
 FALL_COST = 30.0
 """Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
 further costs proportionally less, down to a third."""
@@ -91,27 +94,30 @@ def cost(
     speed = speed_of(records)
     for index in range(walks * len(candidates)):
         candidate = index // walks
-        if missing[index] > 0:
-            total[candidate] += missing[index] * (3 * FALL_COST / SCHEDULED if scheduled[index] else FALL_COST / walks)
-        elif scheduled[index]:
+        if not scheduled[index]:
+            total[candidate] += _paid_with_foreign(missing[index], speed[index], settings)
+        elif missing[index] > 0:
+            total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
+        else:
             missed = misses(records, index, biped, SETTLED)
             total[candidate] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / SCHEDULED
-        else:
-            total[candidate] += _paid_speed(speed[index], settings)
     if settings.equilibrium == "planned":
         lines = replace(settings, **own_settings("thesis", settings))
         missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
-        for candidate, own in enumerate(speed_of(series(biped, ticks))):
-            fall = missing[candidate] * FALL_COST / walks
-            total[candidate] += fall if missing[candidate] > 0 else _paid_speed(own, settings)
+        speed = speed_of(series(biped, ticks))
+        total += [_paid_with_foreign(*each, settings) for each in zip(missing, speed, strict=True)]
     pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(PUSHED_FOREIGN)
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
     missing = walk(pushed, candidates, seeds, threads, ease, foreign=PUSHED_FOREIGN, watched=False)[0]
-    return total + FALL_COST * missing.reshape(len(candidates), walks).mean(1)
+    missing = missing.reshape(len(candidates), walks)
+    foreign = FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
+    return total + FALL_COST * (missing[:, :PUSHED].mean(1) + foreign)
 
 
-def _paid_speed(speed: float, settings: BipedSettings) -> float:
-    return abs(speed - settings.speed) / TOLERANCE["foreign_speed"]
+def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:
+    """What a walk with springs that nobody tuned pays for a fall, or for its mean speed [m/s]."""
+    fall = missing * FALL_COST / len(FOREIGN)
+    return FOREIGN_SHARE * (fall or abs(speed - settings.speed) / TOLERANCE["foreign_speed"])
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
