@@ -73,8 +73,8 @@ TOLERANCE = {
 LATE_SWING = 0.8
 """Stride phase from which the hip holds the leg back before it lands."""
 FOREIGN_SHARE = 0.3
-"""Weight of what is paid with springs that nobody tuned; chosen: with all of it legs stand nearly any spring, and the
-knee of the walk with the schedule goes 5 degrees off people's."""
+"""Weight of what is paid with springs that nobody tuned, but for the thesis's lines, whose weight is one; chosen: with
+all of it legs stand nearly any spring, and the knee of the walk with the schedule goes 5 degrees off people's."""
 FALL_COST = 30.0
 """Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
 further costs proportionally less, down to a third."""
@@ -95,7 +95,7 @@ def cost(
     for index in range(walks * len(candidates)):
         candidate = index // walks
         if not scheduled[index]:
-            total[candidate] += _paid_with_foreign(missing[index], speed[index], settings)
+            total[candidate] += FOREIGN_SHARE * _paid_with_foreign(missing[index], speed[index], settings)
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
@@ -117,7 +117,7 @@ def cost(
 def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:
     """What a walk with springs that nobody tuned pays for a fall, or for its mean speed [m/s]."""
     fall = missing * FALL_COST / len(FOREIGN)
-    return FOREIGN_SHARE * (fall or abs(speed - settings.speed) / TOLERANCE["foreign_speed"])
+    return fall or abs(speed - settings.speed) / TOLERANCE["foreign_speed"]
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
