@@ -81,9 +81,16 @@ further costs proportionally less, down to a third."""
 
 
 def cost(
-    settings: BipedSettings, candidates: Sequence[LegConstants], seed: int, threads: int, push: float, ease: float
+    settings: BipedSettings,
+    candidates: Sequence[LegConstants],
+    seed: int,
+    threads: int,
+    push: float,
+    ease: float = 0.0,
+    foreign: float = 1.0,
 ) -> NDArray:
-    """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`."""
+    """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks with
+    springs that nobody tuned."""
     walks = SCHEDULED + len(FOREIGN)
     settings = replace(settings, unevenness_m=UNEVENNESS)
     total = np.zeros(len(candidates))
@@ -95,7 +102,7 @@ def cost(
     for index in range(walks * len(candidates)):
         candidate = index // walks
         if not scheduled[index]:
-            total[candidate] += FOREIGN_SHARE * _paid_with_foreign(missing[index], speed[index], settings)
+            total[candidate] += foreign * FOREIGN_SHARE * _paid_with_foreign(missing[index], speed[index], settings)
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
@@ -105,13 +112,13 @@ def cost(
         lines = replace(settings, **own_settings("thesis", settings))
         missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
         speed = speed_of(series(biped, ticks))
-        total += [_paid_with_foreign(*each, settings) for each in zip(missing, speed, strict=True)]
+        total += [foreign * _paid_with_foreign(*each, settings) for each in zip(missing, speed, strict=True)]
     pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(PUSHED_FOREIGN)
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
     missing = walk(pushed, candidates, seeds, threads, ease, foreign=PUSHED_FOREIGN, watched=False)[0]
     missing = missing.reshape(len(candidates), walks)
-    foreign = FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
-    return total + FALL_COST * (missing[:, :PUSHED].mean(1) + foreign)
+    fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
+    return total + FALL_COST * fallen
 
 
 def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:

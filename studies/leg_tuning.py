@@ -100,6 +100,8 @@ class LegTuning(Study):
     """Generations over which the foot's equilibrium goes from the planned one to its own: 0, at once."""
     push_newton: float = 150.0
     """Size of the pushes of the pushed walks [N]."""
+    foreign: float = 1.0
+    """Price of the walks with springs that nobody tuned; at 0 they count for nothing."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
@@ -121,6 +123,7 @@ class LegTuning(Study):
         ):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
+        require_number("foreign", self.foreign, 0)
 
     @property
     def total(self) -> float:
@@ -159,7 +162,8 @@ class LegTuning(Study):
             vectors = strategy.ask()
             ease = max(0.0, 1.0 - generation / self.ease) if self.ease else 0.0
             candidates = [search.constants(v) for v in vectors]
-            paid = cost(settings, candidates, self.seed + 1000 * generation, self.threads, self.push_newton, ease)
+            seed = self.seed + 1000 * generation
+            paid = cost(settings, candidates, seed, self.threads, self.push_newton, ease, self.foreign)
             strategy.tell(vectors, list(paid))
             lines.append([generation + 1, paid.min(), np.median(paid)])
             progress(1)
