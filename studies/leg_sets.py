@@ -1,24 +1,30 @@
-"""What independent searches for leg constants found, and how each result walks with its own fixed schedule.
+"""What independent searches for leg constants found, how each result walks, and what their prices trade.
 
 springfoot study leg-sets --page docs/results.md
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+import matplotlib
+import numpy as np
 import tyro
+from matplotlib.figure import Figure
 
-from springfoot.agents.baselines import untrained
 from springfoot.agents.files import csv_text
 from springfoot.agents.markdown import table, text_of
 from springfoot.envs.control.leg_constants import LegConstants, constants_from, constants_name
 from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.gait_figure import MODEL, STYLE
 from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 
 from .constants_file import CONSTANTS, read_constants
+from .leg_cost import REFINED_SECONDS, all_misses
 from .quantities import COMPARED_JOINTS, Quantity
 from .study import Answer, OnProgress, WalkingStudy
 
@@ -30,7 +36,11 @@ SETTINGS: tuple[Mapping[str, Any], ...] = (
     {"cadence": "thesis"},
     {"feedforward": "plan"},
 )
-"""Settings whose constants were searched for."""
+"""Settings whose constants were searched for; the first is that of the front."""
+SCHEDULE = "untrained", {"action_mode": "residual"}
+"""A set's own fixed schedule, as a policy and settings."""
+UNTUNED = ("constant", "quasi_stiffness", "untrained", "thesis")
+"""Policies that set stiffness which no set was tuned with."""
 PUSHED = {"push_newton": 150.0}
 WALKED = (
     Quantity("m/s", ".3f", ("speed_m_s", "mean")),
@@ -48,7 +58,7 @@ WALKED = (
 
 @dataclass(frozen=True, kw_only=True)
 class LegSets(WalkingStudy):
-    """Walk with every committed set of leg constants and its own schedule, and with those of a second search."""
+    """Walk with every committed set of leg constants, and draw likeness against what stands springs nobody tuned."""
 
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants."""
@@ -57,32 +67,68 @@ class LegSets(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with each."""
-        known = read_constants(self.constants)
-        lines, numbers = [], []
-        for changed in SETTINGS:
-            settings = BipedSettings(action_mode="residual", episode_seconds=self.seconds, **changed)
-            name = constants_name(settings.equilibrium, settings.cadence, settings.speed, settings.feedforward)
-            for search, sets in (("first", known["constants"]), ("second", known.get("second", {}))):
-                if name in sets:
-                    legs = constants_from(sets[name])
-                    level, pushed = (self._walk(settings, legs, more, progress) for more in ({}, PUSHED))
-                    falls = [f"{m['falls']} of {m['episodes']}" for m in (level, pushed)]
-                    values = [each.of(level) for each in WALKED]
-                    ankle = "/".join(f"{k:.0f}" for k in legs.ankle_schedule)
-                    texts = [text_of(value, each.pattern) for value, each in zip(values, WALKED, strict=True)]
-                    lines.append([f"{name}: {search}", *falls, *texts, ankle, f"{legs.toe_schedule:.0f}"])
-                    numbers.append([name, search, level["falls"], pushed["falls"], *values])
-        head = ["set and search", "falls", "pushed", *(each.label for each in WALKED), "K ankle", "K toe"]
+        lines, numbers, front = [], [], {}
+        for label, given, legs in _sets(read_constants(self.constants)):
+            name, own = SCHEDULE
+            level, pushed = (self._walk(name, {**given, **own, **more}, legs, progress) for more in ({}, PUSHED))
+            misses = self._misses(given, legs)
+            untuned = None
+            if given == SETTINGS[0]:
+                walks = [self._walk(other, {**given, **PUSHED}, legs, progress) for other in UNTUNED]
+                untuned = 100 * sum(each["falls"] for each in walks) / (len(UNTUNED) * self.episodes)
+                front[label] = misses, untuned
+            values = [misses, untuned, *(each.of(level) for each in WALKED)]
+            patterns = [".1f", ".0f", *(each.pattern for each in WALKED)]
+            falls = [f"{m['falls']} of {m['episodes']}" for m in (level, pushed)]
+            ankle = "/".join(f"{k:.0f}" for k in legs.ankle_schedule)
+            texts = [text_of(value, pattern) for value, pattern in zip(values, patterns, strict=True)]
+            lines.append([label, *falls, *texts, ankle, f"{legs.toe_schedule:.0f}"])
+            numbers.append([label, level["falls"], pushed["falls"], *values])
+        walked = ["misses", "untuned springs fall %", *(each.label for each in WALKED)]
+        head = ["set", "falls", "pushed", *walked, "K ankle", "K toe"]
+        names = ", ".join(f"`{name}`" for name in UNTUNED)
         text = (
-            f"{table(head, lines)}\n\n{self.what_ran} with the set's own fixed schedule; pushed by ±150 N. "
+            f"{table(head, lines)}\n\n{self.what_ran}, with the set's own fixed schedule; pushed by ±150 N. Misses: "
+            "length of the vector that the search pays for, falls apart. Untuned springs: "
+            f"{names} on these legs under the same pushes. "
             "K in N·m/rad: loading / early stance / late stance / push-off / swing."
         )
-        columns = ["set", "search", "falls", "falls_pushed", *(each.column for each in WALKED)]
-        return Answer(text=text, files={"leg_sets.csv": csv_text(columns, numbers)}, sections={"LEG-SETS": text})
+        columns = ["set", "falls", "falls_pushed", "misses", "untuned_falls_percent", *(each.column for each in WALKED)]
+        files = {"leg_sets.csv": csv_text(columns, numbers), "leg_sets.png": partial(_draw, front=front)}
+        picture = "![Misses of a set against falls of springs that nobody tuned](leg_sets.png)"
+        return Answer(text=text, files=files, sections={"LEG-SETS": f"{picture}\n\n{text}"})
 
-    def _walk(
-        self, settings: BipedSettings, legs: LegConstants, more: Mapping[str, float], progress: OnProgress
-    ) -> dict[str, Any]:
-        settings = replace(settings, **more)
-        recorded = record(untrained(settings), settings, name="schedule", legs=legs, progress=progress, **self.how)
-        return measure(recorded).metrics
+    def _walk(self, name: str, given: Mapping[str, Any], legs: LegConstants, progress: OnProgress) -> dict[str, Any]:
+        policy, settings = prepare(name, {"episode_seconds": self.seconds, **given})
+        return measure(record(policy, settings, name=name, legs=legs, progress=progress, **self.how)).metrics
+
+    def _misses(self, given: Mapping[str, Any], legs: LegConstants) -> float | None:
+        (found,) = all_misses(BipedSettings(episode_seconds=REFINED_SECONDS + 1, **given), [legs], self.threads)
+        return None if found is None else float(np.linalg.norm(found))
+
+
+def _sets(known: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], LegConstants]]:
+    """Label, settings and constants of every set: of each setting the first and the second search, then the front."""
+    for given in SETTINGS:
+        settings = BipedSettings(**given)
+        name = constants_name(settings.equilibrium, settings.cadence, settings.speed, settings.feedforward)
+        for search, sets in (("first", known["constants"]), ("second", known.get("second", {}))):
+            if name in sets:
+                yield f"{name}: {search}", given, constants_from(sets[name])
+    for name, values in known.get("front", {}).items():
+        yield name, SETTINGS[0], constants_from(values)
+
+
+def _draw(path: Path, front: Mapping[str, tuple[float | None, float]]) -> None:
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(5.6, 3.6), layout="constrained")
+        ax = figure.subplots()
+        for label, (misses, untuned) in front.items():
+            if misses is not None:
+                ax.plot(misses, untuned, "o", color=MODEL)
+                ax.annotate(label, (misses, untuned), (5, 4), textcoords="offset points", fontsize=8)
+        ax.set_xlabel("misses of the walk with its own schedule (tolerances)")
+        ax.set_ylabel("falls of springs nobody tuned,\nunder ±150 N (%)")
+        ax.set_ylim(0, 105)
+        ax.margins(x=0.25)
+        figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})

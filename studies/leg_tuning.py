@@ -106,8 +106,9 @@ class LegTuning(Study):
     """Seed of the search and of the walks."""
     threads: int = 2
     """Threads of the physics."""
-    second: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Keep what is found as that of a second search, beside the first, which the walk goes on using."""
+    keep: Literal["constants", "second", "front"] = "constants"
+    """Where what is found is kept: as the constants that walk; as those of a second search, or of one at another price,
+    beside them."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
 
@@ -227,8 +228,9 @@ class LegTuning(Study):
         if self.quick:
             return
         known = read_constants(self.constants)  # anew: another search may have written its own
-        kept, label = ("second", f"{name}, second search") if self.second else ("constants", name)
-        known.setdefault(kept, {})[name] = asdict(found)
+        name = f"{name}, --foreign {self.foreign:g}" if self.keep == "front" else name
+        known.setdefault(self.keep, {})[name] = asdict(found)
+        label = f"{name}, second search" if self.keep == "second" else name
         known.setdefault("found_by", {})[label] = self.command
         write_constants(self.constants, known)
 

@@ -84,6 +84,15 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, caps
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+def test_a_search_at_another_price_is_kept_beside_the_constants_that_walk(constants):
+    before = json.loads(constants.read_text())
+    words = ["--generations", "1", "--population", "2", "--threads", "1", "--foreign", "0", "--keep", "front"]
+    assert run(*words, "--constants", constants, "--out", constants.parent / "out") == 0
+    after = json.loads(constants.read_text())
+    assert after["constants"] == before["constants"]
+    assert set(after["front"]["planned, --foreign 0"]) == set(asdict(COMMITTED))
+
+
 def test_a_quick_search_writes_no_constants(constants, capsys):
     before = constants.read_text()
     assert run("--quick", "--generations", "150", "--constants", constants, "--out", constants.parent / "out") == 0
