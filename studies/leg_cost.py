@@ -41,20 +41,20 @@ PLANNED = ("com_x", "com_z", "com_speed")
 """What of the CoM is held against the plan."""
 TOLERANCE = {
     "thigh": np.deg2rad(1.0),
-    "knee": np.deg2rad(2.2),
+    "knee": np.deg2rad(1.9),
     "ankle": np.deg2rad(1.2),
     "toe": np.deg2rad(8.0),
     "grf_vertical": 0.07,  # body weights
     "grf_forward": 0.02,
     "hip_moment": 0.11,  # N m/kg
-    "knee_moment": 0.11,
+    "knee_moment": 0.09,
     "ankle_moment": 0.09,
     "com_x": 0.03,  # m, against the plan
     "com_z": 0.01,
     "com_speed": 0.06,  # m/s, forward, against the plan over the step
     "cop": 0.025,  # m, against the plan's ZMP
-    "beyond_sd": 0.1,  # N m/kg, of the hip moment beyond 1.9 SD from people's
-    "late_hip_moment": 0.1,  # N m/kg, from LATE_SWING on, beyond people's largest then by more than 0.1
+    "beyond_sd": 0.06,  # N m/kg, of the hip moment beyond 1.9 SD from people's
+    "late_hip_moment": 0.06,  # N m/kg, from LATE_SWING on, beyond people's largest then by more than 0.1
     "speed": 0.02,  # m/s
     "period": 0.02,  # share of the plan's stride time
     "double_support": 0.02,  # s, against people's
