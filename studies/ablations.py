@@ -90,6 +90,8 @@ QUANTITIES = (
     Quantity("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
     Quantity("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
     Quantity("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
+    Quantity("CoM x off m", ".4f", ("undisturbed", "com", "x_rmse_m")),
+    Quantity("CoP off m", ".4f", ("undisturbed", "zmp", "cop_rmse_single_support_m")),
 )
 """Columns of every table."""
 
