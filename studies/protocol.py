@@ -48,8 +48,8 @@ class Protocol:
             f"Falls of {self.episodes} episodes × {self.seconds:g} s, undisturbed and pushed by "
             f"±{self.push_newton:g} N, the same seeds in every row; all else undisturbed: return of the default "
             "reward, speed, RMSE of thigh, knee and ankle to people's mean, vertical force peaks, r of both forces "
-            "with people's, largest ankle moment and where in the stride, RMSE of the CoM to the plan forward and of the "
-            "CoP to the planned ZMP in single support. What falls is measured before its falls."
+            "with people's, largest ankle moment and where in the stride, RMSE of the CoM to the plan forward and of "
+            "the CoP to the planned ZMP in single support. What falls is measured before its falls."
         )
 
 
