@@ -57,9 +57,9 @@ DEFAULT_WEIGHTS = {
     "speed": 0.50,
     "com_x": 0.15,
     "com_z": 0.10,
-    "zmp": 0.20,
-    "pose": 0.80,
-    "grf": 1.00,
+    "zmp": 0.15,
+    "pose": 1.60,
+    "grf": 2.00,
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
 }

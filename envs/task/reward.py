@@ -36,11 +36,9 @@ MAX_FORCE = 1.2
 """Vertical force of one foot beyond which it costs more [body weights]; chosen: people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
 """Weight of that excess against the distance from people's range [-]; chosen high, as a peak is short."""
-FORCE_BAND = 0.75
-"""People's range of forces, to either side of their mean [SD]; chosen: within it nothing draws the ankle's moment up to
-theirs, and a much narrower one is walked with a harder landing."""
-FORCE_TOLERANCE = 0.15
-"""Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen."""
+FORCE_TOLERANCE = 0.4
+"""Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen: at 0.15 a push-off
+far too strong costs hardly more than one a little too strong."""
 
 
 TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf", "stiffness_rate", "stiffness")
@@ -117,9 +115,9 @@ class Task:
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
-        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 1, 3, 0.1) x squared distance [rad^2] of thigh
+        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 2, 3, 0.1) x squared distance [rad^2] of thigh
         (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
-        `grf`, exp(-D/0.15) with D the body weights by which the feet's forces leave people's range: vertical
+        `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave people's range: vertical
         beyond 1.2 (fourfold), both components beyond mean +- 0.75 SD at the leg's phase.
         Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
         [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
@@ -271,8 +269,8 @@ def _force_distance(scale, force_windows, people):
         forward += (contacts[0, 0] + contacts[1, 0] + contacts[2, 0]) / scale.weight / count
         up += vertical / count
         excess += max(vertical - MAX_FORCE, 0.0) / count
-    beyond_forward = max(abs(forward - people.force[0]) - FORCE_BAND * people.force_sd[0], 0.0)
-    beyond_up = max(abs(up - people.force[1]) - FORCE_BAND * people.force_sd[1], 0.0)
+    beyond_forward = max(abs(forward - people.force[0]) - people.force_band[0], 0.0)
+    beyond_up = max(abs(up - people.force[1]) - people.force_band[1], 0.0)
     return EXCESS_SHARE * excess + beyond_forward + beyond_up
 
 

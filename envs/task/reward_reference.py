@@ -15,15 +15,18 @@ from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
 
 MIN_HIP_HEIGHT = 0.65
 """A hip lower than this is a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
-COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.03, 0.01
+COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.05, 0.02
 """Error of the CoM, forward and up, at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 COP_TOLERANCE = 0.04
 """Distance of the CoP from the planned ZMP at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 SPEED_TOLERANCE = 0.10
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen."""
-POSE_WEIGHTS = {HIP: 3.0, KNEE: 1.0, ANKLE: 3.0, TOE: 0.1}
+POSE_WEIGHTS = {HIP: 3.0, KNEE: 2.0, ANKLE: 3.0, TOE: 0.1}
 """Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve is of other
 people than those of thigh, knee and ankle."""
+FORCE_BAND = 0.75
+"""People's range of forces, to either side of their mean [SD]; chosen: at 1 the ankle pushes off with less than their
+moment."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
 """Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height]; chosen, as of mid-stance."""
 TOE_SHARE = 0.25
@@ -33,7 +36,7 @@ REFERENCE = np.dtype(
     [
         ("pose", float, len(JOINTS)),  # people's thigh (to the vertical), knee, ankle, toe [rad]
         ("force", float, 2),  # people's ground reaction force (forward, up), at the middle of the step [body weights]
-        ("force_sd", float, 2),  # its standard deviation
+        ("force_band", float, 2),  # how far from it is still people's range
         ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
         ("zmp", float),  # the plan's ZMP at the middle of the step [m], x as of `com`
         ("speed", float),  # the plan's forward speed of the CoM [m/s]
@@ -76,7 +79,8 @@ def reference_curves(plan: ComPlan, human: HumanGait, step_seconds: float) -> ND
     curves["pose"] = np.stack([human.mean(name, GRID) for name in ANGLES], -1)
     middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # a force averaged over a step belongs to its middle
     for axis, name in enumerate(("grf_forward", "grf_vertical")):
-        curves["force"][:, axis], curves["force_sd"][:, axis] = human.mean(name, middle), human.sd(name, middle)
+        curves["force"][:, axis] = human.mean(name, middle)
+        curves["force_band"][:, axis] = FORCE_BAND * human.sd(name, middle)
     step = (2 * GRID) % 1.0
     x, z = plan.com(step)
     curves["com"] = np.stack((x - plan.step_length * step, z), -1)
