@@ -40,7 +40,7 @@ def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_le
     farther = replace(COMMITTED, hip_knots_deg=tuple(1.5 + knot for knot in COMMITTED.hip_knots_deg))
     limp = replace(COMMITTED, hip_stiffness=(20.0, 20.0), knee_stiffness=(20.0, 20.0))
     settings = BipedSettings(episode_seconds=SECONDS + 1)
-    paid = leg_cost.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=150.0, ease=0.0)
+    paid = leg_cost.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=0.0, foreign=0.0)
     assert paid[1] < paid[2] < paid[0]
 
 

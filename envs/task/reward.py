@@ -37,8 +37,8 @@ MAX_FORCE = 1.2
 EXCESS_SHARE = 4.0
 """Weight of that excess against the distance from people's range [-]; chosen high, as a peak is short."""
 FORCE_TOLERANCE = 0.4
-"""Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen: at 0.15 a push-off
-far too strong costs hardly more than one a little too strong."""
+"""Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen: at 0.15 a
+push-off far too strong costs hardly more than one a little too strong."""
 
 
 TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf", "stiffness_rate", "stiffness")
