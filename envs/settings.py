@@ -58,8 +58,8 @@ DEFAULT_WEIGHTS = {
     "com_x": 0.15,
     "com_z": 0.10,
     "zmp": 0.15,
-    "pose": 1.60,
-    "grf": 2.00,
+    "pose": 2.40,
+    "grf": 1.50,
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
 }

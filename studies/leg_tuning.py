@@ -24,6 +24,7 @@ from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, con
 from springfoot.envs.settings import BipedSettings, Feedforward
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.plan import Cadence
+from springfoot.gait.stiffness import LOWEST_STIFFNESS
 
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .leg_cost import REFINED_SECONDS, all_misses, cost
@@ -39,6 +40,8 @@ ADDITIVE_STEP = {
     "period_speed_gain": 0.03,
 }
 """One unit of the search for constants that may change sign or vanish, in their own units."""
+LEAST = {"ankle_schedule": LOWEST_STIFFNESS[0], "toe_schedule": LOWEST_STIFFNESS[1]}
+"""Least value of a constant [N m/rad]."""
 DIFFERENCE = 0.08
 """Step of the refinement's differences [units of the search]; chosen: less drowns in what a walk changes by itself."""
 STEEPEST = 5.0
@@ -70,6 +73,8 @@ class Search:
                 value = start + ADDITIVE_STEP[name] * step
             else:
                 value = start * np.exp(GAIN_STEP * step)
+            if name in LEAST:
+                value = np.maximum(value, LEAST[name])  # an action sets no less
             values[name] = [float(round(x, 5)) for x in value] if start.size > 1 else float(round(value[0], 5))
         return constants_from(values)
 

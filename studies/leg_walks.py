@@ -27,11 +27,11 @@ SETTLED = 2.5
 """Strides that begin later [s] are measured."""
 QUASI = np.stack([plateau_curve(REFERENCE_STIFFNESS), np.full(len(GRID), TOE_STIFFNESS)], -1)
 """People's ankle quasi-stiffness and `TOE_STIFFNESS`, (SAMPLES, 2) on `GRID` [N m/rad], as all here."""
-HELD = np.tile(CONSTANT_STIFFNESS, (len(GRID), 1))
+UNCHANGING = np.tile(CONSTANT_STIFFNESS, (len(GRID), 1))
 """One that is held."""
 MID_RANGE = np.tile(np.sqrt(np.prod(stiffness_ranges(BipedSettings(), Body()), axis=0)), (len(GRID), 1))
 """That of action 0, where a training begins."""
-FOREIGN, PUSHED_FOREIGN = (HELD, QUASI, MID_RANGE), (HELD, QUASI)
+FOREIGN, PUSHED_FOREIGN = (UNCHANGING, QUASI, MID_RANGE), (UNCHANGING, QUASI)
 """Springs that nobody tuned for it, with which each candidate walks undisturbed, and pushed."""
 
 

@@ -100,8 +100,8 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
         (((20.0, 0.0), (25.0, 10.0)), 0),
         (((45.0, 0.0), (5.0, 10.0)), 0),
         (((20.0, 0.0), (5.0, 0.0)), 4),  # as printed
-        (((200.0, 0.0), (50.0, 0.0)), 3),  # of 4; on the legs before the present ones all
-        (((45.0, 0.0), (25.0, 0.0)), 3),
+        (((200.0, 0.0), (50.0, 0.0)), 4),
+        (((45.0, 0.0), (25.0, 0.0)), 4),
     ],
 )
 def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, falls):

@@ -254,10 +254,10 @@ def test_a_recording_is_of_one_body_at_one_speed():
 
 def test_bodies_side_by_side_are_measured_each_in_its_own_units():
     ranges = {"height_range": (1.5, 1.9), "mass_range": (50.0, 100.0), "speed_range": (1.0, 1.3)}
-    policy, settings = prepare("constant:400,40", ranges | {"episode_seconds": 5.0})
+    policy, settings = prepare("quasi_stiffness", ranges | {"episode_seconds": 5.0})
     who = {"height": [1.7, 1.9], "mass": [63.0, 100.0], "speed": [1.2, 1.2 * np.sqrt(1.9 / 1.7)]}
-    own, other = record_each(policy, settings, who, name="constant:400,40", seed=3)
-    alone = record(*prepare("constant:400,40", {"episode_seconds": 5.0}), name="constant:400,40", episodes=1, seed=3)
+    own, other = record_each(policy, settings, who, name="quasi_stiffness", seed=3)
+    alone = record(*prepare("quasi_stiffness", {"episode_seconds": 5.0}), name="constant:400,40", episodes=1, seed=3)
     for key, values in alone.series.items():
         np.testing.assert_array_equal(own.series[key], values, err_msg=key)
     assert measure(own).metrics == measure(alone).metrics

@@ -115,7 +115,7 @@ class Task:
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
-        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 2, 3, 0.1) x squared distance [rad^2] of thigh
+        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 3, 3, 0.1) x squared distance [rad^2] of thigh
         (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave people's range: vertical
         beyond 1.2 (fourfold), both components beyond mean +- 0.75 SD at the leg's phase.

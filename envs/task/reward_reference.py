@@ -21,7 +21,7 @@ COP_TOLERANCE = 0.04
 """Distance of the CoP from the planned ZMP at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 SPEED_TOLERANCE = 0.10
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen."""
-POSE_WEIGHTS = {HIP: 3.0, KNEE: 2.0, ANKLE: 3.0, TOE: 0.1}
+POSE_WEIGHTS = {HIP: 3.0, KNEE: 3.0, ANKLE: 3.0, TOE: 0.1}
 """Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve is of other
 people than those of thigh, knee and ankle."""
 FORCE_BAND = 0.75
