@@ -58,8 +58,8 @@ DEFAULT_WEIGHTS = {
     "com_x": 0.15,
     "com_z": 0.10,
     "zmp": 0.15,
-    "pose": 2.40,
-    "grf": 1.50,
+    "pose": 2.00,
+    "grf": 2.00,
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
 }
