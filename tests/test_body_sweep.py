@@ -64,11 +64,11 @@ def test_the_table_has_falls_apart_and_the_worst_of_those_that_walked():
 
 def test_the_command_prints_a_table_and_writes_a_row_for_each_pair(capsys, tmp_path):
     ranges = [f"--{name.replace('_', '-')} {low:g} {high:g}" for name, (low, high) in SOME.items()]
-    words = ["bodies", "schedule", "--pairs", "2", "--seconds", "4.5", "--out", str(tmp_path / "new"), *ranges]
+    words = ["bodies", "schedule", "--pairs", "2", "--seconds", "6", "--out", str(tmp_path / "new"), *ranges]
     words = " ".join(words).split()
     assert study_main(words) == 0
     out = capsys.readouterr().out
-    assert "| falls | 0 of 2 |" in out and "2 pairs × 4.5 s, seed 0: 1.6–1.75 m, 40–120 kg, 1.15–1.25 m/s" in out
+    assert "| falls | 0 of 2 |" in out and "2 pairs × 6 s, seed 0: 1.6–1.75 m, 40–120 kg, 1.15–1.25 m/s" in out
     with (tmp_path / "new" / bodies.PAIRS).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 and list(rows[0]) == list(row())
