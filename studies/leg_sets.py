@@ -121,14 +121,14 @@ def _sets(known: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Le
 
 def _draw(path: Path, front: Mapping[str, tuple[float | None, float]]) -> None:
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.6, 3.6), layout="constrained")
+        figure = Figure(figsize=(6.4, 3.6), layout="constrained")
         ax = figure.subplots()
-        for label, (misses, untuned) in front.items():
-            if misses is not None:
-                ax.plot(misses, untuned, "o", color=MODEL)
-                ax.annotate(label, (misses, untuned), (5, 4), textcoords="offset points", fontsize=8)
+        drawn = sorted((falls, misses, label) for label, (misses, falls) in front.items() if misses is not None)
+        for index, (falls, misses, label) in enumerate(drawn):
+            ax.plot(misses, falls, "o", color=MODEL)
+            ax.annotate(label, (misses, falls), (6, (4, -11)[index % 2]), textcoords="offset points", fontsize=8)
         ax.set_xlabel("misses of the walk with its own schedule (tolerances)")
         ax.set_ylabel("falls of springs nobody tuned,\nunder ±150 N (%)")
         ax.set_ylim(0, 105)
-        ax.margins(x=0.25)
+        ax.margins(x=0.5)
         figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
