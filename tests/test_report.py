@@ -199,7 +199,7 @@ def test_a_gait_that_was_measured_here_can_be_walked_after(command, folder, tmp_
     assert metrics["reference"]["speed_m_s"] == float(first["speed_m_s"])
     own = reference_gait(settings_from(**metrics["environment"]))
     assert np.degrees(own.mean("knee", 0.0)) == pytest.approx(float(first["knee_flexion_deg"]), abs=1.0)
-    assert metrics["cadence_steps_min"] == pytest.approx(120 / own.stride_time, rel=0.05)
+    assert metrics["cadence_steps_min"] == pytest.approx(120 / own.stride_time, rel=0.08)
 
 
 @pytest.mark.parametrize(
