@@ -55,7 +55,7 @@ def test_a_vector_gives_the_constants_it_was_made_of():
 def test_the_committed_numbers_pay_less_than_none():
     none = slopes.constants_of(np.zeros(10))
     level = slopes.walk(None, (0.0,), 1, 5.0, seed=0, threads=1)["reward"].mean()
-    walked = [slopes.walk(each, (4.0,), 2, 5.0, seed=0, threads=1) for each in (COMMITTED, none)]
+    walked = [slopes.walk(each, (5.0,), 2, 5.0, seed=0, threads=1) for each in (COMMITTED, none)]
     assert not walked[0]["missing"].any() and walked[1]["missing"].all()
     assert slopes.cost(walked[0], level) < slopes.cost(walked[1], level)
     harder = walked[0] | {"heel": walked[0]["heel"] + 1.0}
