@@ -56,7 +56,7 @@ def test_returns_and_the_cost_of_changing_stiffness_are_of_time_and_not_of_steps
         returns.append(total)
     np.testing.assert_allclose(costs, 4 * (0.2 * 0.02) ** 2, rtol=1e-9)  # 0.2 a second, four actions, per 20 ms
     np.testing.assert_allclose(returns[0], returns[1], rtol=0.01)
-    np.testing.assert_allclose(returns[2], returns[1], rtol=0.03)
+    np.testing.assert_allclose(returns[2], returns[1], rtol=0.02)
 
 
 @pytest.mark.parametrize("rate", RATES)

@@ -98,7 +98,8 @@ def test_footfalls_lie_within_their_bounds_and_change_in_mid_swing_alone():
     assert changed.sum() >= 4 * 4 and np.abs(height).max() <= 0.01
     assert height.min() < -0.005 and height.max() > 0.005
     assert (phase[1:][changed] >= NEXT_FOOTFALL_PHASE).all() and (phase[1:][changed] < NEXT_FOOTFALL_PHASE + 0.05).all()
-    assert (np.array(clearance)[1:][changed] > -0.001).all()  # the new ground is below the foot, which is coming down
+    room = np.maximum(np.array(clearance)[1:], 0.0)  # above the ground of before; 0 where the foot scuffs it
+    assert (np.diff(height, axis=0) <= room + 1e-12)[changed].all()  # the new ground is below the foot
 
 
 def test_a_batch_in_any_world_gives_the_bits_of_its_members_alone():

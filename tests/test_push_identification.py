@@ -41,12 +41,13 @@ def test_torque_is_recorded_at_the_same_instant_as_angle_and_velocity():
 def test_springs_are_found_in_every_loaded_phase_ramps_included():
     rows = loaded(identified(samples(pushed("schedule"))))
     assert {row.joint for row in rows} == {"ankle", "toe"} and len(rows) >= 8
+    rows += loaded(identified(samples(pushed("frozen:pretrained"))))  # whose ramps are steeper
     for row in rows:
         assert row.pushed.stiffness and row.pushed.damping_time
         assert row.pushed.stiffness.value == pytest.approx(row.applied[0], rel=0.01)
         assert row.pushed.damping_time.value == pytest.approx(0.02, rel=0.05)
         assert row.pushed.verdict == SPRING
-    assert any(row.applied[2] > 1.5 * row.applied[1] for row in rows)  # a ramp
+    assert any(row.applied[2] > 3 * row.applied[1] for row in rows)
 
 
 def test_noise_on_the_torque_leaves_the_truth_within_intervals_and_the_undisturbed_estimator_is_blind():
