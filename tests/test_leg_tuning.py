@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.leg_controller import KNOTS
 from springfoot.envs.settings import BipedSettings
+from springfoot.gait.human import human_gait
 from springfoot.studies import leg_cost
 from springfoot.studies import leg_tuning as tuning
 from springfoot.studies.command import study_main
@@ -30,10 +32,24 @@ def constants(tmp_path):
 def test_the_search_begins_at_its_start_and_steps_in_the_constants_own_units():
     search = tuning.Search(COMMITTED)
     assert search.constants(np.zeros(search.size)) == COMMITTED
-    stepped = search.constants(np.ones(search.size))
+    stepped = search.constants(np.append(np.ones(search.size - len(tuning.LED)), np.zeros(len(tuning.LED))))
     assert stepped.knee_knots_deg == pytest.approx(np.array(COMMITTED.knee_knots_deg) + 2.0, abs=1e-5)
     assert stepped.hip_stiffness == pytest.approx(np.array(COMMITTED.hip_stiffness) * exp(0.15), rel=1e-6)
     assert stepped.trunk_pitch_deg == pytest.approx(COMMITTED.trunk_pitch_deg + 1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("place", "joint", "curve"), [(-3, "hip", "thigh"), (-2, "knee", "knee"), (-1, "ankle", "ankle")]
+)
+def test_one_step_brings_the_whole_target_of_a_joint_earlier(place, joint, curve):
+    search = tuning.Search(COMMITTED)
+    vector = np.zeros(search.size)
+    vector[place] = 1.0
+    led, human, name = search.constants(vector), human_gait(tuning.TUNED_SPEED), f"{joint}_knots_deg"
+    added = np.array(getattr(led, name)) - getattr(COMMITTED, name)
+    earlier = human.mean(curve, KNOTS + tuning.LEAD_STEP) - human.mean(curve, KNOTS)
+    assert added == pytest.approx(np.rad2deg(earlier), abs=0.2)  # to first order; the knee moves 1.5 deg
+    assert replace(led, **{name: getattr(COMMITTED, name)}) == COMMITTED
 
 
 def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_legs_that_fall():
