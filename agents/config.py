@@ -70,7 +70,7 @@ class TrainingConfig:
 PRESETS: dict[str, TrainingConfig] = {
     "walk": TrainingConfig(),
     "any-body": TrainingConfig(
-        timesteps=8_000_000,
+        timesteps=12_000_000,
         eval_interval=262_144,
         environment=replace(
             TRAINED_ON,

@@ -54,12 +54,12 @@ LONGEST_DELAY = 0.04
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
-    "speed": 0.50,
-    "com_x": 0.15,
+    "speed": 0.70,
+    "com_x": 0.20,
     "com_z": 0.10,
-    "zmp": 0.15,
-    "pose": 2.00,
-    "grf": 2.00,
+    "zmp": 0.20,
+    "pose": 1.80,
+    "grf": 4.00,
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
 }

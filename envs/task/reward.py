@@ -115,10 +115,10 @@ class Task:
 
         Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against
         the ZMP plan; `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
-        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 3, 3, 0.1) x squared distance [rad^2] of thigh
+        `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 2.5, 3, 0.1) x squared distance [rad^2] of thigh
         (to the vertical), knee, ankle and toe from people's mean curves at the leg's phase.
         `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave people's range: vertical
-        beyond 1.2 (fourfold), both components beyond mean +- 0.75 SD at the leg's phase.
+        beyond 1.2 (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
         Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
         [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
 

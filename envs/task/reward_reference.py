@@ -15,16 +15,17 @@ from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
 
 MIN_HIP_HEIGHT = 0.65
 """A hip lower than this is a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
-COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.05, 0.02
+COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.03, 0.015
 """Error of the CoM, forward and up, at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 COP_TOLERANCE = 0.04
 """Distance of the CoP from the planned ZMP at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
-SPEED_TOLERANCE = 0.10
-"""Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen."""
-POSE_WEIGHTS = {HIP: 3.0, KNEE: 3.0, ANKLE: 3.0, TOE: 0.1}
+SPEED_TOLERANCE = 0.05
+"""Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen: at
+0.10 policies walk too slowly and push off with less than people's moment."""
+POSE_WEIGHTS = {HIP: 3.0, KNEE: 2.5, ANKLE: 3.0, TOE: 0.1}
 """Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve is of other
 people than those of thigh, knee and ankle."""
-FORCE_BAND = 0.75
+FORCE_BAND = 0.5
 """People's range of forces, to either side of their mean [SD]; chosen: at 1 the ankle pushes off with less than their
 moment."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
