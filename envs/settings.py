@@ -57,9 +57,9 @@ DEFAULT_WEIGHTS = {
     "speed": 0.70,
     "com_x": 0.20,
     "com_z": 0.10,
-    "zmp": 0.20,
-    "pose": 1.80,
-    "grf": 4.00,
+    "zmp": 0.35,
+    "pose": 2.00,
+    "grf": 5.00,
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
 }

@@ -9,7 +9,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.leg_constants import constants_from, leg_constants
 from springfoot.envs.control.leg_controller import KNOTS
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.human import human_gait
@@ -50,6 +50,18 @@ def test_one_step_brings_the_whole_target_of_a_joint_earlier(place, joint, curve
     earlier = human.mean(curve, KNOTS + tuning.LEAD_STEP) - human.mean(curve, KNOTS)
     assert added == pytest.approx(np.rad2deg(earlier), abs=0.2)  # to first order; the knee moves 1.5 deg
     assert replace(led, **{name: getattr(COMMITTED, name)}) == COMMITTED
+
+
+def test_the_planned_set_is_made_of_two_searches_as_its_note_says():
+    sets = tuning.read_constants(tuning.CONSTANTS)["front"]
+    two = [sets[name] for name in ("planned, targets later", "planned, less hip work")]
+    mean = {name: np.mean([each[name] for each in two], axis=0).tolist() for name in two[0]}
+    search = tuning.Search(constants_from(mean))
+    vector = np.zeros(search.size)
+    vector[-2] = 0.8
+    made = asdict(search.constants(vector))
+    for name, value in asdict(COMMITTED).items():
+        assert made[name] == pytest.approx(value, abs=2e-5), name
 
 
 def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_legs_that_fall():
