@@ -54,10 +54,10 @@ LONGEST_DELAY = 0.04
 
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
-    "speed": 0.70,
+    "speed": 0.40,
     "com_x": 0.20,
     "com_z": 0.10,
-    "zmp": 0.35,
+    "zmp": 0.50,
     "pose": 2.00,
     "grf": 5.00,
     "stiffness_rate": -0.10,
