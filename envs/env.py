@@ -99,12 +99,12 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
     | Term           | Weight | Meaning                                                                         |
     | -------------- | ------ | ------------------------------------------------------------------------------- |
     | alive          | 0.15   | neither fallen nor diverged                                                     |
-    | speed          | 0.5    | exp(-(e/0.1)^2), e forward speed of the CoM minus plan [m/s]                   |
-    | com_x          | 0.15   | exp(-(e/0.05)^2), e CoM minus plan, forward [m]                                 |
-    | com_z          | 0.1    | exp(-(e/0.02)^2), e CoM minus plan, up [m]                                      |
-    | zmp            | 0.15   | exp(-(e/0.04)^2), e CoP of both feet minus planned ZMP [m]; 0 in flight         |
+    | speed          | 0.4    | exp(-(e/0.05)^2), e forward speed of the CoM minus plan [m/s]                   |
+    | com_x          | 0.2    | exp(-(e/0.03)^2), e CoM minus plan, forward [m]                                 |
+    | com_z          | 0.1    | exp(-(e/0.015)^2), e CoM minus plan, up [m]                                     |
+    | zmp            | 0.5    | exp(-(e/0.04)^2), e CoP of both feet minus planned ZMP [m]; 0 in flight         |
     | pose           | 2      | exp(-E/0.02), E squared distance [rad^2] from people's joint angles             |
-    | grf            | 2      | exp(-D/0.4), D body weights by which the feet's forces leave people's range     |
+    | grf            | 5      | exp(-D/0.4), D body weights by which the feet's forces leave people's range     |
     | stiffness_rate | -0.1   | squared change of the action, per 20 ms                                         |
     | stiffness      | -0.02  | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
 

@@ -226,10 +226,10 @@ def test_what_cannot_be_gone_on_with_is_refused(run, tmp_path):
 def test_it_learns(tmp_path):
     """To walk better, by the default reward, than the untrained mean action does on the same fixed seeds."""
     config = TrainingConfig(
-        timesteps=65_536,
+        timesteps=131_072,
         update_steps=2048,
         learning_rate=1e-3,
-        eval_interval=65_536,
+        eval_interval=131_072,
         environment=BipedSettings(episode_seconds=4.0),
     )
     training.train(config, tmp_path / "run")
