@@ -31,7 +31,7 @@ MAX_PITCH = 0.8
 TOO_LOW, TOO_TILTED = "fell: hip too low", "fell: trunk too tilted"
 
 POSE_TOLERANCE = 0.02
-"""Pose error E at which its reward is 1/e [rad^2]; chosen: 3.0 deg at every joint."""
+"""Pose error E at which its reward is 1/e [rad^2]; chosen: 2.8 deg at every joint."""
 MAX_FORCE = 1.2
 """Vertical force of one foot beyond which it costs more [body weights]; chosen: people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
