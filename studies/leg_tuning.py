@@ -67,7 +67,7 @@ class Search:
     def __init__(self, start: LegConstants, speed: float = TUNED_SPEED):
         self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in asdict(start).items()}
         human = human_gait(speed)
-        self._leads = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
+        self._led = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
         self.size = sum(value.size for value in self._start.values()) + len(LED)
 
     def constants(self, vector: NDArray) -> LegConstants:
@@ -78,7 +78,7 @@ class Search:
             step = vector[place : place + start.size]
             place += start.size
             if name in LED:
-                value = start + KNOT_STEP * step + leads[name] * self._leads[name]
+                value = start + KNOT_STEP * step + leads[name] * self._led[name]
             elif name == "neutral_deg":
                 value = start + KNOT_STEP * step
             elif name in ADDITIVE_STEP:

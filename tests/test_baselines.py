@@ -97,6 +97,10 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
     ("swing", "falls"),
     [
         (((45.0, 0.0), (25.0, 10.0)), 0),  # (K, rest angle in degrees) of ankle and toe
+        pytest.param(
+            *(((20.0, 0.0), (25.0, 10.0)), 0),
+            marks=pytest.mark.xfail(strict=True, reason="3 of 4 fall since planned legs bend earlier"),
+        ),
         (((45.0, 0.0), (5.0, 10.0)), 0),
         (((20.0, 0.0), (5.0, 0.0)), 4),  # as printed
         (((200.0, 0.0), (50.0, 0.0)), 4),
