@@ -196,7 +196,8 @@ LOADS_LIKE_PEOPLE = (
 
 def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
     name = f"{joint} work {'+' if sign == 'positive' else '−'}"
-    return Criterion(name=name, path=("joint_work_J_kg", joint, sign), low=low, high=high, unit=" J/kg", loosen="share")
+    path = ("joint_work_J_kg", joint, sign)
+    return Criterion(name=name, path=path, low=low, high=high, unit=" J/kg", pattern=".3f", loosen="share")
 
 
 def _near_people(joint: str, sign: str, theirs: float) -> Criterion:
@@ -224,9 +225,9 @@ FOLLOWS_THE_PLAN = (
     _r("forward speed r", ("com", "vx_r"), 0.9),
     Criterion(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
     Criterion(
-        name="CoP off in single support", path=("zmp", "cop_rmse_single_support_m"), high=0.02, unit=" m", pattern=".3f"
+        name="CoP off in single support", path=("zmp", "cop_rmse_single_support_m"), high=0.02, unit=" m", pattern=".4f"
     ),
-    Criterion(name="CoP off", path=("zmp", "cop_rmse_m"), high=0.04, unit=" m", pattern=".3f"),
+    Criterion(name="CoP off", path=("zmp", "cop_rmse_m"), high=0.04, unit=" m", pattern=".4f"),
     _r("CoP r", ("zmp", "r"), 0.95),
     Criterion(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
     Criterion(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
