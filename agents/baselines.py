@@ -19,7 +19,7 @@ from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_pha
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, body_of
-from springfoot.envs.task.reward import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import PRINTED_SWING, THESIS_SWING, TOE_STIFFNESS, StiffnessSchedule, thesis_schedule

@@ -27,8 +27,8 @@ from .physics.measurement import Measurement
 from .physics.model import ACTIONS, JOINTS, SIDES
 from .physics.simulation import Simulation
 from .settings import BipedSettings
-from .step_result import StepResult, Tick, report
-from .task.episode_end import end_step
+from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
+from .step_result import INFO, StepResult, Tick
 from .task.ground import Ground
 from .task.initial_state import place, random_phase, start_table, walking_posture
 from .task.observation import SensorNoise
@@ -79,33 +79,35 @@ class Biped:
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
         incline = slope_table(slope or slope_constants())
-        self._legs = LegController(table, self.subjects, incline)
+        self._legs = LegController(table, self.subjects)
         curves = [foot_curves(settings, c, w) for c, w in table]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
-        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, incline)
-        self._decisions = DecisionTimes(settings, self.human, num_envs)
+        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects)
+        self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
 
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
-        self._ground = Ground(settings, self._simulation, self.subjects)
-        self._noise = SensorNoise(settings.sensor_noise, num_envs)
         self._task = Task(settings, table, self.subjects)
+        self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
+        self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
+        self._pushes = Pushes(settings, self.subjects, self._task.rows)
         self.observation_names = self._task.names
         self.observation_low, self.observation_high = self._task.low, self._task.high
 
         self._random: list[np.random.Generator | None] = [None] * num_envs
-        self._everyone = np.ones(num_envs, bool)
+        self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
         self._no_reason = np.full(num_envs, "", object)
         self._no_reason.flags.writeable = False
-        self._steps = np.zeros(num_envs, int)
-        self._last_action = np.zeros((num_envs, len(ACTIONS)))
-        self._window_forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
-        self._force = np.zeros(self._window_forces.shape[1:])
-        self._pushes = Pushes(settings, self.subjects)
-        self._now = self._simulation.measure()
+        self._steps = self._task.rows["steps"]
+        forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
+        self._rows = self.subjects.rows, self._task.rows, forces
+        curves = self._springs.rest, self._springs.schedule, self._legs.table, incline
+        self._tables = *(each.table for each in curves), self._task.table
+        self._physics = tuple(self._simulation.arrays)
+        self._simulation.measure()
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -119,7 +121,7 @@ class Biped:
     @property
     def measurement(self) -> Measurement:
         """The measurement at the end of the last control window, or right after a reset."""
-        return self._now
+        return Measurement.of(self._simulation.arrays.bodies["measured"].copy())
 
     @property
     def leg_phase(self) -> NDArray:
@@ -185,14 +187,12 @@ class Biped:
         self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
         self._noise.draw(ids, randoms)
         self._decisions.reset(ids)
-        self._steps[ids] = 0
-        self._last_action[ids] = 0.0
-        self._force[ids] = 0.0
+        self._steps[ids], self._task.rows["force"][ids] = 0, 0.0
         posture = walking_posture(self._start, self.subjects, ids, phase)
         if self._standing is not None:
             posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing") or posture
         place(self._simulation, self.subjects, ids, posture, noise)
-        self._now = self._simulation.measure()
+        self._simulation.measure()
 
     def _fit(self, ids: list[int]) -> None:
         """Give environments `ids` the bodies of their subjects, and every leg its commanded speed."""
@@ -204,7 +204,7 @@ class Biped:
 
     def observe(self) -> NDArray:
         """(N, D) float32 observation at this moment."""
-        return self._noise.on(self._task.observe(self._now, self._legs.phase, self._last_action, self._force))
+        return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
         """Apply actions (N, 4) for one step.
@@ -215,83 +215,81 @@ class Biped:
         running, ids = self._everyone, None
         if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
-        springs, phase = self._springs, self._legs.phase
-        action = self._decode(actions, running)
-        walking, scheduled = running, None
+        rows, physics, tables, springs = self._rows, self._physics, self._tables, self._springs
+        factor = springs.factor(self._decode(actions, running))
+        walking, fixed = running, self._nobody
         if self._standing is not None:
-            walking, scheduled = self._standing.switch(self._now, phase, self._steps * self.dt, running)
+            walking, fixed = self._standing.switch(self._simulation.arrays, self._steps * self.dt, running)
         if self.subjects.advance(self._steps, self._random, walking):
             self._legs.follow()
-        springs.set_stiffness(action, phase, self._now.angle, walking, scheduled)
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        rests = phase.copy() if self.settings.equilibrium == "phase" else phase  # a phase's rest angle goes with its K
-        for window in range(self.windows_per_step):
-            self._window(running, walking, ids, rests)
-            self._window_forces[window] = self._now.force
-        curves = self._task.at(phase)
-        terms = self._task.terms(
-            self._now, phase, action, self._last_action, springs.stiffness, self._window_forces, curves
-        )
-        reward = self._task.reward(terms)
-        terminated, truncated, termination = self._end(running, terms, reward)
-        self._last_action = action
+        begin_step(rows, physics, tables, springs.options, factor, walking, fixed)
+        for window in range(self.windows_per_step - 1):
+            tick = self._roll(running, walking, ids)
+            if tick is None:
+                next_window(rows, physics, tables, springs.options, window, walking)
+                self._after_window(tick)
+            else:  # whoever listens sees the control of the window that ended
+                end_window(rows, physics, window, walking)
+                self._after_window(tick)
+                begin_window(rows, physics, tables, springs.options, walking)
+        tick = self._roll(running, walking, ids)
+        outcome = self._outcome()
+        ended = end_step(rows, physics, tables, self._task.options, walking, running, outcome)
+        self._after_window(tick)
+        observation, reward, terminated, truncated, values = outcome
         if self.settings.sensor_noise:
             seen = np.flatnonzero(running)
             self._noise.draw(seen, [self._random[index] for index in seen])
         return StepResult(
-            observation=self._noise.on(self._task.observe(self._now, phase, action, self._force, curves)),
+            observation=self._noise.on(observation),
             reward=reward,
             terminated=terminated,
             truncated=truncated,
-            values=report(springs, self._now, terms, phase, self._steps, self.dt),
-            termination=termination,
+            values=values,
+            termination=self._task.reasons(self._simulation.now, terminated) if ended else self._no_reason,
         )
 
-    def _end(self, running: NDArray, terms: NDArray, reward: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Count the step and average its contact forces; an environment that is not `running` gets no reward.
-
-        Returns: (N,) the episodes that are terminated, those that are truncated, and why the former are terminated.
-        """
-        counts = self._window_forces, self._steps, self._force
-        terminated, truncated = end_step(self.settings.episode_seconds / self.dt, running, terms, *counts, reward)
-        reasons = self._task.reasons(self._now, terminated) if terminated.any() else self._no_reason
-        return terminated, truncated, reasons
+    def _outcome(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+        """Room for what a step returns."""
+        num = self.num_envs
+        return (
+            np.empty((num, len(self.observation_low)), np.float32),
+            np.empty(num),
+            np.empty(num, bool),
+            np.empty(num, bool),
+            np.empty((num, len(INFO))),
+        )
 
     def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
         """The actions that take effect, in [-1, 1]; an environment that is not `running` keeps its last one."""
         action = np.array(actions, float, order="C")
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
-        if not self._decisions.take(action, self._last_action, self._legs.phase, running):
+        taken = self._decisions.take(action, running)
+        if taken is None:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
-        return action
+        return taken
 
-    def _window(self, running: NDArray, walking: NDArray, ids: NDArray | None, rests: NDArray) -> None:
-        """Run one control window; foot springs of those `walking` (N,) rest where phases `rests` (N, side) say."""
-        legs, m, control = self._legs, self._now, self._simulation.control
-        phase = None if self.on_tick is None else legs.phase.copy()
-        self._springs.move_equilibrium(rests, m.angle, control, walking)
-        legs.drive(m, control)
+    def _roll(self, running: NDArray, walking: NDArray, ids: NDArray | None) -> dict[str, NDArray] | None:
+        """Run the physics of one control window; returns what a `Tick` tells of its beginning, if someone listens."""
         if self._standing is not None:
             standing = running & ~walking
-            self._standing.drive(m, standing, control)
-            self._springs.hold(control, m.angle, standing)
-        advance = self._simulation.advance_watched if self.on_tick else self._simulation.advance
-        self._now = advance(ids)
-        legs.advance(self._now, walking)
-        self._ground.advance(self._now, legs.phase, self._random)
-        if self.on_tick is not None and phase is not None:
-            self.on_tick(self._tick(phase, running))
+            self._standing.drive(self._simulation.arrays, standing)
+            self._springs.hold(self._simulation.arrays, standing)
+        if self.on_tick is None:
+            self._simulation.advance(ids)
+            return None
+        stiffness, drive = np.moveaxis(self._simulation.control, -1, 0)
+        begin = {"phase": self._legs.phase.copy(), "active": running.copy()}
+        begin |= {"stiffness": stiffness.copy(), "equilibrium": drive / stiffness}
+        self._simulation.advance_watched(ids)
+        return begin
 
-    def _tick(self, phase: NDArray, running: NDArray) -> Tick:
-        m, (stiffness, drive) = self._now, np.moveaxis(self._simulation.control, -1, 0)
-        return Tick(
-            measurement=m,
-            phase=phase,
-            stiffness=stiffness.copy(),
-            equilibrium=drive / stiffness,
-            work=self._simulation.work,
-            com_reference=self._task.planned_com(m, self._legs.phase),
-            active=running.copy(),
-        )
+    def _after_window(self, tick: dict[str, NDArray] | None) -> None:
+        """Lay the ground of the next footfalls, and tell of the window if someone listens."""
+        self._ground.advance(self._simulation.now, self._legs.phase, self._random)
+        if self.on_tick is not None and tick is not None:
+            com = self._task.planned_com(self._simulation.arrays.bodies)
+            self.on_tick(Tick(measurement=self.measurement, work=self._simulation.work, com_reference=com, **tick))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .control.foot_springs import FootSprings
 from .physics.energy import WindowWork
 from .physics.kernel import kernel
 from .physics.measurement import Measurement
@@ -43,6 +42,34 @@ Of each action: `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad]
 and `work/equilibrium/` [J] of the step. Of each reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1).
 `time` [s], `speed` [m/s].
 """
+
+
+@kernel
+def report(rows, controls, bodies, terms, options, values) -> None:
+    """Fill `StepResult.values` of one step.
+
+    Args:
+        rows: (N,) of `TASK_ROW`; `steps` count this one.
+        controls: (N,) of `CONTROL_ROW`.
+        bodies: (N,) of `BODY_ROW`, as measured at the step's end.
+        terms: (N, len(TERMS)) reward terms, unweighted [-].
+        options: (1,) of `TASK_OPTIONS`.
+        values: (N, len(INFO)).
+    """
+    reports = values.view(REPORT)
+    for i in range(len(rows)):
+        row, springs, m = reports[i, 0], controls[i].springs, bodies[i].measured
+        row.time, row.speed = options[0].seconds * rows[i].steps, m.com_velocity[0]
+        for term in range(terms.shape[1]):
+            row.reward[term] = terms[i, term]
+        for side in range(2):
+            row.phase[side] = controls[i].legs.phase[side]
+            for joint in range(2):
+                row.stiffness[side, joint] = springs.stiffness[side, joint]
+                row.torque[side, joint] = m.torque[side, ANKLE + joint]
+                row.equilibrium[side, joint] = springs.equilibrium[side, joint]
+                row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]
+                row.work_equilibrium[side, joint] = springs.work_equilibrium[side, joint]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -85,52 +112,3 @@ class Tick:
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray
     """(N,) True for the environments that ran in this window."""
-
-
-def report(
-    springs: FootSprings, m: Measurement, terms: NDArray, leg_phase: NDArray, steps: NDArray, seconds: float
-) -> NDArray:
-    """`StepResult.values` of one step.
-
-    Args:
-        springs: the foot springs after the step.
-        m: the measurement at the step's end.
-        terms: (N, len(TERMS)) reward terms, unweighted [-].
-        leg_phase: (N, side) stride phase of each leg [0, 1).
-        steps: (N,) steps since the episode began, this one included.
-        seconds: time of one step [s].
-    """
-    values = np.empty((len(terms), len(INFO)))
-    works = springs.work_stiffness, springs.work_equilibrium
-    state = springs.stiffness, m.torque, springs.equilibrium, *works, terms, leg_phase
-    _report(*state, steps, seconds, m.com_velocity, values.view(REPORT))
-    return values
-
-
-@kernel
-def _report(
-    stiffness,
-    torque,
-    equilibrium,
-    work_stiffness,
-    work_equilibrium,
-    terms,
-    leg_phase,
-    steps,
-    seconds,
-    com_velocity,
-    rows,
-):
-    for i in range(len(rows)):
-        row = rows[i, 0]
-        row.time, row.speed = seconds * steps[i], com_velocity[i, 0]
-        for term in range(terms.shape[1]):
-            row.reward[term] = terms[i, term]
-        for side in range(2):
-            row.phase[side] = leg_phase[i, side]
-            for joint in range(2):
-                row.stiffness[side, joint] = stiffness[i, side, joint]
-                row.torque[side, joint] = torque[i, side, ANKLE + joint]
-                row.equilibrium[side, joint] = equilibrium[i, side, joint]
-                row.work_stiffness[side, joint] = work_stiffness[i, side, joint]
-                row.work_equilibrium[side, joint] = work_equilibrium[i, side, joint]

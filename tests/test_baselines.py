@@ -8,7 +8,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.settings import BipedSettings, settings_from
-from springfoot.envs.task.observation import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.evaluation.recording import record
 from springfoot.gait import Body, SpringfootError
 from springfoot.gait.stiffness import TOE_STIFFNESS, thesis_schedule

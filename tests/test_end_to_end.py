@@ -14,7 +14,7 @@ from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs import Biped, BipedSettings, SegmentedFootBiped, SegmentedFootBipedVector
 from springfoot.envs.biped_batch import Tick
 from springfoot.envs.physics.model import ANKLE, LEFT
-from springfoot.envs.task.reward import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.recording import record
 from springfoot.evaluation.report import write_gait_cycle

@@ -17,7 +17,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import DEFAULT_WEIGHTS, THEME_OF, THEMES, BipedSettings, settings_from, settings_to_json
-from springfoot.envs.task.reward import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.gait.errors import SpringfootError
 
 ID = "springfoot.envs:SegmentedFootBiped-v0"

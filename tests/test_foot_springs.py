@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from springfoot.envs.control.foot_springs import FootSprings, action_of, stiffness_of, stiffness_ranges
+from springfoot.envs.control.foot_springs import FootSprings, action_of, move, stiffen, stiffness_of, stiffness_ranges
 from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.control.leg_controller import slope_table
 from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.control.subjects import Subjects
+from springfoot.envs.physics.measurement import BODY_ROW
+from springfoot.envs.physics.model import build_model
+from springfoot.envs.physics.simulation import plant_dtype
 from springfoot.envs.settings import ActionMode, BipedSettings
 from springfoot.gait.body import Body
 
@@ -32,39 +36,72 @@ def test_action_of_inverts_the_map_and_stops_at_the_ends():
     np.testing.assert_array_equal(action_of([[1e-9, 1e9]], settings, body), [[-1.0, 1.0]])
 
 
-def springs(mode: ActionMode = "absolute", num: int = 3) -> FootSprings:
+def springs(mode: ActionMode = "absolute", num: int = 3) -> "Springs":
     rest = np.stack([0.3 * np.sin(2 * np.pi * GRID), 0.1 * np.cos(2 * np.pi * GRID)], -1)[None]
     schedule = np.stack([200 + 100 * GRID, 30 + 0 * GRID], -1)[None]
     settings = BipedSettings(action_mode=mode)
-    return FootSprings(
-        settings, Body(), rest, schedule, Subjects(settings, np.array([1.2]), num), slope_table(slope_constants())
-    )
+    return Springs(settings, rest, schedule, Subjects(settings, np.array([1.2]), num))
+
+
+class Springs:
+    """Foot springs and what they act on."""
+
+    def __init__(self, settings: BipedSettings, rest: NDArray, schedule: NDArray, subjects: Subjects):
+        self.feet = FootSprings(settings, Body(), rest, schedule, subjects)
+        self.rows, self.everyone = subjects.rows, np.ones(len(subjects.rows), bool)
+        self.bodies, self.plant = (
+            np.zeros(len(self.rows), BODY_ROW),
+            np.zeros(len(self.rows), plant_dtype(build_model(Body()))),
+        )
+        self.angle, self.control = self.bodies["measured"]["angle"], self.plant["control"]
+        own = self.rows["springs"]
+        self.stiffness, self.equilibrium = own["stiffness"], own["equilibrium"]
+        self.work_stiffness, self.work_equilibrium = own["work_stiffness"], own["work_equilibrium"]
+
+    def set_stiffness(self, action: NDArray, leg_phase: NDArray) -> None:
+        self.rows["legs"]["phase"] = leg_phase
+        feet = self.feet
+        stiffen(
+            self.rows,
+            self.bodies,
+            feet.schedule.table,
+            feet.options,
+            feet.factor(action),
+            self.everyone,
+            ~self.everyone,
+        )
+
+    def move_equilibrium(self, leg_phase: NDArray) -> None:
+        self.rows["legs"]["phase"] = leg_phase
+        incline = slope_table(slope_constants()).table
+        move(self.rows, self.bodies, self.plant, self.feet.rest.table, incline, self.feet.options, self.everyone)
 
 
 def test_a_residual_action_multiplies_the_schedule():
     feet = springs("residual")
     action = np.random.default_rng(1).uniform(-1, 1, (3, 4))
     phase = np.array([[0.1, 0.6], [0.25, 0.75], [0.0, 0.5]])
-    feet.set_stiffness(action, phase, np.zeros((3, 2, 4)))
+    feet.set_stiffness(action, phase)
     expected = np.stack([200 + 100 * phase, np.full((3, 2), 30.0)], -1) * np.exp(action.reshape(3, 2, 2))
     np.testing.assert_allclose(feet.stiffness, expected, rtol=1e-9)
 
 
 def test_the_works_add_up_to_the_change_of_the_springs_energy():
     feet, random = springs(), np.random.default_rng(2)
-    angle, control = 0.1 * random.normal(size=(3, 2, 4)), np.zeros((3, 2, 4, 2))
+    angle, control = feet.angle, feet.control
+    angle[:] = 0.1 * random.normal(size=(3, 2, 4))
     phase = np.array([[0.1, 0.6], [0.2, 0.7], [0.3, 0.8]])
-    feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle)
-    feet.move_equilibrium(phase, angle, control)
+    feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase)
+    feet.move_equilibrium(phase)
     assert not feet.work_stiffness.any() and not feet.work_equilibrium.any()  # a new episode costs nothing
 
     def energy():
         return 0.5 * feet.stiffness * (feet.equilibrium - angle[..., 2:]) ** 2
 
     before = energy()
-    feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase, angle)
+    feet.set_stiffness(random.uniform(-1, 1, (3, 4)), phase)
     for later in (0.05, 0.1):
-        feet.move_equilibrium(phase + later, angle, control)
+        feet.move_equilibrium(phase + later)
     work = feet.work_stiffness + feet.work_equilibrium
     np.testing.assert_allclose(work, energy() - before, atol=1e-12)
     assert np.abs(work).max() > 1e-3

@@ -2,20 +2,23 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.control.subjects import Subjects
-from springfoot.envs.physics.measurement import Measurement
+from springfoot.envs.physics.measurement import BODY_ROW, Measurement
 from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.envs.task.reward import (
     EXCESS_SHARE,
     FORCE_TOLERANCE,
-    OBSERVATION,
     TERMS,
     TOO_LOW,
     TOO_TILTED,
     Task,
+    judge,
+    total,
 )
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.com_plan import over_peoples_zmp
@@ -36,9 +39,21 @@ class Setup:
 
     def task(self, num) -> Task:
         """For so many environments."""
-        return Task(
-            self.settings, list(rows(self.walks)), Subjects(self.settings, np.array([self.settings.speed]), num)
-        )
+        return self.at(np.zeros(num))[0]
+
+    def at(self, left_phase, measurement=None) -> tuple[Task, NDArray, NDArray]:
+        """Task, rows of the control, and rows of the bodies, at these phases and as measured."""
+        legs = leg_phases(np.atleast_1d(left_phase))
+        subjects = Subjects(self.settings, np.array([self.settings.speed]), len(legs))
+        subjects.rows["legs"]["phase"] = legs
+        bodies = np.zeros(len(legs), BODY_ROW)
+        for name, values in vars(measurement or self.measurement(legs[:, LEFT])).items():
+            bodies["measured"][name] = values
+        return Task(self.settings, list(rows(self.walks)), subjects), subjects.rows, bodies
+
+    def tracking(self, measurement, left_phase) -> NDArray:
+        task, _, bodies = self.at(left_phase, measurement)
+        return task.tracking(bodies)
 
     def measurement(self, left_phase, **other) -> Measurement:
         """The body on its plan with people's joint angles, trunk upright, the leading ankle at x = 10 m."""
@@ -79,8 +94,18 @@ class Setup:
             "stiffness": np.tile([300.0, 60.0], (n, 2, 1)) * self.body.mass_scale * self.body.length_scale,
             "force_windows": self.people_force(left_phase),
         }
-        terms = self.task(n).terms(measurement, leg_phases(np.atleast_1d(left_phase)), **(values | other))
+        values |= other
+        task, controls, bodies = self.at(left_phase, measurement)
+        controls["decision"]["action"], controls["decision"]["last_action"] = values["action"], values["last_action"]
+        controls["springs"]["stiffness"] = values["stiffness"]
+        terms = np.empty((n, len(TERMS)))
+        judge(task.rows, controls, bodies, task.table, task.options, values["force_windows"], terms)
         return dict(zip(TERMS, terms.T, strict=True))
+
+    def reward(self, terms) -> NDArray:
+        total_of = np.empty(len(terms["alive"]))
+        total(np.stack([*terms.values()], -1), self.task(len(total_of)).options, total_of)
+        return total_of
 
 
 def leg_phases(left):
@@ -110,7 +135,7 @@ def test_planned_speed_is_the_derivative_of_the_planned_com(thesis_body):
     ahead, behind = (thesis_body.plan.com(2 * (phase + sign * 1e-4))[0] for sign in (1, -1))
     speed = (ahead - behind) / (4e-4 * step)
     measured = thesis_body.measurement(phase, com_velocity=np.stack([speed, 0 * speed], -1))
-    np.testing.assert_allclose(thesis_body.task(len(phase)).tracking(measured, leg_phases(phase)), 0.0, atol=2e-4)
+    np.testing.assert_allclose(thesis_body.tracking(measured, phase), 0.0, atol=2e-4)
 
 
 @pytest.mark.parametrize("height", [1.7, 1.3])
@@ -141,7 +166,7 @@ def test_tracking_falls_to_one_over_e_at_its_tolerance(term, field, offset, heig
     setup = Setup(height=height, mass=45, speed=1.0)
     ratio = height / 1.7
     exact = setup.measurement(PHASES)
-    error = setup.task(len(PHASES)).tracking(exact, leg_phases(PHASES))
+    error = setup.tracking(exact, PHASES)
     exact = setup.measurement(
         PHASES,
         com=exact.com - error[:, :2],
@@ -240,7 +265,7 @@ def test_reward_is_the_weighted_sum_and_nothing_after_a_fall(thesis_body):
     assert set(terms) == set(weights)
     expected = np.sum([weights[name] * terms[name] for name in weights], axis=0)
     expected[0] = 0.0
-    np.testing.assert_allclose(setup.task(len(PHASES)).reward(np.stack([*terms.values()], -1)), expected, rtol=1e-12)
+    np.testing.assert_allclose(setup.reward(terms), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("height", [1.7, 1.2])
@@ -267,7 +292,10 @@ def observe(setup, measured, left_phase, **other):
         "last_action": np.zeros((n, 4)),
         "force": np.zeros((n, 2, 3, 2)),
     }
-    return setup.task(n).observe(measured, leg_phases(left_phase), **(values | other))
+    values |= other
+    task, controls, bodies = setup.at(left_phase, measured)
+    controls["decision"]["last_action"], task.rows["force"] = values["last_action"], values["force"]
+    return task.observe(bodies)
 
 
 def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
@@ -357,12 +385,11 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
     force = rng.uniform(-500, 1000, (2, n, 2, 3, 2))
 
     def results(rows):
-        task = setup.task(len(left[rows]))
         measured = Measurement(diverged=base.diverged[rows], **{name: value[rows] for name, value in numbers.items()})
-        legs = leg_phases(left[rows])
-        seen = task.observe(measured, legs, last[rows], force[0, rows])
-        terms = task.terms(measured, legs, action[rows], last[rows], stiffness[rows], force[:, rows])
-        return np.column_stack([seen, task.reward(terms), terms])
+        seen = observe(setup, measured, left[rows], last_action=last[rows], force=force[0, rows])
+        own = {"action": action[rows], "last_action": last[rows], "stiffness": stiffness[rows]}
+        terms = setup.terms(measured, left[rows], **own, force_windows=force[:, rows])
+        return np.column_stack([seen, setup.reward(terms), *terms.values()])
 
     together = results(slice(None))
     alone = np.concatenate([results(slice(i, i + 1)) for i in range(n)])

@@ -9,16 +9,17 @@ import pytest
 from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import foot_curves
-from springfoot.envs.control.foot_springs import FootSprings, action_of
+from springfoot.envs.control.foot_springs import FootSprings, action_of, move
 from springfoot.envs.control.leg_constants import slope_constants
-from springfoot.envs.control.leg_controller import LegController, slope_table
+from springfoot.envs.control.leg_controller import LegController, drive, slope_table
 from springfoot.envs.control.reference_walk import rows as rows_of
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
+from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.step_result import INFO, Tick
-from springfoot.envs.task.observation import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.envs.task.reward import Task
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body import Body
@@ -265,22 +266,24 @@ def test_nothing_jumps_as_the_speed_changes():
     settings = BipedSettings(**ANYBODY)
     biped = Biped(settings, 1)
     biped.reset(np.arange(1), [0], start=0.3)
-    m, phase, control = biped.measurement, biped.leg_phase, np.zeros((1, 2, 4, 2))
-    table, incline = list(rows_of(biped.walks)), slope_table(slope_constants())
-    subjects = Subjects(settings, tabulated_speeds(settings), 1)
-    legs, task = LegController(table, subjects, incline), Task(settings, table, subjects)
-    legs.reset(np.arange(1), phase[:, 0])
+    table, incline = list(rows_of(biped.walks)), slope_table(slope_constants()).table
+    subjects, simulation = Subjects(settings, tabulated_speeds(settings), 1), Simulation(biped.body, 1)
+    legs, task = LegController(table, subjects), Task(settings, table, subjects)
+    legs.reset(np.arange(1), biped.leg_phase[:, 0])
     rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
-    springs = FootSprings(settings, biped.body, rest, stiffness, subjects, incline)
+    springs = FootSprings(settings, biped.body, rest, stiffness, subjects)
+    bodies, plant = simulation.arrays.bodies, simulation.arrays.plant
+    for name, values in vars(biped.measurement).items():
+        bodies["measured"][name] = values
     rows = []
     for speed in np.linspace(0.8, 1.6, 801):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         legs.follow()
-        springs.move_equilibrium(phase, m.angle, control)
-        legs.drive(m, control)
-        equilibrium = 100 * springs.equilibrium
-        plan = 100 * task.tracking(m, phase)
-        rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
+        move(subjects.rows, bodies, plant, springs.rest.table, incline, springs.options, np.ones(1, bool))
+        drive(subjects.rows, bodies, plant, legs.table.table, incline)
+        equilibrium = 100 * subjects.rows["springs"]["equilibrium"]
+        plan = 100 * task.tracking(bodies)
+        rows.append(np.concatenate([np.moveaxis(plant["control"], -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
     change = np.abs(np.diff(rows, axis=0)).max()  # N m, N m/rad, 0.01 rad, cm or cm/s for 1 mm/s
     assert change < 1.0 and change < 0.6 * np.abs(np.diff(rows[::2], axis=0)).max()  # half as far, half the change
     assert (np.ptp(rows, axis=0) > 0.5).sum() >= 8

@@ -9,7 +9,7 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from springfoot.envs.env import METADATA, SegmentedFootBiped
-from springfoot.envs.task.reward import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
 

@@ -20,49 +20,68 @@ def gait_events(human: HumanGait) -> NDArray:
     return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], human.toe_off])
 
 
+@kernel
+def _take(actions, running, decided, events, rows):
+    """Decide what takes effect.
+
+    Args:
+        actions: (N, 4) as given.
+        running: (N,) bool.
+        decided: (2,) bool, whether actions decide the stiffness of the ankle, of the toe.
+        events: (E,) stride phases at which a leg decides; none for every step.
+        rows: (N,) of `CONTROL_ROW`; `decision` is changed.
+
+    Returns False for a number that is not finite.
+    """
+    for i in range(len(actions)):
+        for k in range(4):
+            if running[i] and not isfinite(actions[i, k]):
+                return False
+    for i in range(len(actions)):
+        own, phase = rows[i].decision, rows[i].legs.phase
+        for side in range(2):
+            now = 0
+            for event in events:
+                now += phase[side] >= event
+            held = not running[i] or (len(events) > 0 and now == own.stage[side])
+            if running[i]:
+                own.stage[side] = now
+            for joint in range(2):
+                k = 2 * side + joint
+                if held:
+                    own.action[k] = own.last_action[k]
+                elif not decided[joint]:
+                    own.action[k] = 0.0
+                else:
+                    own.action[k] = min(max(actions[i, k], -1.0), 1.0)
+    return True
+
+
 class DecisionTimes:
     """Decides which actions of N bodies take effect in a step.
 
     With `decisions="event"` events are read from the leg's phase. A touchdown sets the phase to 0, so the heel strike
     is that of the foot itself, and a foot that bounces does not decide again. Other events lie at people's phases.
+
+    Args:
+        settings: when stiffness is decided, and of which joints.
+        human: whose events count.
+        rows: (N,) of `CONTROL_ROW`.
     """
 
-    def __init__(self, settings: BipedSettings, human: HumanGait, num: int):
+    def __init__(self, settings: BipedSettings, human: HumanGait, rows: NDArray):
         self._events = gait_events(human) if settings.decisions == "event" else np.empty(0)
         self._decided = np.array([settings.stiffness_joints in ("both", joint) for joint in ("ankle", "toe")])
-        self._stage = np.full((num, 2), -1)  # number of events since heel strike when each leg decided last
+        self._rows = rows
+        self._own = rows["decision"]
+        self.action = self._own["action"]
+        """(N, 4) the actions that take effect, in [-1, 1]."""
 
     def reset(self, ids: NDArray) -> None:
         """Let the next actions of bodies `ids` (K,) take effect whatever the phase."""
-        self._stage[ids] = -1
+        self._own["stage"][ids], self._own["last_action"][ids] = -1, 0.0
 
-    def take(self, action: NDArray, last_action: NDArray, leg_phase: NDArray, running: NDArray) -> bool:
-        """Clip `action` (N, 4) to [-1, 1] in place; legs at no event and bodies not running keep `last_action`.
-
-        Returns False for a number that is not finite; `action` is then undefined.
-        """
-        sides = (len(action), 2, 2)
-        actions = last_action.reshape(sides), action.reshape(sides)
-        return _take(running, self._decided, self._events, leg_phase, self._stage, *actions)
-
-
-@kernel
-def _take(running, decided, events, phase, stage, last_action, action):
-    for i in range(len(action)):
-        for side in range(2):
-            now = 0
-            for event in events:
-                now += phase[i, side] >= event
-            held = not running[i] or (len(events) > 0 and now == stage[i, side])
-            if running[i]:
-                stage[i, side] = now
-            for joint in range(2):
-                if running[i] and not isfinite(action[i, side, joint]):
-                    return False
-                if held:
-                    action[i, side, joint] = last_action[i, side, joint]
-                elif not decided[joint]:
-                    action[i, side, joint] = 0.0
-                else:
-                    action[i, side, joint] = min(max(action[i, side, joint], -1.0), 1.0)
-    return True
+    def take(self, actions: NDArray, running: NDArray) -> NDArray | None:
+        """The actions that take effect, (N, 4): those given, clipped to [-1, 1]; legs at no event and bodies not
+        `running` (N,) keep their last ones. None, leaving all state unchanged, for a number that is not finite."""
+        return self.action if _take(actions, running, self._decided, self._events, self._rows) else None

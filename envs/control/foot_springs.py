@@ -1,6 +1,6 @@
 """From actions to stiffness to control of the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
 
-Arrays are (N, side, 2), the last axis being ankle and toe; flattened, they are in the order of `ACTIONS`.
+What each ankle and toe has is (side, 2), the last axis being ankle and toe; flattened, it is in the order of `ACTIONS`.
 """
 
 import numpy as np
@@ -10,9 +10,11 @@ from springfoot.gait.body import Body
 
 from ..physics.kernel import kernel
 from ..physics.model import ANKLE
-from ..settings import LONGEST_DELAY, BipedSettings
+from ..physics.simulation import Physics
+from ..settings import BipedSettings
 from ..timing import CONTROL_WINDOW
-from .phase_table import PhaseTable
+from .phase_table import PhaseTable, read
+from .rows import PLACE
 from .subjects import Subjects
 
 FEET = slice(ANKLE, None)
@@ -52,8 +54,136 @@ def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
     return int(random.integers(shortest, longest + 1))
 
 
+SPRING_OPTIONS = np.dtype(
+    [
+        ("middle", float, 2),  # stiffness of ankle and toe at action 0 [N m/rad] where no schedule sets it
+        ("scheduled", np.int64, 2),  # 1 where the schedule sets that of ankle, of toe
+        ("follows", np.int64),  # 1 if the rest angles move with the slope: a constant equilibrium does not
+        ("held", np.int64),  # 1 if the rest angles are those of the phases at which K was set
+    ]
+)
+"""How settings and body of the tables make springs."""
+
+
+@kernel
+def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
+    """Request new stiffness, to act after the delay.
+
+    Changing K to K' under a deflection x puts 1/2 (K' - K) x^2 into the spring.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`; `springs` is changed.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        schedule: (R, SAMPLES, 2, 2) fixed stiffness of ankle and toe [N m/rad], of a `PhaseTable`.
+        options: (1,) of `SPRING_OPTIONS`.
+        factor: (N, 4) what the actions make of the stiffness [-].
+        walking: (N,) bool; the springs of the others do not change.
+        fixed: (N,) bool, the bodies that take the schedule in place of the action's stiffness.
+    """
+    scheduled, option = np.empty(2), options[0]
+    for i in range(len(rows)):
+        own, subject, angle = rows[i].springs, rows[i].subject, bodies[i].measured.angle
+        for side in range(2):
+            read(schedule, subject.place, rows[i].legs.phase[side], scheduled)
+            own.rest_phase[side] = rows[i].legs.phase[side]
+            for joint in range(2):
+                own.work_stiffness[side, joint] = own.work_equilibrium[side, joint] = 0.0
+                if not walking[i]:
+                    continue
+                middle = scheduled[joint] if fixed[i] or option.scheduled[joint] else option.middle[joint]
+                share = 1.0 if fixed[i] else factor[i, 2 * side + joint]
+                before, after = own.stiffness[side, joint], middle * subject.scale.torque * share
+                deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
+                own.requests[0, side, joint] = after
+                if own.fresh:
+                    own.requests[:, side, joint] = after
+                if own.fresh or own.delay == 0:
+                    own.stiffness[side, joint] = after
+                if not own.fresh and own.delay == 0:
+                    own.work_stiffness[side, joint] = 0.5 * (after - before) * deflection**2
+
+
+@kernel
+def _arrive(own, angle):
+    """Let the request of `delay` windows ago act, and shift the past requests by one window."""
+    for side in range(2):
+        for joint in range(2):
+            before, after = own.stiffness[side, joint], own.requests[own.delay, side, joint]
+            deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
+            own.stiffness[side, joint] = after
+            own.work_stiffness[side, joint] += 0.5 * (after - before) * deflection**2
+            for past in range(len(own.requests) - 1, 0, -1):
+                own.requests[past, side, joint] = own.requests[past - 1, side, joint]
+
+
+@kernel
+def move(rows, bodies, plant, rest, incline, options, walking) -> None:
+    """Begin a control window: K and K theta_eq of ankles and toes go into the control.
+
+    K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases. Moving the rest angle, so that
+    the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`; `springs` is changed.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        plant: (N,) of MuJoCo's state, whose `control` is filled.
+        rest: (R, SAMPLES, 2, 2) rest angles of ankle and toe [rad], of a `PhaseTable`.
+        incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.leg_controller.slope_table`).
+        options: (1,) of `SPRING_OPTIONS`.
+        walking: (N,) bool; the springs of the others do not change.
+    """
+    wanted, inclined, option = np.empty(2), np.empty(4), options[0]
+    level = np.zeros(1, PLACE)[0]
+    for i in range(len(rows)):
+        own, subject, angle = rows[i].springs, rows[i].subject, bodies[i].measured.angle
+        control = plant[i].control
+        if walking[i] and own.delay > 0:
+            _arrive(own, angle)
+        for side in range(2):
+            if not option.held:
+                own.rest_phase[side] = rows[i].legs.phase[side]
+            read(rest, subject.place, own.rest_phase[side], wanted)
+            if option.follows and subject.slope != 0.0:
+                read(incline, level, own.rest_phase[side], inclined)
+                wanted[0] += subject.slope * inclined[ANKLE]
+            for joint in range(2):
+                k, theta = own.stiffness[side, joint], angle[side, ANKLE + joint]
+                if walking[i]:
+                    before, after = own.equilibrium[side, joint] - theta, wanted[joint] - theta
+                    own.equilibrium[side, joint] = wanted[joint]
+                    if not own.fresh:
+                        own.work_equilibrium[side, joint] += 0.5 * k * (after * after - before * before)
+                control[side, ANKLE + joint, 0] = k
+                control[side, ANKLE + joint, 1] = k * own.equilibrium[side, joint]
+        if walking[i]:
+            own.fresh = 0
+
+
+@kernel
+def _hold(rows, bodies, plant, held):
+    """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control of `plant` (N,).
+
+    They act without delay, and the work of both changes is counted as that of `stiffen` and `move`.
+    """
+    for i in range(len(rows)):
+        if not held[i]:
+            continue
+        own, angle = rows[i].springs, bodies[i].measured.angle
+        for side in range(2):
+            for joint in range(2):
+                k, drive = plant[i].control[side, ANKLE + joint, 0], plant[i].control[side, ANKLE + joint, 1]
+                theta, before = angle[side, ANKLE + joint], own.stiffness[side, joint]
+                old, new = own.equilibrium[side, joint] - theta, drive / k - theta
+                own.stiffness[side, joint], own.equilibrium[side, joint] = k, drive / k
+                own.requests[:, side, joint] = k
+                if not own.fresh:
+                    own.work_stiffness[side, joint] += 0.5 * (k - before) * old * old
+                    own.work_equilibrium[side, joint] += 0.5 * k * (new * new - old * old)
+        own.fresh = 0
+
+
 class FootSprings:
-    """The state of the ankle and toe springs of N bodies, and the work that is done by changing them.
+    """The ankle and toe springs of N bodies, and the work that is done by changing them.
 
     Args:
         settings: ranges of stiffness and action mode.
@@ -61,40 +191,21 @@ class FootSprings:
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
         subjects: bodies and requested speeds.
-        incline: what a slope adds to the equilibrium (`envs.control.leg_controller.slope_table`).
     """
 
     def __init__(
-        self,
-        settings: BipedSettings,
-        body: Body,
-        equilibrium: NDArray,
-        schedule: NDArray,
-        subjects: Subjects,
-        incline: PhaseTable,
+        self, settings: BipedSettings, body: Body, equilibrium: NDArray, schedule: NDArray, subjects: Subjects
     ):
-        num = len(subjects.place)
-        self._follows = settings.equilibrium in ("planned", "angle")  # a constant equilibrium stays constant on a slope
         self._residual = settings.action_mode == "residual"
-        self._fixed = [joint for joint, name in enumerate(("toe", "ankle")) if settings.stiffness_joints == name]
-        middle, self._factor = _log_scale(settings, body)
-        self._middle = np.tile(middle, (num, 2, 1))
-        self._subjects, self._incline = subjects, incline
-        self._equilibrium, self._schedule = PhaseTable(equilibrium), PhaseTable(schedule)
-        self.stiffness = np.zeros((num, 2, 2))
-        """(N, side, 2) K [N m/rad]; changed in place."""
-        self.equilibrium = np.zeros((num, 2, 2))
-        """(N, side, 2) rest angle [rad]; changed in place."""
-        self.work_stiffness = np.zeros((num, 2, 2))
-        """(N, side, 2) work done by the last change of stiffness [J]; changed in place."""
-        self.work_equilibrium = np.zeros((num, 2, 2))
-        """(N, side, 2) work done by moving the rest angle since that change [J]; changed in place."""
-        self._fresh = np.ones(num, bool)
-        self._everyone = np.ones(num, bool)
-        self._delay = np.zeros(num, int)
-        self._requests = np.zeros(
-            (num, 1 + round(LONGEST_DELAY / CONTROL_WINDOW), 2, 2)
-        )  # in the last windows, newest first
+        middle, factor = _log_scale(settings, body)
+        self._factor = np.tile(factor, 2)
+        fixed = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
+        follows, held = settings.equilibrium in ("planned", "angle"), settings.equilibrium == "phase"
+        self.options = np.array([(middle, fixed, follows, held)], SPRING_OPTIONS)
+        """(1,) of `SPRING_OPTIONS`."""
+        self.rest, self.schedule = PhaseTable(equilibrium), PhaseTable(schedule)
+        self._subjects, self._own = subjects, subjects.rows["springs"]
+        self._own["fresh"] = 1
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
         """Begin an episode of springs `ids` (K,).
@@ -102,146 +213,19 @@ class FootSprings:
         Their next change does no work and acts at once, as if it had been requested long before. Later changes act
         `delay` (K,) control windows after their request.
         """
-        self._fresh[ids] = True
-        self._delay[ids] = delay
+        self._own["fresh"][ids], self._own["delay"][ids] = 1, delay
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
-        return self._schedule.at(leg_phase, self._subjects.place) * self._subjects.scale["torque"][:, None, None]
+        return self.schedule.at(leg_phase, self._subjects.place) * self._subjects.scale["torque"][:, None, None]
 
-    def set_stiffness(
-        self,
-        action: NDArray,
-        leg_phase: NDArray,
-        angle: NDArray,
-        running: NDArray | None = None,
-        scheduled: NDArray | None = None,
-    ) -> None:
-        """Request new stiffness by an action (N, 4), to act after the delay.
+    def factor(self, action: NDArray) -> NDArray:
+        """What actions (N, 4) make of the stiffness: factors (N, 4) on that at action 0, or on the schedule.
 
-        Changing K to K' under a deflection x puts 1/2 (K' - K) x^2 into the spring; x is that of the joint angles
-        `angle` (N, side, joint) [rad]. Springs of bodies not `running` (N,) do not change (None: all are running);
-        those of bodies `scheduled` (N,) take the fixed stiffness in place of the action's.
+        By NumPy, not in a kernel: its powers have other last bits than those of numba.
         """
-        action = action.reshape(self.stiffness.shape)
-        if self._residual:
-            middle, factor = self._schedule.at(leg_phase, self._subjects.place), np.exp(action)
-        else:
-            middle, factor = self._middle, self._factor**action
-            if self._fixed:
-                middle = middle.copy()
-                middle[..., self._fixed] = self._schedule.at(leg_phase, self._subjects.place)[..., self._fixed]
-        if scheduled is not None:
-            fixed = scheduled[:, None, None]
-            middle = np.where(fixed, self._schedule.at(leg_phase, self._subjects.place), middle)
-            factor = np.where(fixed, 1.0, factor)
-        running = self._everyone if running is None else running
-        state = self._fresh, running, self._delay, self._requests, self.stiffness
-        works = self.work_stiffness, self.work_equilibrium
-        _stiffen(middle, factor, self._subjects.scale, angle, self.equilibrium, *state, *works)
+        return np.exp(action) if self._residual else self._factor**action
 
-    def move_equilibrium(
-        self, leg_phase: NDArray, angle: NDArray, control: NDArray, running: NDArray | None = None
-    ) -> None:
-        """Begin a control window: put K and K theta_eq into `control` (N, side, joint, 2).
-
-        K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases `leg_phase` (N, side).
-        Moving the rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring.
-        """
-        equilibrium = self._equilibrium.at(leg_phase, self._subjects.place)
-        if self._follows and self._subjects.slope.any():
-            equilibrium[..., 0] += self._subjects.slope[:, None] * self._incline.at(leg_phase)[..., ANKLE]
-        running = self._everyone if running is None else running
-        state = self._fresh, running, self._delay, self._requests, self.stiffness, self.equilibrium
-        _move(equilibrium, angle, *state, self.work_stiffness, self.work_equilibrium, control)
-
-    def hold(self, control: NDArray, angle: NDArray, held: NDArray) -> None:
-        """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in `control` (N, side, joint, 2).
-
-        They act without delay, and the work of both changes is counted as above.
-        """
-        works = self.work_stiffness, self.work_equilibrium
-        _hold(control, angle, held, self._fresh, self._requests, self.stiffness, self.equilibrium, *works)
-
-
-@kernel
-def _stiffen(
-    middle,
-    factor,
-    scale,
-    angle,
-    equilibrium,
-    fresh,
-    running,
-    delay,
-    requests,
-    stiffness,
-    work_stiffness,
-    work_equilibrium,
-):
-    for i in range(len(stiffness)):
-        for side in range(2):
-            for joint in range(2):
-                work_stiffness[i, side, joint] = work_equilibrium[i, side, joint] = 0.0
-                if running[i]:
-                    before = stiffness[i, side, joint]
-                    after = middle[i, side, joint] * scale[i].torque * factor[i, side, joint]
-                    deflection = equilibrium[i, side, joint] - angle[i, side, ANKLE + joint]
-                    requests[i, 0, side, joint] = after
-                    if fresh[i]:
-                        requests[i, :, side, joint] = after
-                    if fresh[i] or delay[i] == 0:
-                        stiffness[i, side, joint] = after
-                    if not fresh[i] and delay[i] == 0:
-                        work_stiffness[i, side, joint] = 0.5 * (after - before) * deflection**2
-
-
-@kernel
-def _move(
-    wanted, angle, fresh, running, delay, requests, stiffness, equilibrium, work_stiffness, work_equilibrium, control
-):
-    for i in range(len(equilibrium)):
-        if running[i] and delay[i] > 0:
-            _arrive(delay[i], angle[i], equilibrium[i], requests[i], stiffness[i], work_stiffness[i])
-        for side in range(2):
-            for joint in range(2):
-                k, theta = stiffness[i, side, joint], angle[i, side, ANKLE + joint]
-                if running[i]:
-                    before, after = equilibrium[i, side, joint] - theta, wanted[i, side, joint] - theta
-                    equilibrium[i, side, joint] = wanted[i, side, joint]
-                    if not fresh[i]:
-                        work_equilibrium[i, side, joint] += 0.5 * k * (after * after - before * before)
-                control[i, side, ANKLE + joint, 0] = k
-                control[i, side, ANKLE + joint, 1] = k * equilibrium[i, side, joint]
-        fresh[i] = fresh[i] and not running[i]
-
-
-@kernel
-def _arrive(delay, angle, equilibrium, requests, stiffness, work):
-    """Let the request of `delay` windows ago act, and shift the past requests by one window."""
-    for side in range(2):
-        for joint in range(2):
-            before, after = stiffness[side, joint], requests[delay, side, joint]
-            deflection = equilibrium[side, joint] - angle[side, ANKLE + joint]
-            stiffness[side, joint] = after
-            work[side, joint] += 0.5 * (after - before) * deflection**2
-            for past in range(len(requests) - 1, 0, -1):
-                requests[past, side, joint] = requests[past - 1, side, joint]
-
-
-@kernel
-def _hold(control, angle, held, fresh, requests, stiffness, equilibrium, work_stiffness, work_equilibrium):
-    for i in range(len(held)):
-        if not held[i]:
-            continue
-        for side in range(2):
-            for joint in range(2):
-                k, drive = control[i, side, ANKLE + joint]
-                theta, before = angle[i, side, ANKLE + joint], stiffness[i, side, joint]
-                old, new = equilibrium[i, side, joint] - theta, drive / k - theta
-                stiffness[i, side, joint], equilibrium[i, side, joint] = k, drive / k
-                requests[i, :, side, joint] = k
-                if not fresh[i]:
-                    work_stiffness[i, side, joint] += 0.5 * (k - before) * old * old
-                    work_equilibrium[i, side, joint] += 0.5 * k * (new * new - old * old)
-        fresh[i] = False
+    def hold(self, physics: Physics, held: NDArray) -> None:
+        """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control."""
+        _hold(self._subjects.rows, physics.bodies, physics.plant, held)

@@ -17,12 +17,12 @@ from scipy.interpolate import CubicSpline
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
 from ..physics.kernel import kernel
-from ..physics.measurement import Measurement
 from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..timing import CONTROL_WINDOW
 from .leg_constants import LegConstants, SlopeConstants
-from .phase_table import GRID, PhaseTable, leg_phases
+from .phase_table import GRID, PhaseTable, leg_phases, read
 from .reference_walk import ReferenceWalk
+from .rows import GAINS, PLACE
 from .subjects import Subjects
 
 KNOTS = np.arange(10) / 10
@@ -54,64 +54,124 @@ def slope_table(constants: SlopeConstants) -> PhaseTable:
     return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
 
 
+@kernel
+def _between(low, high, weight):
+    return low + weight * (high - low)
+
+
+@kernel
+def _follow(constants, rows):
+    """Scale the constants of the tables' rows, (R,) of `GAINS`, to the bodies of `rows`, (N,) of `CONTROL_ROW`."""
+    for i in range(len(rows)):
+        subject, gain = rows[i].subject, rows[i].legs.gains
+        row, weight, scale = subject.place.row, subject.place.weight, subject.scale
+        low, high = constants[row], constants[row + 1 if weight > 0.0 else row]
+        gain.touchdown = scale.mass * _between(low.touchdown, high.touchdown, weight)
+        gain.rate = _between(low.rate, high.rate, weight) / scale.time
+        gain.rate_gain = _between(low.rate_gain, high.rate_gain, weight) / scale.time
+        gain.pitch = _between(low.pitch, high.pitch, weight)
+        gain.trunk_stiffness = scale.torque * _between(low.trunk_stiffness, high.trunk_stiffness, weight)
+        gain.trunk_damping = scale.torque * scale.time * _between(low.trunk_damping, high.trunk_damping, weight)
+        gain.speed_torque = scale.torque / scale.time * _between(low.speed_torque, high.speed_torque, weight)
+        gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / scale.time
+
+
+@kernel
+def _too_fast(m, row):
+    """Error of the CoM's forward speed against the plan [m/s], as the gains see it."""
+    return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
+
+
+@kernel
+def drive(rows, bodies, plant, table, incline) -> None:
+    """Begin a control window: stiffness [N m/rad] and drive torque [N m] of hips and knees go into the control.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        plant: (N,) of MuJoCo's state, whose `control` is filled.
+        table: (R, SAMPLES, 2, 6) of `leg_curves`, of a `PhaseTable`.
+        incline: (1, SAMPLES, 2, 4) of `slope_table`.
+    """
+    curves, inclined, level = np.empty((2, table.shape[-1])), np.empty(4), np.zeros(1, PLACE)[0]
+    for i in range(len(rows)):
+        subject, legs, m, control = rows[i].subject, rows[i].legs, bodies[i].measured, plant[i].control
+        gain, torque = legs.gains, subject.scale.torque
+        for side in range(2):
+            read(table, subject.place, legs.phase[side], curves[side])
+        legs.planned_speed = curves[LEFT, PLANNED_SPEED]
+        too_fast = _too_fast(m, rows[i])
+        trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
+        on_trunk = trunk + gain.speed_torque * too_fast
+        aim = gain.swing_gain * too_fast
+        for side in range(2):
+            stance, hip, knee = curves[side, 0], torque * curves[side, 1], torque * curves[side, 2]
+            own = stance * on_trunk + (1.0 - stance) * hip * aim
+            control[side, HIP, 0], control[side, HIP, 1] = hip, torque * curves[side, 3] + own
+            control[side, KNEE, 0], control[side, KNEE, 1] = knee, torque * curves[side, 4]
+            if subject.slope != 0.0:  # moves the targets of hips, knees and trunk
+                read(incline, level, legs.phase[side], inclined)
+                lean = stance * gain.trunk_stiffness * inclined[3]
+                control[side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
+                control[side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
+
+
+@kernel
+def _load(force):
+    return force[0, 1] + force[1, 1] + force[2, 1]
+
+
+@kernel
+def advance(rows, bodies, walking) -> None:
+    """Let one window pass.
+
+    The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`; the phase of the legs is changed.
+        bodies: (N,) of `BODY_ROW`, as measured at the window's end.
+        walking: (N,) bool; the phase of the others waits.
+    """
+    for i in range(len(rows)):
+        if not walking[i]:
+            continue
+        legs, m = rows[i].legs, bodies[i].measured
+        gain, left = legs.gains, legs.phase[LEFT]
+        rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(m, rows[i]))
+        waiting = (0.5 if left < 0.5 else 1.0) - HOLD
+        left = min(left + max(rate, 0.0), max(waiting, left))
+        right = (left + 0.5) % 1.0
+        if left > TOUCHDOWN_PHASE and _load(m.force[LEFT]) > gain.touchdown:
+            left = 0.0
+        elif right > TOUCHDOWN_PHASE and _load(m.force[RIGHT]) > gain.touchdown:
+            left = 0.5
+        legs.phase[LEFT], legs.phase[RIGHT] = left, (left + 0.5) % 1.0
+
+
 class LegController:
     """Phase and hip-knee controller of N bodies.
 
     Args:
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
-        incline: what a slope adds (`slope_table`).
     """
 
-    def __init__(self, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects, incline: PhaseTable):
-        self._subjects, self._incline = subjects, incline
-        self._rows = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
-        self._table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
-        self._gains = np.zeros(len(subjects.place), GAINS)
-        self.phase = leg_phases(np.zeros(len(subjects.place)))
+    def __init__(self, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects):
+        self._subjects = subjects
+        self._constants = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
+        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
+        self.phase = subjects.rows["legs"]["phase"]
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
-        self._curves = self._table.at(self.phase, subjects.place)  # of the window that runs
+        self.phase[:] = leg_phases(np.zeros(len(self.phase)))
         self.follow()
 
     def follow(self) -> None:
         """Take over the present bodies and commanded speeds of the subjects."""
-        _follow(self._rows, self._subjects.place, self._subjects.scale, self._gains)
+        _follow(self._constants, self._subjects.rows)
 
     def reset(self, ids: NDArray, left_phase: NDArray) -> None:
         """Put the left legs of bodies `ids` (K,) at the stride phases `left_phase` (K,)."""
         self.phase[ids] = leg_phases(left_phase)
-
-    def advance(self, m: Measurement, running: NDArray) -> None:
-        """Let one window pass for the bodies `running` (N,).
-
-        The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
-        """
-        _advance(self._gains, self._subjects.speed, self._curves, m.com_velocity, m.force, running, self.phase)
-
-    def drive(self, m: Measurement, control: NDArray) -> None:
-        """Put stiffness [N m/rad] and drive torque K theta_eq + feed-forward [N m] of hips and knees into `control`,
-        which is (N, side, joint, 2)."""
-        subjects = self._subjects
-        self._curves = curves = self._table.at(self.phase, subjects.place)
-        state = m.base, m.base_velocity, m.com_velocity
-        _drive(self._gains, subjects.speed, subjects.scale, curves, *state, control)
-        if subjects.slope.any():
-            _incline(subjects.slope, self._gains, curves, self._incline.at(self.phase), control)
-
-
-GAINS = np.dtype(
-    [
-        ("touchdown", float),  # vertical force of a foot that has landed [N]
-        ("rate", float),  # advance of the phase in one window
-        ("rate_gain", float),  # share by which it rises for each m/s too fast [s/m]
-        ("pitch", float),  # held trunk pitch [rad]
-        ("trunk_stiffness", float),  # [N m/rad]
-        ("trunk_damping", float),  # [N m s/rad]
-        ("speed_torque", float),  # [N s]
-        ("swing_gain", float),  # [rad s/m]
-    ]
-)
-"""Constants of one body's legs, scaled to it."""
 
 
 def _gains(c: LegConstants, body: Body, stride_time: float) -> tuple[float, ...]:
@@ -126,81 +186,6 @@ def _gains(c: LegConstants, body: Body, stride_time: float) -> tuple[float, ...]
         c.speed_torque * scale / time_scale,
         c.swing_speed_gain / time_scale,
     )
-
-
-@kernel
-def _follow(rows, place, scale, gains):
-    for i in range(len(gains)):
-        row, weight = place[i].row, place[i].weight
-        low, high = rows[row], rows[row + 1 if weight > 0.0 else row]
-        time_scale, mass, torque, gain = scale[i].time, scale[i].mass, scale[i].torque, gains[i]
-        gain.touchdown = mass * _between(low.touchdown, high.touchdown, weight)
-        gain.rate = _between(low.rate, high.rate, weight) / time_scale
-        gain.rate_gain = _between(low.rate_gain, high.rate_gain, weight) / time_scale
-        gain.pitch = _between(low.pitch, high.pitch, weight)
-        gain.trunk_stiffness = torque * _between(low.trunk_stiffness, high.trunk_stiffness, weight)
-        gain.trunk_damping = torque * time_scale * _between(low.trunk_damping, high.trunk_damping, weight)
-        gain.speed_torque = torque / time_scale * _between(low.speed_torque, high.speed_torque, weight)
-        gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / time_scale
-
-
-@kernel
-def _incline(slope, gains, curves, inclined, control):
-    """Move the targets of hips, knees and trunk with the slope."""
-    for i in range(len(slope)):
-        for side in range(2):
-            hip, knee = control[i, side, HIP], control[i, side, KNEE]
-            lean = curves[i, side, 0] * gains[i].trunk_stiffness * inclined[i, side, 3]
-            hip[1] += slope[i] * (hip[0] * inclined[i, side, 0] + lean)
-            knee[1] += slope[i] * knee[0] * inclined[i, side, 1]
-
-
-@kernel
-def _between(low, high, weight):
-    return low + weight * (high - low)
-
-
-@kernel
-def _advance(gains, speed, curves, com_velocity, force, running, phase):
-    for i in range(len(phase)):
-        if not running[i]:
-            continue
-        gain, left = gains[i], phase[i, LEFT]
-        rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(com_velocity[i], speed[i], curves[i, LEFT]))
-        waiting = (0.5 if left < 0.5 else 1.0) - HOLD
-        left = min(left + max(rate, 0.0), max(waiting, left))
-        right = (left + 0.5) % 1.0
-        if left > TOUCHDOWN_PHASE and _load(force[i, LEFT]) > gain.touchdown:
-            left = 0.0
-        elif right > TOUCHDOWN_PHASE and _load(force[i, RIGHT]) > gain.touchdown:
-            left = 0.5
-        phase[i, LEFT], phase[i, RIGHT] = left, (left + 0.5) % 1.0
-
-
-@kernel
-def _too_fast(com_velocity, speed, curves):
-    return max(com_velocity[0] - speed * curves[PLANNED_SPEED], SLOWEST)
-
-
-@kernel
-def _load(force):
-    return force[0, 1] + force[1, 1] + force[2, 1]
-
-
-@kernel
-def _drive(gains, speed, scale, curves, base, base_velocity, com_velocity, control):
-    for i in range(len(gains)):
-        gain = gains[i]
-        too_fast = _too_fast(com_velocity[i], speed[i], curves[i, LEFT])
-        torque = scale[i].torque
-        trunk = -gain.trunk_stiffness * (base[i, 2] - gain.pitch) - gain.trunk_damping * base_velocity[i, 2]
-        on_trunk = trunk + gain.speed_torque * too_fast
-        aim = gain.swing_gain * too_fast
-        for side in range(2):
-            stance, hip, knee = curves[i, side, 0], torque * curves[i, side, 1], torque * curves[i, side, 2]
-            own = stance * on_trunk + (1.0 - stance) * hip * aim
-            control[i, side, HIP, 0], control[i, side, HIP, 1] = hip, torque * curves[i, side, 3] + own
-            control[i, side, KNEE, 0], control[i, side, KNEE, 1] = knee, torque * curves[i, side, 4]
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:

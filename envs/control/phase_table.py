@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..physics.kernel import kernel
+from .rows import PLACE
 
 SAMPLES = 1000
 """Samples of a stride, between which curves are linear; chosen."""
@@ -16,9 +17,41 @@ def leg_phases(left: NDArray) -> NDArray:
     return np.stack([left, (left + 0.5) % 1.0], axis=-1)
 
 
-PLACE = np.dtype([("row", np.int64), ("weight", float)])
-"""Where an environment reads a table of several rows: between `row` and the next one, which has `weight` in [0, 1)."""
 _FIRST = np.zeros(1, PLACE)
+
+
+@kernel
+def read(table, place, phase, curves) -> None:
+    """Read one phase.
+
+    Args:
+        table: (R, SAMPLES, value and rise, C) of a `PhaseTable`.
+        place: one `PLACE`.
+        phase: in [0, 1).
+        curves: (C,), which is filled.
+    """
+    spot = phase * SAMPLES
+    index = 0
+    if spot >= SAMPLES - 1:
+        index = SAMPLES - 1
+    elif spot > 0.0:
+        index = int(spot)
+    row = table[place.row, index]
+    for column in range(row.shape[1]):
+        curves[column] = row[0, column] + (spot - index) * row[1, column]
+    if place.weight > 0.0:
+        above = table[place.row + 1, index]
+        for column in range(row.shape[1]):
+            value = above[0, column] + (spot - index) * above[1, column]
+            curves[column] += place.weight * (value - curves[column])
+
+
+@kernel
+def _read_all(table, place, phase, curves):
+    """Read phases (M,) into `curves` (M, C), an equal number of them at each of the places."""
+    each = max(len(phase) // len(place), 1)
+    for i in range(len(phase)):
+        read(table, place[i // each], phase[i], curves[i])
 
 
 class PhaseTable:
@@ -31,33 +64,12 @@ class PhaseTable:
     def __init__(self, curves: NDArray):
         curves = curves.reshape(-1, SAMPLES, curves.shape[-1])
         rise = np.roll(curves, -1, axis=1) - curves
-        self._table = np.stack([curves, rise], axis=2).astype(float)  # (R, SAMPLES, value and rise, C)
+        self.table = np.stack([curves, rise], axis=2).astype(float)
+        """(R, SAMPLES, value and rise, C); do not write to it."""
 
     def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
         """Curves (..., C) at phases (...) in [0, 1); with `place` (N,) of dtype `PLACE`, phases are (N, ...)."""
         phase = np.asarray(phase, float, order="C")
-        curves = np.empty((*phase.shape, self._table.shape[-1]))
-        _read(self._table, place, phase, curves)
+        curves = np.empty((*phase.shape, self.table.shape[-1]))
+        _read_all(self.table, place, phase.reshape(-1), curves.reshape(-1, curves.shape[-1]))
         return curves
-
-
-@kernel
-def _read(table, place, phases, all_curves):
-    phase, curves = phases.reshape(-1), all_curves.reshape(-1, table.shape[-1])
-    each = max(len(phase) // len(place), 1)
-    for i in range(len(phase)):
-        spot = phase[i] * SAMPLES
-        index = 0
-        if spot >= SAMPLES - 1:
-            index = SAMPLES - 1
-        elif spot > 0.0:
-            index = int(spot)
-        where = place[i // each]
-        row = table[where.row, index]
-        for column in range(row.shape[1]):
-            curves[i, column] = row[0, column] + (spot - index) * row[1, column]
-        if where.weight > 0.0:
-            above = table[where.row + 1, index]
-            for column in range(row.shape[1]):
-                value = above[0, column] + (spot - index) * above[1, column]
-                curves[i, column] += where.weight * (value - curves[i, column])

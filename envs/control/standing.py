@@ -23,7 +23,8 @@ from springfoot.gait.body import Body
 
 from ..physics.kernel import kernel
 from ..physics.measurement import Measurement
-from ..physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES
+from ..physics.model import ANKLE, HIP, KNEE
+from ..physics.simulation import Physics
 from ..settings import BipedSettings, body_of
 from ..timing import CONTROL_WINDOW
 from .subjects import Subjects
@@ -66,21 +67,80 @@ WALKING, STANDING, STARTING, STOPPING, STOPPED = range(5)
 
 """What a body does: see `Standing.mode`."""
 
-GAINS = np.dtype([("stiffness", float, len(JOINTS)), ("balance", float), ("trunk", float), ("trunk_damping", float)])
-HELD = np.dtype(
-    [
-        ("mode", np.int64),  # one of the five above
-        ("begin", float),  # time at which the body begins to lean; once it walks, time at which it began to [s]
-        ("place", float),  # where the CoM is held, ahead of mid-way between the ankles [m]
-        ("pitch", float),  # pitch at which the trunk is held [rad]
-        ("draw", float),  # shift of the hips' rest angles that brings the legs together [rad]
-        ("rest", float, (len(SIDES), len(JOINTS))),  # rest angles [rad], those of the hips for an upright trunk
-        ("length", float),  # ratio of the height to 1.70 m
-        ("time", float),  # square root of that
-        ("torque", float),  # ratio of mass x height to that of 63 kg and 1.70 m
-    ]
-)
-"""How one body is held; changed in place."""
+
+@kernel
+def _switch(rows, bodies, running, time, stop_at):
+    """Change modes whose time has come, and move the CoM's place of bodies that lean.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`; `held` is changed.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        running: (N,) bool; the others stay as they are.
+        time: (N,) in the episode [s].
+        stop_at: time in the episode from which a body stops [s].
+
+    Returns whether a mode changed.
+    """
+    changed = False
+    for i in range(len(rows)):
+        body, subject, phase = rows[i].held, rows[i].subject, rows[i].legs.phase
+        if not running[i]:
+            continue
+        before, slow = body.mode, SLOW_SPEED * body.time
+        if before == STANDING and time[i] >= body.begin:
+            share = min((time[i] - body.begin) / (LEAN_SECONDS * body.time), 1.0)
+            body.place = body.length * (STAND_COM + LEAN * share)
+            if bodies[i].measured.com_velocity[0] > OFF_SPEED * body.time:
+                body.mode, body.begin = STARTING, time[i]
+        elif (
+            before == STARTING and time[i] >= body.begin + EARLY_SECONDS * body.time and subject.speed == subject.target
+        ):
+            body.mode = WALKING
+        elif before in (WALKING, STARTING) and time[i] >= stop_at:
+            body.mode = STOPPING
+        elif before == STOPPING and subject.speed <= slow * (1.0 + 1e-9):
+            for side in range(2):
+                if LANDED[0] <= phase[side] <= LANDED[1]:
+                    body.mode = STOPPED
+        changed = changed or body.mode != before
+    return changed
+
+
+@kernel
+def _draw(body, m):
+    """Move the rest angles of the hips until their torque takes over the push of the feet against each other."""
+    front = 0 if m.ankle[0, 0] > m.ankle[1, 0] else 1
+    push = 0.0
+    for contact in range(3):
+        push += 0.5 * (m.force[1 - front, contact, 0] - m.force[front, contact, 0])
+    torque = push * HIP_HEIGHT * body.length
+    body.draw += CONTROL_WINDOW / (DRAW_SECONDS * body.time) * torque / (STANDING_STIFFNESS[HIP] * body.torque)
+
+
+@kernel
+def _drive(rows, bodies, plant, standing):
+    """Stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) go into the control of `plant`.
+
+    `rows` (N,) of `CONTROL_ROW`, whose `held` is changed; `bodies` (N,) of `BODY_ROW`, as measured now.
+    """
+    for i in range(len(rows)):
+        if not standing[i]:
+            continue
+        body, m, control = rows[i].held, bodies[i].measured, plant[i].control
+        if body.mode == STOPPED:
+            _draw(body, m)
+        ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - body.place
+        trunk = TRUNK_STIFFNESS * (m.base[2] - body.pitch) + TRUNK_DAMPING * body.time * m.base_velocity[2]
+        for side in range(2):
+            front = 1.0 if m.ankle[side, 0] > m.ankle[1 - side, 0] else -1.0
+            for joint in range(4):
+                k, rest = STANDING_STIFFNESS[joint], body.rest[side, joint]
+                if joint == ANKLE:
+                    rest -= BALANCE * ahead / body.length
+                if joint == HIP:
+                    rest += TRUNK_FREE * m.base[2] - trunk / k - front * body.draw
+                control[side, joint, 0] = k * body.torque
+                control[side, joint, 1] = k * body.torque * rest
 
 
 class Standing:
@@ -94,8 +154,7 @@ class Standing:
     def __init__(self, settings: BipedSettings, subjects: Subjects):
         self._stop_at = inf if settings.stop_at is None else settings.stop_at
         self._subjects = subjects
-        self._held = np.zeros(len(subjects.place), HELD)
-        self._gains = np.array([(STANDING_STIFFNESS, BALANCE, TRUNK_STIFFNESS, TRUNK_DAMPING)], GAINS)[0]
+        self._held = subjects.rows["held"]
 
     @property
     def mode(self) -> NDArray:
@@ -130,15 +189,14 @@ class Standing:
         held["rest"][ids, :, HIP] += (1.0 - TRUNK_FREE) * pitch[:, None]
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
-    def switch(self, m: Measurement, leg_phase: NDArray, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
+    def switch(self, physics: Physics, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
         """Before a step at `time` (N,) [s], let those `running` (N,) set off or stop whose time has come.
 
         Returns (N,) the bodies that run and walk, and (N,) those of them that walk with the fixed schedule.
         """
-        mode, before, subjects = self._held["mode"], self._held["mode"].copy(), self._subjects
-        state = m.com_velocity, subjects.speed, subjects.target, leg_phase
-        if _switch(running, time, self._stop_at, *state, self._held):
-            self._told(before, m)
+        mode, before = self._held["mode"], self._held["mode"].copy()
+        if _switch(self._subjects.rows, physics.bodies, running, time, self._stop_at):
+            self._told(before, Measurement.of(physics.bodies["measured"]))
         scheduled = running & ((mode == STARTING) | (mode == STOPPING))
         return scheduled | (running & (mode == WALKING)), scheduled
 
@@ -156,10 +214,9 @@ class Standing:
         held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]
         held["place"][ids] = STOP_COM * held["length"][ids]
 
-    def drive(self, m: Measurement, standing: NDArray, control: NDArray) -> None:
-        """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into `control`."""
-        _draw(self._gains, standing, m.ankle, m.force, self._held)
-        _drive(self._gains, standing, m.base, m.base_velocity, m.com, m.ankle, self._held, control)
+    def drive(self, physics: Physics, standing: NDArray) -> None:
+        """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into the control."""
+        _drive(self._subjects.rows, physics.bodies, physics.plant, standing)
 
 
 def steady_walk(settings: BipedSettings) -> tuple[float, float]:
@@ -198,64 +255,3 @@ def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
 
     shank = float(brentq(com, -0.5, 0.5))  # type: ignore[arg-type]
     return shank + knee, knee, -shank, 0.0
-
-
-@kernel
-def _switch(running, time, stop_at, com_velocity, speed, target, leg_phase, held):
-    """Change modes whose time has come, move the CoM's place of bodies that lean; returns whether a mode changed."""
-    changed = False
-    for i in range(len(held)):
-        body = held[i]
-        if not running[i]:
-            continue
-        before, slow = body.mode, SLOW_SPEED * body.time
-        if before == STANDING and time[i] >= body.begin:
-            share = min((time[i] - body.begin) / (LEAN_SECONDS * body.time), 1.0)
-            body.place = body.length * (STAND_COM + LEAN * share)
-            if com_velocity[i, 0] > OFF_SPEED * body.time:
-                body.mode, body.begin = STARTING, time[i]
-        elif before == STARTING and time[i] >= body.begin + EARLY_SECONDS * body.time and speed[i] == target[i]:
-            body.mode = WALKING
-        elif before in (WALKING, STARTING) and time[i] >= stop_at:
-            body.mode = STOPPING
-        elif before == STOPPING and speed[i] <= slow * (1.0 + 1e-9):
-            for side in range(2):
-                if LANDED[0] <= leg_phase[i, side] <= LANDED[1]:
-                    body.mode = STOPPED
-        changed = changed or body.mode != before
-    return changed
-
-
-@kernel
-def _drive(gains, standing, base, base_velocity, com, ankle, held, control):
-    for i in range(len(held)):
-        if not standing[i]:
-            continue
-        body = held[i]
-        ahead = com[i, 0] - 0.5 * (ankle[i, 0, 0] + ankle[i, 1, 0]) - body.place
-        trunk = gains.trunk * (base[i, 2] - body.pitch) + gains.trunk_damping * body.time * base_velocity[i, 2]
-        for side in range(2):
-            front = 1.0 if ankle[i, side, 0] > ankle[i, 1 - side, 0] else -1.0
-            for joint in range(4):
-                k, rest = gains.stiffness[joint], body.rest[side, joint]
-                if joint == ANKLE:
-                    rest -= gains.balance * ahead / body.length
-                if joint == HIP:
-                    rest += TRUNK_FREE * base[i, 2] - trunk / k - front * body.draw
-                control[i, side, joint, 0] = k * body.torque
-                control[i, side, joint, 1] = k * body.torque * rest
-
-
-@kernel
-def _draw(gains, standing, ankle, force, held):
-    """Move the rest angles of the hips until their torque takes over the push of the feet against each other."""
-    for i in range(len(held)):
-        body = held[i]
-        if not standing[i] or body.mode != STOPPED:
-            continue
-        front = 0 if ankle[i, 0, 0] > ankle[i, 1, 0] else 1
-        push = 0.0
-        for contact in range(3):
-            push += 0.5 * (force[i, 1 - front, contact, 0] - force[i, front, contact, 0])
-        torque = push * HIP_HEIGHT * body.length
-        body.draw += CONTROL_WINDOW / (DRAW_SECONDS * body.time) * torque / (gains.stiffness[HIP] * body.torque)

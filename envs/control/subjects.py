@@ -17,15 +17,49 @@ from springfoot.gait.errors import SpringfootError
 
 from ..physics.kernel import kernel
 from ..settings import BipedSettings, body_of
-from .phase_table import PLACE
+from .rows import CONTROL_ROW
 
-SCALE = np.dtype([("length", float), ("time", float), ("mass", float), ("torque", float)])
-"""Ratios of a body to that of the settings: of heights; its square root, that of times and speeds; of masses; and of
-mass x height, that of torque and stiffness."""
 DRAWN: tuple[str, ...] = ("height", "mass", "speed")
 """What may be drawn for each environment: settings `<name>_range`, and options of a reset."""
 MOST_DRAWS = 1000
 """Bodies drawn for one reset before it fails; chosen, as few pairs from wide ranges of height and mass make a body."""
+
+
+@kernel
+def _approach(most, running, subjects):
+    """Change the speeds of those `running` (N,) by at most `most` [m/s] towards the targets; `subjects` (N,) of
+    `SUBJECT`. Returns whether any speed is still on its way."""
+    under_way = False
+    for i in range(len(subjects)):
+        subject = subjects[i]
+        way = subject.target - subject.speed
+        if running[i]:
+            if abs(way) <= most:
+                subject.speed = subject.target
+            else:
+                subject.speed += most if way > 0.0 else -most
+        under_way = under_way or subject.speed != subject.target
+    return under_way
+
+
+@kernel
+def _locate(ids, speeds, first, subjects):
+    """Find the places of environments `ids` (K,) among `speeds` (G,) [m/s], at the speed Froude-equal to theirs.
+
+    `first` (N,) is the first row of the variant that each environment reads; `subjects` (N,) of `SUBJECT`.
+    """
+    last = len(speeds) - 1
+    for i in ids:
+        equal = subjects[i].speed / subjects[i].scale.time
+        lower = 0
+        while lower < last - 1 and equal >= speeds[lower + 1]:
+            lower += 1
+        weight = 0.0
+        if last > 0:
+            weight = min(max((equal - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
+        if weight == 1.0:
+            lower, weight = lower + 1, 0.0
+        subjects[i].place.row, subjects[i].place.weight = first[i] + lower, weight
 
 
 class Subjects:
@@ -45,17 +79,19 @@ class Subjects:
         self._first = np.zeros(num, int) if variant is None else np.asarray(variant, int) * len(speeds)
         self.bodies = [self._home] * num
         """Body of each environment."""
-        self.speed = np.full(num, settings.speed)
-        """(N,) speed commanded now [m/s]."""
-        self.place = np.zeros(num, PLACE)
-        """(N,) place of that speed in tables of variants x speeds."""
-        self.scale = np.ones(num, SCALE)
-        """(N,) ratios of the bodies to that of the settings."""
-        self.slope = np.full(num, radians(settings.slope_deg))
+        self.rows = np.zeros(num, CONTROL_ROW)
+        """(N,) all that the control keeps of each environment."""
+        own = self.rows["subject"]
+        self.place, self.scale = own["place"], own["scale"]
+        """(N,) place of the commanded speed in tables of variants x speeds, and ratios of the bodies to that of the
+        settings."""
+        self.speed, self.target, self._change = own["speed"], own["target"], own["change"]
+        """(N,) speed commanded now, and that to which it goes [m/s]; time of the next target drawn [s]."""
+        self.slope = own["slope"]
         """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
-        self.target = self.speed.copy()
-        """(N,) speed to which the commanded speed goes [m/s]."""
-        self._change = np.full(num, np.inf)  # time of the next speed drawn [s]
+        self.scale[:] = 1.0
+        self.speed[:] = self.target[:] = settings.speed
+        self.slope[:], self._change[:] = radians(settings.slope_deg), np.inf
         self._changing = False
         self._everyone = np.arange(num)
         self._locate(self._everyone)
@@ -119,7 +155,7 @@ class Subjects:
                     self._changing = True
         if not self._changing:
             return False
-        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self.target, self.speed)
+        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self.rows["subject"])
         self._locate(self._everyone)
         return True
 
@@ -158,36 +194,4 @@ class Subjects:
             )
 
     def _locate(self, ids: NDArray) -> None:
-        _locate(ids, self.speed, self.scale, self._speeds, self._first, self.place)
-
-
-@kernel
-def _approach(most, running, target, speed):
-    """Change speeds by at most `most` towards the targets; returns whether any is still on its way."""
-    under_way = False
-    for i in range(len(speed)):
-        way = target[i] - speed[i]
-        if running[i]:
-            if abs(way) <= most:
-                speed[i] = target[i]
-            else:
-                speed[i] += most if way > 0.0 else -most
-        under_way = under_way or speed[i] != target[i]
-    return under_way
-
-
-@kernel
-def _locate(ids, speed, scale, speeds, first, place):
-    """Find the places of environments `ids` among the speeds, at the speed that is Froude-equal to theirs."""
-    last = len(speeds) - 1
-    for i in ids:
-        equal = speed[i] / scale[i].time
-        lower = 0
-        while lower < last - 1 and equal >= speeds[lower + 1]:
-            lower += 1
-        weight = 0.0
-        if last > 0:
-            weight = min(max((equal - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
-        if weight == 1.0:
-            lower, weight = lower + 1, 0.0
-        place[i].row, place[i].weight = first[i] + lower, weight
+        _locate(ids, self._speeds, self._first, self.rows["subject"])

@@ -121,37 +121,6 @@ def parts_of(body: Body) -> NDArray:
     return parts
 
 
-def window_work(
-    parts: NDArray,
-    steps: StepRecord,
-    control: NDArray,
-    held: NDArray,
-    angle: NDArray,
-    push: NDArray,
-    state: tuple[NDArray, NDArray],
-    timestep: float,
-) -> WindowWork:
-    """Torque, work and energy of one window.
-
-    Args:
-        parts: (N,) of `PARTS`.
-        steps: what MuJoCo reported.
-        control: (N, side, joint, 2) K [N m/rad] and K theta_eq [N m] held in the window.
-        held: as `control`, in the window before; NaN where there was none.
-        angle: (N, side, joint) when the window began [rad].
-        push: (N,) horizontal force on the trunk's CoM [N].
-        state: MuJoCo's qpos and qvel at the window's end, (N, D) each.
-        timestep: of the physics [s].
-    """
-    num = len(parts)
-    torque, work = np.zeros((num, len(SIDES), len(JOINTS))), np.zeros((num, len(SIDES), len(JOINTS), 2))
-    energy = np.zeros(num, LEDGER)
-    _sum_work(parts, steps, control, push, timestep, torque, work, energy)
-    _sum_changes(control, held, angle, energy)
-    _add_mechanical(parts, *state, energy)
-    return WindowWork(torque=torque, work=work, energy=energy)
-
-
 @kernel
 def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
     count = steps.velocity.shape[1]
@@ -192,6 +161,15 @@ def _sum_changes(control, held, angle, energy):
 
 
 @kernel
+def _part_energy(own, part, x, z, x_rate, z_rate, turn, spin):
+    """Kinetic and potential energy [J] of one part whose joint is at (x, z), turned up-forward by `turn`."""
+    forward, up = own.com[part]
+    along, above = forward * cos(turn) - up * sin(turn), forward * sin(turn) + up * cos(turn)
+    speed = (x_rate - above * spin) ** 2 + (z_rate + along * spin) ** 2
+    return own.mass[part] * (0.5 * speed + GRAVITY * (z + above)) + 0.5 * own.inertia[part] * spin**2
+
+
+@kernel
 def _add_mechanical(parts, position, rate, energy):
     """Planar kinematics as in `envs.physics.measurement`."""
     for i in range(len(energy)):
@@ -213,10 +191,32 @@ def _add_mechanical(parts, position, rate, energy):
         energy[i].mechanical = total
 
 
-@kernel
-def _part_energy(own, part, x, z, x_rate, z_rate, turn, spin):
-    """Kinetic and potential energy [J] of one part whose joint is at (x, z), turned up-forward by `turn`."""
-    forward, up = own.com[part]
-    along, above = forward * cos(turn) - up * sin(turn), forward * sin(turn) + up * cos(turn)
-    speed = (x_rate - above * spin) ** 2 + (z_rate + along * spin) ** 2
-    return own.mass[part] * (0.5 * speed + GRAVITY * (z + above)) + 0.5 * own.inertia[part] * spin**2
+def window_work(
+    parts: NDArray,
+    steps: StepRecord,
+    control: NDArray,
+    held: NDArray,
+    angle: NDArray,
+    push: NDArray,
+    state: tuple[NDArray, NDArray],
+    timestep: float,
+) -> WindowWork:
+    """Torque, work and energy of one window.
+
+    Args:
+        parts: (N,) of `PARTS`.
+        steps: what MuJoCo reported.
+        control: (N, side, joint, 2) K [N m/rad] and K theta_eq [N m] held in the window.
+        held: as `control`, in the window before; NaN where there was none.
+        angle: (N, side, joint) when the window began [rad].
+        push: (N,) horizontal force on the trunk's CoM [N].
+        state: MuJoCo's qpos and qvel at the window's end, (N, D) each.
+        timestep: of the physics [s].
+    """
+    num = len(parts)
+    torque, work = np.zeros((num, len(SIDES), len(JOINTS))), np.zeros((num, len(SIDES), len(JOINTS), 2))
+    energy = np.zeros(num, LEDGER)
+    _sum_work(parts, steps, control, push, timestep, torque, work, energy)
+    _sum_changes(control, held, angle, energy)
+    _add_mechanical(parts, *state, energy)
+    return WindowWork(torque=torque, work=work, energy=energy)

@@ -1,26 +1,55 @@
 """Kernels: what a step does besides its physics, as compiled loops over bodies in scalar equations.
 
-For so few numbers a call of NumPy costs more than its arithmetic, and Python more still. A kernel fills the arrays that
-it is given. Row i of what it writes depends on row i of what it reads, by the same operations in the same order for any
-N (no fast-math, no threads), so a batch of N gives the bits of N batches of one. numba compiles a kernel at its first
-call and keeps the code beside the source, until that source file changes. A change in another file goes unnoticed;
-therefore a kernel calls only functions of its own file, and takes numbers of other files as arguments. It may use the
-order of axes in `envs.physics.model`, which never changes.
+For so few numbers a call of NumPy costs more than its arithmetic, and Python more still. A kernel takes records, one
+row an environment, and fills those it is given. Row i of what it writes depends on row i of what it reads, by the same
+operations in the same order for any N (no fast-math, no threads), so a batch of N gives the bits of N batches of one.
+
+numba compiles a kernel at its first call and keeps the code beside the source. It watches no more than the source file
+of the kernel that is called; so a kernel carries in its name, under which numba keeps the code, a fingerprint of its
+own code and of all that it uses: the kernels it calls, in whatever file, and constants. Therefore a kernel stands below
+what it uses.
 """
 
+import builtins
+import dis
 from collections.abc import Callable
+from hashlib import sha256
 from typing import Any, TypeVar
 
+import numpy as np
 from numba import njit
+from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
     """Compile `function` with numba at its first call; dividing by zero gives infinity, as in NumPy."""
+    function.__qualname__ += f"_{_fingerprint(function)}"
     compiled: Any
     try:
         compiled = njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # neither the package's folder nor the user's cache can be written
         compiled = njit(error_model="numpy")(function)
     return compiled
+
+
+def _fingerprint(function: Callable[..., Any]) -> str:
+    """What a function does: of its code and all that it uses. Raises NameError for what does not stand above it."""
+    code: Any = function.__code__  # type: ignore[attr-defined]
+    found = [code.co_code.hex(), repr(code.co_consts), repr(code.co_varnames), repr(code.co_names)]
+    for name in sorted({each.argval for each in dis.get_instructions(code) if each.opname == "LOAD_GLOBAL"}):
+        known = function.__globals__  # type: ignore[attr-defined]
+        if name in known:
+            found.append(f"{name} = {_meaning(known[name])}")
+        elif not hasattr(builtins, name):
+            raise NameError(f"kernel {function.__name__} uses {name}, which must stand above it")
+    return sha256("\n".join(found).encode()).hexdigest()[:12]
+
+
+def _meaning(value: Any) -> str:
+    if isinstance(value, Dispatcher):
+        return value.py_func.__qualname__  # with its own fingerprint
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.tobytes().hex()}"
+    return getattr(value, "__name__", None) or repr(value)  # of modules and functions; of numbers and types of records

@@ -12,8 +12,46 @@ from .foot_contact import CONTACTS, contact_offsets
 from .kernel import kernel
 from .model import ANKLE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
 
+SEGMENTS = np.dtype(
+    [
+        ("trunk", float, 2),  # part of trunk and load in hip -> CoM [m], in the trunk's frame (forward, up)
+        ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see segments_of
+        ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
+        ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
+        ("radius", float, len(CONTACTS)),  # of the contact spheres [m]
+        ("beta", float, len(JOINTS)),  # damping time of each joint's spring [s]
+        ("limit", float, len(JOINTS)),  # largest torque of each joint's actuator [N m]
+    ]
+)
+"""What kinematics and springs need to know of one body."""
+MEASURED = np.dtype(
+    [
+        ("time", float),
+        ("base", float, 3),
+        ("base_velocity", float, 3),
+        ("angle", float, (len(SIDES), len(JOINTS))),
+        ("velocity", float, (len(SIDES), len(JOINTS))),
+        ("torque", float, (len(SIDES), len(JOINTS))),
+        ("com", float, 2),
+        ("com_velocity", float, 2),
+        ("ankle", float, (len(SIDES), 2)),
+        ("contact", float, (len(SIDES), len(CONTACTS), 2)),
+        ("force", float, (len(SIDES), len(CONTACTS), 2)),
+        ("diverged", np.int64),
+    ]
+)
+"""One body's row of a `Measurement`, which explains it."""
+BODY_ROW = np.dtype(
+    [
+        ("segments", SEGMENTS),
+        ("ground", float, 1 + len(SIDES)),  # tangent of the slope [-], height of the ground below each foot [m]
+        ("measured", MEASURED),
+    ]
+)
+"""What the simulation knows of one body."""
 
-@dataclass(kw_only=True, eq=False)  # making it frozen takes longer than measuring
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Measurement:
     """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
 
@@ -49,120 +87,10 @@ class Measurement:
     diverged: NDArray
     """(N,) `mjtWarning` with the lowest number among those MuJoCo has raised since the episode began, -1 for none."""
 
-
-def measurement_of(
-    time: NDArray,
-    segments: NDArray,
-    ground: NDArray,
-    position: NDArray,
-    rate: NDArray,
-    control: NDArray,
-    sensors: NDArray,
-    warnings: NDArray,
-) -> Measurement:
-    """Compute the measurement of N bodies.
-
-    Args:
-        time: (N,) since the episode began [s].
-        segments: (N,) of dtype `SEGMENTS`, one row a body.
-        ground: (N, 3) tangent of the slope [-], then the height of the ground below each foot [m].
-        position, rate: (N, 11) MuJoCo's qpos and qvel.
-        control: (N, side, joint, 2) as in `envs.physics.simulation.Simulation.control`.
-        sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
-        warnings: (N, kinds) how often MuJoCo has warned of each kind.
-    """
-    num, sides = len(time), len(SIDES)
-    legs, feet = (num, sides, len(JOINTS)), (num, sides, len(CONTACTS), 2)
-    m = Measurement(
-        time=time.copy(),
-        base=np.empty((num, 3)),
-        base_velocity=np.empty((num, 3)),
-        angle=np.empty(legs),
-        velocity=np.empty(legs),
-        torque=np.empty(legs),
-        com=np.empty((num, 2)),
-        com_velocity=np.empty((num, 2)),
-        ankle=np.empty((num, sides, 2)),
-        contact=np.empty(feet),
-        force=np.empty(feet),
-        diverged=np.empty(num, int),
-    )
-    state = segments, ground, position, rate, control, sensors, warnings
-    joints = m.base, m.base_velocity, m.angle, m.velocity, m.torque
-    _measure(*state, *joints, m.com, m.com_velocity, m.ankle, m.contact, m.force, m.diverged)
-    return m
-
-
-@kernel
-def _measure(
-    segments,
-    ground,
-    position,
-    rate,
-    control,
-    sensors,
-    warnings,
-    base,
-    base_velocity,
-    angle,
-    velocity,
-    torque,
-    com,
-    com_velocity,
-    ankle,
-    contact,
-    force,
-    diverged,
-):
-    for i in range(len(base)):
-        for k in range(3):
-            base[i, k], base_velocity[i, k] = position[i, k], rate[i, k]
-        _read_joints(segments[i], position[i], rate[i], control[i], angle[i], velocity[i], torque[i])
-        _locate(segments[i], position[i], rate[i], com[i], com_velocity[i], ankle[i], contact[i])
-        _above(ground[i], base[i], base_velocity[i], com[i], com_velocity[i], ankle[i], contact[i])
-        _average(sensors[i], force[i])
-        diverged[i] = -1
-        for kind in range(warnings.shape[1] - 1, -1, -1):
-            if warnings[i, kind] > 0:
-                diverged[i] = kind
-
-
-@kernel
-def _read_joints(segments, position, rate, control, angle, velocity, torque):
-    beta, limit = segments.beta, segments.limit
-    for side in range(2):
-        for joint in range(4):
-            theta, theta_rate = position[3 + 4 * side + joint], rate[3 + 4 * side + joint]
-            stiffness, drive = control[side, joint]
-            spring = drive - stiffness * (theta + beta[joint] * theta_rate)
-            angle[side, joint], velocity[side, joint] = theta, theta_rate
-            torque[side, joint] = min(max(spring, -limit[joint]), limit[joint])
-
-
-@kernel
-def _average(sensors, force):
-    steps = len(sensors)
-    for side in range(2):
-        for contact in range(3):
-            forward = up = 0.0
-            for step in range(steps):
-                forward += sensors[step, side, contact, 0]
-                up += sensors[step, side, contact, 2]
-            force[side, contact, 0], force[side, contact, 1] = forward / steps, up / steps
-
-
-SEGMENTS = np.dtype(
-    [
-        ("trunk", float, 2),  # part of trunk and load in hip -> CoM [m], in the trunk's frame (forward, up)
-        ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see segments_of
-        ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
-        ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
-        ("radius", float, len(CONTACTS)),  # of the contact spheres [m]
-        ("beta", float, len(JOINTS)),  # damping time of each joint's spring [s]
-        ("limit", float, len(JOINTS)),  # largest torque of each joint's actuator [N m]
-    ]
-)
-"""What kinematics and springs need to know of one body."""
+    @classmethod
+    def of(cls, measured: NDArray) -> "Measurement":
+        """The measurement in rows (N,) of `MEASURED`; its arrays are views of them."""
+        return cls(**{name: measured[name] for name in MEASURED.names or ()})
 
 
 def segments_of(body: Body) -> NDArray:
@@ -198,7 +126,12 @@ def segments_of(body: Body) -> NDArray:
 
 
 @kernel
-def _locate(segments, position, rate, com, com_velocity, ankle, contact):
+def _turned(offset, c, s):
+    return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c
+
+
+@kernel
+def _locate(segments, position, rate, m):
     """Planar forward kinematics.
 
     A segment is turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its
@@ -219,29 +152,74 @@ def _locate(segments, position, rate, com, com_velocity, ankle, contact):
             com_x, com_z = com_x + x, com_z + z
             com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
             if joint == ANKLE:
-                ankle[side, 0], ankle[side, 1] = joint_x, joint_z
+                m.ankle[side, 0], m.ankle[side, 1] = joint_x, joint_z
             for k in range(3):
                 if joint == (ANKLE if k == 0 else TOE):  # the heel is on the foot
                     x, z = _turned(segments.contact[k], c, s)
-                    contact[side, k, 0], contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
+                    m.contact[side, k, 0], m.contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
             x, z = _turned(segments.end[joint], c, s)
             joint_x, joint_z = joint_x + x, joint_z + z
-    com[0], com[1], com_velocity[0], com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
+    m.com[0], m.com[1], m.com_velocity[0], m.com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
 
 
 @kernel
-def _above(ground, base, base_velocity, com, com_velocity, ankle, contact):
+def _above(ground, m):
     """Turn heights and upward velocities in the world into those relative to the ground, in place."""
     slope = ground[0]
-    for position, velocity in ((base, base_velocity), (com, com_velocity)):
-        position[1] -= slope * position[0]
-        velocity[1] -= slope * velocity[0]
+    m.base[1] -= slope * m.base[0]
+    m.base_velocity[1] -= slope * m.base_velocity[0]
+    m.com[1] -= slope * m.com[0]
+    m.com_velocity[1] -= slope * m.com_velocity[0]
     for side in range(2):
-        ankle[side, 1] -= slope * ankle[side, 0]
+        m.ankle[side, 1] -= slope * m.ankle[side, 0]
         for k in range(3):
-            contact[side, k, 1] -= slope * contact[side, k, 0] + ground[1 + side]
+            m.contact[side, k, 1] -= slope * m.contact[side, k, 0] + ground[1 + side]
 
 
 @kernel
-def _turned(offset, c, s):
-    return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c
+def _read_joints(segments, plant, m):
+    beta, limit = segments.beta, segments.limit
+    for side in range(2):
+        for joint in range(4):
+            theta, theta_rate = plant.qpos[3 + 4 * side + joint], plant.qvel[3 + 4 * side + joint]
+            stiffness, drive = plant.control[side, joint, 0], plant.control[side, joint, 1]
+            spring = drive - stiffness * (theta + beta[joint] * theta_rate)
+            m.angle[side, joint], m.velocity[side, joint] = theta, theta_rate
+            m.torque[side, joint] = min(max(spring, -limit[joint]), limit[joint])
+
+
+@kernel
+def _average(sensors, force):
+    steps = len(sensors)
+    for side in range(2):
+        for contact in range(3):
+            forward = up = 0.0
+            for step in range(steps):
+                forward += sensors[step, side, contact, 0]
+                up += sensors[step, side, contact, 2]
+            force[side, contact, 0], force[side, contact, 1] = forward / steps, up / steps
+
+
+@kernel
+def measure_bodies(bodies, plant, sensors, warnings) -> None:
+    """Measure N bodies after a control window.
+
+    Args:
+        bodies: (N,) of `BODY_ROW`; `measured` is filled.
+        plant: (N,) of MuJoCo's state, as `envs.physics.simulation.plant_dtype` names it.
+        sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
+        warnings: (N, kinds) how often MuJoCo has warned of each kind.
+    """
+    for i in range(len(bodies)):
+        segments, m = bodies[i].segments, bodies[i].measured
+        m.time = plant[i].time
+        for k in range(3):
+            m.base[k], m.base_velocity[k] = plant[i].qpos[k], plant[i].qvel[k]
+        _read_joints(segments, plant[i], m)
+        _locate(segments, plant[i].qpos, plant[i].qvel, m)
+        _above(bodies[i].ground, m)
+        _average(sensors[i], m.force)
+        m.diverged = -1
+        for kind in range(warnings.shape[1] - 1, -1, -1):
+            if warnings[i, kind] > 0:
+                m.diverged = kind

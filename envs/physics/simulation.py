@@ -7,6 +7,7 @@ physics step); contact forces are the mean over the window's physics steps, so t
 
 from collections.abc import Sequence
 from math import cos, sin, tan
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -19,8 +20,41 @@ from springfoot.gait.errors import SpringfootError
 from ..timing import CONTROL_WINDOW
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot_contact import CONTACTS, FRICTION
-from .measurement import Measurement, measurement_of, segments_of
+from .measurement import BODY_ROW, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
+
+
+class Physics(NamedTuple):
+    """The arrays of a simulation that kernels read and write."""
+
+    bodies: NDArray
+    """(N,) of `BODY_ROW`."""
+    plant: NDArray
+    """(N,) of `plant_dtype`."""
+    sensors: NDArray
+    """(N, S, side, contact, 3) contact forces of the last window's S physics steps [N]."""
+    warnings: NDArray
+    """(N, kinds) how often MuJoCo has warned of each kind since the episode began."""
+
+
+def plant_dtype(model: mujoco.MjModel) -> np.dtype:
+    """Of one row of MuJoCo's state: `time` [s], `qpos`, `qvel`, and `control`, which is `Simulation.control`."""
+    every = mujoco.mjtState.mjSTATE_INTEGRATION.value
+    names = {
+        "time": (mujoco.mjtState.mjSTATE_TIME, ()),
+        "qpos": (mujoco.mjtState.mjSTATE_QPOS, model.nq),
+        "qvel": (mujoco.mjtState.mjSTATE_QVEL, model.nv),
+        "control": (mujoco.mjtState.mjSTATE_CTRL, (len(SIDES), len(JOINTS), 2)),
+    }
+    before = [mujoco.mj_stateSize(model, every & (component.value - 1)) for component, _ in names.values()]
+    return np.dtype(
+        {
+            "names": list(names),
+            "formats": [(float, shape) for _, shape in names.values()],
+            "offsets": [8 * size for size in before],
+            "itemsize": 8 * mujoco.mj_stateSize(model, every),
+        }
+    )
 
 
 class Simulation:
@@ -52,22 +86,24 @@ class Simulation:
         self._friction = friction
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, threads)
-        self._qpos = self._batch.bind("qpos")
-        self._qvel = self._batch.bind("qvel")
-        self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
+        plant = self._batch.state.view(plant_dtype(self.model))[:, 0]
+        self._qpos, self._qvel = plant["qpos"], plant["qvel"]
+        self.control = plant["control"]
         """(N, side, joint, 2) K [N m/rad] and K theta_eq plus any feed-forward torque [N m]; changed in place."""
-        self._time = self._batch.bind("time").reshape(num)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
         self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
-        self._ground = np.zeros((num, 1 + len(SIDES)))  # tangent of the slope, height below each foot [m]
-        self._warnings = self._batch.warning[:, :, 1]
-        self._sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
-        self._record = {"sensordata": self._sensors.reshape(num, self._substeps, self.model.nsensordata)}
-        self._segments, self._parts = np.repeat(segments_of(body), num), np.repeat(parts_of(body), num)
+        bodies = np.zeros(num, BODY_ROW)
+        bodies["segments"], self._parts = segments_of(body), np.repeat(parts_of(body), num)
+        self._ground = bodies["ground"]
+        sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
+        self.arrays = Physics(bodies, plant, sensors, self._batch.warning[:, :, 1])
+        """What kernels read and write."""
+        self.now = Measurement.of(bodies["measured"])
+        """The last measurement; its arrays change in place."""
+        self._record = {"sensordata": sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._held = np.full(self.control.shape, np.nan)  # in the last window that was watched
         self.work: WindowWork
         """Torque, work and energy in the last window that was watched."""
-        self._no_control = np.zeros_like(self.control)
 
     def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
         """Simulate `bodies` (K,) in simulations `ids` (K,) from their next reset on.
@@ -81,7 +117,7 @@ class Simulation:
             )
         for index, body in zip(ids, bodies, strict=True):
             self.models[index] = self.model if body == self.body else build_model(body, self._friction)
-            self._segments[index], self._parts[index] = segments_of(body)[0], parts_of(body)[0]
+            self.arrays.bodies["segments"][index], self._parts[index] = segments_of(body)[0], parts_of(body)[0]
         self._batch.set_models(self.models)
 
     def reset(self, ids: NDArray, base: NDArray, base_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
@@ -119,15 +155,14 @@ class Simulation:
         """Let a horizontal force (N,), forward positive [N], act on the CoM of the trunk until the next call."""
         self._push[:, 0] = force
 
-    def advance(self, ids: NDArray | None = None) -> Measurement:
-        """Run one control window with `control` held, and return the measurement of all N at its end.
+    def advance(self, ids: NDArray | None = None) -> None:
+        """Run one control window with `control` held; the kernel `measure_bodies` then tells what came of it.
 
         Only simulations `ids` run (all if None); the others stay as they are, and their contact forces read 0.
         """
         self._roll(ids, self._record)
-        return self._measure(self.control)
 
-    def advance_watched(self, ids: NDArray | None = None) -> Measurement:
+    def advance_watched(self, ids: NDArray | None = None) -> None:
         """As `advance`, the same bits; `work` then holds what the physics steps did, 0 for those not in `ids`."""
         shape = self.num, self._substeps, self.model.nv
         steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), *(np.zeros(shape) for _ in RECORDED))
@@ -141,7 +176,6 @@ class Simulation:
             held[still], steps.before[still], push[still] = np.nan, 0.0, 0.0
         self.work = window_work(self._parts, steps, self.control, held, angle, push, state, timestep)
         self._held[:] = self.control
-        return self._measure(self.control)
 
     def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
         """Run the physics steps of a window and record what `out` names, 0 for those that do not run."""
@@ -157,15 +191,13 @@ class Simulation:
 
     def measure(self) -> Measurement:
         """The measurement right after a reset: the state as it stands, with torques and contact forces of zero."""
-        self._sensors[:] = 0.0
-        return self._measure(self._no_control)
+        self.arrays.sensors[:] = 0.0
+        measure_bodies(*self.arrays)
+        self.now.torque[:] = 0.0
+        return self.now
 
     def data(self, index: int) -> mujoco.MjData:
         """A copy of the state of simulation `index` after `mj_forward`, to render or to inspect."""
         data = self._batch.get_data(index)
         mujoco.mj_forward(self.models[index], data)
         return data
-
-    def _measure(self, control: NDArray) -> Measurement:
-        state = self._ground, self._qpos, self._qvel, control, self._sensors, self._warnings
-        return measurement_of(self._time, self._segments, *state)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ..control.subjects import Subjects
 from ..physics.measurement import Measurement
-from ..physics.model import SIDES
 from ..physics.simulation import Simulation
 from ..settings import BipedSettings
 
@@ -24,15 +23,15 @@ class Ground:
         settings: slope and unevenness; friction is that of the simulation's models.
         simulation: the simulation whose ground this is.
         subjects: the bodies, which own the slope.
+        rows: (N,) of `TASK_ROW`.
     """
 
-    def __init__(self, settings: BipedSettings, simulation: Simulation, subjects: Subjects):
+    def __init__(self, settings: BipedSettings, simulation: Simulation, subjects: Subjects, rows: NDArray):
         self._settings, self._simulation = settings, simulation
         self.slope = subjects.slope
         """(N,) slope of the ground [rad], uphill positive."""
-        self.height = np.zeros((simulation.num, len(SIDES)))
-        """(N, side) height of the ground below each foot above the mean ground [m]."""
-        self._phase = np.zeros((simulation.num, len(SIDES)))
+        self.height, self._phase = rows["ground"]["height"], rows["ground"]["phase"]
+        """(N, side) height of the ground below each foot above the mean ground [m]; the legs' phases a window ago."""
 
     def reset(self, ids: NDArray, randoms: Sequence[np.random.Generator], leg_phase: NDArray) -> None:
         """Begin episodes of environments `ids` (K,) on even ground, with legs at the phases `leg_phase` (N, side)."""

@@ -12,17 +12,21 @@ from ..settings import BipedSettings
 
 
 class Pushes:
-    """Pushes each environment once in each interval, at a random time, forward or backward at random."""
+    """Pushes each environment once in each interval, at a random time, forward or backward at random.
 
-    def __init__(self, settings: BipedSettings, subjects: Subjects):
-        num, self._scale = len(subjects.bodies), subjects.scale
+    Args:
+        settings: size, duration and interval of pushes.
+        subjects: whose mass counts.
+        rows: (N,) of `TASK_ROW`.
+    """
+
+    def __init__(self, settings: BipedSettings, subjects: Subjects, rows: NDArray):
+        self._scale = subjects.scale
         self._size = settings.push_newton * (settings.mass / REFERENCE_MASS)
         self._latest = settings.push_interval - settings.push_seconds
         self._interval, self._duration = settings.push_interval, settings.push_seconds
         self._step = settings.step_seconds
-        self._ends = np.zeros(num)
-        self._begin = np.zeros(num)
-        self._force = np.zeros(num)
+        self._begin, self._force, self._ends = (rows["push"][name] for name in ("begin", "force", "ends"))
 
     def reset(self, index: int, random: np.random.Generator) -> None:
         """Begin an episode of environment `index`."""

@@ -1,0 +1,69 @@
+"""The entries of the observation: names, units, bounds and meanings."""
+
+from typing import NamedTuple
+
+from ..physics.foot_contact import CONTACTS
+from ..physics.model import ACTIONS, JOINTS, SIDES
+
+UNITS = ("1", "rad", "leg length", "sqrt(g l)", "sqrt(g/l)", "body weight")
+"""What divides the entries."""
+
+
+class Entry(NamedTuple):
+    """One entry of the observation: its name, the unit that divides it, the bounds that clip it, its meaning, and
+    whether it is measured. What is not measured needs no sensor: the controller has set it itself."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    measured: bool = True
+
+
+def _entries() -> tuple[Entry, ...]:
+    legs = [(side, joint) for side in SIDES for joint in JOINTS]
+    sign: dict[str, str] = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
+    return (
+        Entry("hip_height", "leg length", 0.0, 2.0, "height of the hip"),
+        Entry("pitch", "rad", -3.2, 3.2, "pitch of the trunk, forward positive"),
+        *(Entry(f"{joint}_{side}", "rad", -3.2, 3.2, f"angle, {sign[joint]} positive") for side, joint in legs),
+        Entry("hip_velocity_x", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, forward positive"),
+        Entry("hip_velocity_z", "sqrt(g l)", -5.0, 5.0, "velocity of the hip, up positive"),
+        Entry("pitch_rate", "sqrt(g/l)", -15.0, 15.0, "rate of the pitch, forward positive"),
+        *(
+            Entry(f"{joint}_rate_{side}", "sqrt(g/l)", -15.0, 15.0, f"angular rate, {sign[joint]} positive")
+            for side, joint in legs
+        ),
+        Entry("phase_sin", "1", -1.0, 1.0, "sine of 2 pi x left stride phase", False),
+        Entry("phase_cos", "1", -1.0, 1.0, "cosine of 2 pi x left stride phase", False),
+        Entry("phase_sin_2", "1", -1.0, 1.0, "sine of 4 pi x left stride phase", False),
+        Entry("phase_cos_2", "1", -1.0, 1.0, "cosine of 4 pi x left stride phase", False),
+        *(
+            Entry(
+                f"load_{contact}_{side}",
+                "body weight",
+                0.0,
+                5.0,
+                "vertical force, mean of the step",
+            )
+            for side in SIDES
+            for contact in CONTACTS
+        ),
+        Entry("com_x_error", "leg length", -2.0, 2.0, "CoM minus plan, forward positive"),
+        Entry("com_z_error", "leg length", -2.0, 2.0, "CoM minus plan, up positive"),
+        Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
+        *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before", False) for name in ACTIONS),
+        *(
+            Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "people's ankle angle at the leg's phase", False)
+            for side in SIDES
+        ),
+        Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right", False),
+        Entry("command_speed", "sqrt(g l)", 0.0, 2.0, "commanded speed (Froude speed)", False),
+        Entry("height_ratio", "1", 0.0, 2.0, "height / 1.70 m", False),
+    )
+
+
+OBSERVATION = _entries()
+"""Every entry of the observation, in order. l is the leg length (hip to floor when standing); the weight is that of
+body and load. No entry tells the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
