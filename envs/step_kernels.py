@@ -23,18 +23,18 @@ from .task.reward import ALIVE, judge, total
 def begin_window(rows, physics, tables, springs, walking) -> None:
     """Begin a control window; arguments as of `begin_step`."""
     controls, _, _ = rows
-    bodies, plant, _, _ = physics
+    bodies, state, _, _ = physics
     rest, _, legs, incline, _ = tables
-    move(controls, bodies, plant, rest, incline, springs, walking)
-    drive(controls, bodies, plant, legs, incline)
+    move(controls, bodies, state, rest, incline, springs, walking)
+    drive(controls, bodies, state, legs, incline)
 
 
 @kernel
 def end_window(rows, physics, window, walking) -> None:
     """End control window number `window` of the step; else as of `begin_step`."""
     controls, _, forces = rows
-    bodies, plant, sensors, warnings = physics
-    measure_bodies(bodies, plant, sensors, warnings)
+    bodies, state, sensors, warnings = physics
+    measure_bodies(bodies, state, sensors, warnings)
     advance(controls, bodies, walking)
     for i in range(len(bodies)):
         force = bodies[i].measured.force

@@ -9,9 +9,7 @@ from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.control.leg_controller import slope_table
 from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.control.subjects import Subjects
-from springfoot.envs.physics.measurement import BODY_ROW
-from springfoot.envs.physics.model import build_model
-from springfoot.envs.physics.simulation import plant_dtype
+from springfoot.envs.physics.measurement import BODY_ROW, PLANT
 from springfoot.envs.settings import ActionMode, BipedSettings
 from springfoot.gait.body import Body
 
@@ -49,11 +47,10 @@ class Springs:
     def __init__(self, settings: BipedSettings, rest: NDArray, schedule: NDArray, subjects: Subjects):
         self.feet = FootSprings(settings, Body(), rest, schedule, subjects)
         self.rows, self.everyone = subjects.rows, np.ones(len(subjects.rows), bool)
-        self.bodies, self.plant = (
-            np.zeros(len(self.rows), BODY_ROW),
-            np.zeros(len(self.rows), plant_dtype(build_model(Body()))),
-        )
-        self.angle, self.control = self.bodies["measured"]["angle"], self.plant["control"]
+        self.bodies = np.zeros(len(self.rows), BODY_ROW)
+        plant = np.zeros((len(self.rows), 1), PLANT)
+        self.state, self.angle = plant.view(float), self.bodies["measured"]["angle"]
+        self.control = plant["control"][:, 0]
         own = self.rows["springs"]
         self.stiffness, self.equilibrium = own["stiffness"], own["equilibrium"]
         self.work_stiffness, self.work_equilibrium = own["work_stiffness"], own["work_equilibrium"]
@@ -74,7 +71,7 @@ class Springs:
     def move_equilibrium(self, leg_phase: NDArray) -> None:
         self.rows["legs"]["phase"] = leg_phase
         incline = slope_table(slope_constants()).table
-        move(self.rows, self.bodies, self.plant, self.feet.rest.table, incline, self.feet.options, self.everyone)
+        move(self.rows, self.bodies, self.state, self.feet.rest.table, incline, self.feet.options, self.everyone)
 
 
 def test_a_residual_action_multiplies_the_schedule():

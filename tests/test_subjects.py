@@ -272,18 +272,18 @@ def test_nothing_jumps_as_the_speed_changes():
     legs.reset(np.arange(1), biped.leg_phase[:, 0])
     rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
     springs = FootSprings(settings, biped.body, rest, stiffness, subjects)
-    bodies, plant = simulation.arrays.bodies, simulation.arrays.plant
+    bodies, state = simulation.arrays.bodies, simulation.arrays.state
     for name, values in vars(biped.measurement).items():
         bodies["measured"][name] = values
     rows = []
     for speed in np.linspace(0.8, 1.6, 801):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         legs.follow()
-        move(subjects.rows, bodies, plant, springs.rest.table, incline, springs.options, np.ones(1, bool))
-        drive(subjects.rows, bodies, plant, legs.table.table, incline)
+        move(subjects.rows, bodies, state, springs.rest.table, incline, springs.options, np.ones(1, bool))
+        drive(subjects.rows, bodies, state, legs.table.table, incline)
         equilibrium = 100 * subjects.rows["springs"]["equilibrium"]
         plan = 100 * task.tracking(bodies)
-        rows.append(np.concatenate([np.moveaxis(plant["control"], -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
+        rows.append(np.concatenate([np.moveaxis(simulation.control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
     change = np.abs(np.diff(rows, axis=0)).max()  # N m, N m/rad, 0.01 rad, cm or cm/s for 1 mm/s
     assert change < 1.0 and change < 0.6 * np.abs(np.diff(rows[::2], axis=0)).max()  # half as far, half the change
     assert (np.ptp(rows, axis=0) > 0.5).sum() >= 8

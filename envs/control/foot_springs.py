@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from springfoot.gait.body import Body
 
 from ..physics.kernel import kernel
+from ..physics.measurement import plant_of
 from ..physics.model import ANKLE
 from ..physics.simulation import Physics
 from ..settings import BipedSettings
@@ -117,7 +118,7 @@ def _arrive(own, angle):
 
 
 @kernel
-def move(rows, bodies, plant, rest, incline, options, walking) -> None:
+def move(rows, bodies, state, rest, incline, options, walking) -> None:
     """Begin a control window: K and K theta_eq of ankles and toes go into the control.
 
     K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases. Moving the rest angle, so that
@@ -126,7 +127,7 @@ def move(rows, bodies, plant, rest, incline, options, walking) -> None:
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        plant: (N,) of MuJoCo's state, whose `control` is filled.
+        state: (N, numbers) MuJoCo's, whose `control` is filled.
         rest: (R, SAMPLES, 2, 2) rest angles of ankle and toe [rad], of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.leg_controller.slope_table`).
         options: (1,) of `SPRING_OPTIONS`.
@@ -136,7 +137,7 @@ def move(rows, bodies, plant, rest, incline, options, walking) -> None:
     level = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
         own, subject, angle = rows[i].springs, rows[i].subject, bodies[i].measured.angle
-        control = plant[i].control
+        control = plant_of(state, i).control
         if walking[i] and own.delay > 0:
             _arrive(own, angle)
         for side in range(2):
@@ -160,8 +161,8 @@ def move(rows, bodies, plant, rest, incline, options, walking) -> None:
 
 
 @kernel
-def _hold(rows, bodies, plant, held):
-    """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control of `plant` (N,).
+def _hold(rows, bodies, state, held):
+    """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control of `state` (N, numbers).
 
     They act without delay, and the work of both changes is counted as that of `stiffen` and `move`.
     """
@@ -169,9 +170,10 @@ def _hold(rows, bodies, plant, held):
         if not held[i]:
             continue
         own, angle = rows[i].springs, bodies[i].measured.angle
+        control = plant_of(state, i).control
         for side in range(2):
             for joint in range(2):
-                k, drive = plant[i].control[side, ANKLE + joint, 0], plant[i].control[side, ANKLE + joint, 1]
+                k, drive = control[side, ANKLE + joint, 0], control[side, ANKLE + joint, 1]
                 theta, before = angle[side, ANKLE + joint], own.stiffness[side, joint]
                 old, new = own.equilibrium[side, joint] - theta, drive / k - theta
                 own.stiffness[side, joint], own.equilibrium[side, joint] = k, drive / k
@@ -228,4 +230,4 @@ class FootSprings:
 
     def hold(self, physics: Physics, held: NDArray) -> None:
         """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control."""
-        _hold(self._subjects.rows, physics.bodies, physics.plant, held)
+        _hold(self._subjects.rows, physics.bodies, physics.state, held)

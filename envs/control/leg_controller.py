@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
 from ..physics.kernel import kernel
+from ..physics.measurement import plant_of
 from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..timing import CONTROL_WINDOW
 from .leg_constants import LegConstants, SlopeConstants
@@ -83,19 +84,19 @@ def _too_fast(m, row):
 
 
 @kernel
-def drive(rows, bodies, plant, table, incline) -> None:
+def drive(rows, bodies, state, table, incline) -> None:
     """Begin a control window: stiffness [N m/rad] and drive torque [N m] of hips and knees go into the control.
 
     Args:
         rows: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        plant: (N,) of MuJoCo's state, whose `control` is filled.
+        state: (N, numbers) MuJoCo's, whose `control` is filled.
         table: (R, SAMPLES, 2, 6) of `leg_curves`, of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) of `slope_table`.
     """
     curves, inclined, level = np.empty((2, table.shape[-1])), np.empty(4), np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
-        subject, legs, m, control = rows[i].subject, rows[i].legs, bodies[i].measured, plant[i].control
+        subject, legs, m, control = rows[i].subject, rows[i].legs, bodies[i].measured, plant_of(state, i).control
         gain, torque = legs.gains, subject.scale.torque
         for side in range(2):
             read(table, subject.place, legs.phase[side], curves[side])

@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from springfoot.gait.body import Body
 
 from ..physics.kernel import kernel
-from ..physics.measurement import Measurement
+from ..physics.measurement import Measurement, plant_of
 from ..physics.model import ANKLE, HIP, KNEE
 from ..physics.simulation import Physics
 from ..settings import BipedSettings, body_of
@@ -118,15 +118,19 @@ def _draw(body, m):
 
 
 @kernel
-def _drive(rows, bodies, plant, standing):
-    """Stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) go into the control of `plant`.
+def _drive(rows, bodies, state, standing):
+    """Stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) go into the control.
 
-    `rows` (N,) of `CONTROL_ROW`, whose `held` is changed; `bodies` (N,) of `BODY_ROW`, as measured now.
+    Args:
+        rows: (N,) of `CONTROL_ROW`; `held` is changed.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        state: (N, numbers) MuJoCo's, whose `control` is filled.
+        standing: (N,) bool.
     """
     for i in range(len(rows)):
         if not standing[i]:
             continue
-        body, m, control = rows[i].held, bodies[i].measured, plant[i].control
+        body, m, control = rows[i].held, bodies[i].measured, plant_of(state, i).control
         if body.mode == STOPPED:
             _draw(body, m)
         ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - body.place
@@ -216,7 +220,7 @@ class Standing:
 
     def drive(self, physics: Physics, standing: NDArray) -> None:
         """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into the control."""
-        _drive(self._subjects.rows, physics.bodies, physics.plant, standing)
+        _drive(self._subjects.rows, physics.bodies, physics.state, standing)
 
 
 def steady_walk(settings: BipedSettings) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,10 @@ from springfoot.gait.body import Body
 
 from .foot_contact import CONTACTS, contact_offsets
 from .kernel import kernel
-from .model import ANKLE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
+from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
 
+DEGREES = len(BASE) + len(SIDES) * len(JOINTS)
+"""Degrees of freedom of the body."""
 SEGMENTS = np.dtype(
     [
         ("trunk", float, 2),  # part of trunk and load in hip -> CoM [m], in the trunk's frame (forward, up)
@@ -24,6 +27,19 @@ SEGMENTS = np.dtype(
     ]
 )
 """What kinematics and springs need to know of one body."""
+PLANT = np.dtype(
+    [
+        ("time", float),  # since the episode began [s]
+        ("qpos", float, DEGREES),  # of base (x, z, pitch) and joints [m, rad]
+        ("qvel", float, DEGREES),  # [m/s, rad/s]
+        ("qacc_warmstart", float, DEGREES),
+        ("control", float, (len(SIDES), len(JOINTS), 2)),  # as `envs.physics.simulation.Simulation.control`
+    ]
+)
+"""How a row of MuJoCo's state begins."""
+_PLANT_NUMBERS = PLANT.itemsize // 8
+
+
 MEASURED = np.dtype(
     [
         ("time", float),
@@ -201,22 +217,28 @@ def _average(sensors, force):
 
 
 @kernel
-def measure_bodies(bodies, plant, sensors, warnings) -> None:
+def plant_of(state, i) -> Any:
+    """The beginning of row `i` of MuJoCo's state (N, numbers), of `PLANT`; what is written to it is the state."""
+    return state[i, :_PLANT_NUMBERS].view(PLANT)[0]
+
+
+@kernel
+def measure_bodies(bodies, state, sensors, warnings) -> None:
     """Measure N bodies after a control window.
 
     Args:
         bodies: (N,) of `BODY_ROW`; `measured` is filled.
-        plant: (N,) of MuJoCo's state, as `envs.physics.simulation.plant_dtype` names it.
+        state: (N, numbers) MuJoCo's, whose rows begin as `PLANT`.
         sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
         warnings: (N, kinds) how often MuJoCo has warned of each kind.
     """
     for i in range(len(bodies)):
-        segments, m = bodies[i].segments, bodies[i].measured
-        m.time = plant[i].time
+        segments, m, plant = bodies[i].segments, bodies[i].measured, plant_of(state, i)
+        m.time = plant.time
         for k in range(3):
-            m.base[k], m.base_velocity[k] = plant[i].qpos[k], plant[i].qvel[k]
-        _read_joints(segments, plant[i], m)
-        _locate(segments, plant[i].qpos, plant[i].qvel, m)
+            m.base[k], m.base_velocity[k] = plant.qpos[k], plant.qvel[k]
+        _read_joints(segments, plant, m)
+        _locate(segments, plant.qpos, plant.qvel, m)
         _above(bodies[i].ground, m)
         _average(sensors[i], m.force)
         m.diverged = -1

@@ -20,7 +20,7 @@ from springfoot.gait.errors import SpringfootError
 from ..timing import CONTROL_WINDOW
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot_contact import CONTACTS, FRICTION
-from .measurement import BODY_ROW, Measurement, measure_bodies, segments_of
+from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
 
 
@@ -29,32 +29,12 @@ class Physics(NamedTuple):
 
     bodies: NDArray
     """(N,) of `BODY_ROW`."""
-    plant: NDArray
-    """(N,) of `plant_dtype`."""
+    state: NDArray
+    """(N, numbers) MuJoCo's state, whose rows begin as `PLANT`."""
     sensors: NDArray
     """(N, S, side, contact, 3) contact forces of the last window's S physics steps [N]."""
     warnings: NDArray
     """(N, kinds) how often MuJoCo has warned of each kind since the episode began."""
-
-
-def plant_dtype(model: mujoco.MjModel) -> np.dtype:
-    """Of one row of MuJoCo's state: `time` [s], `qpos`, `qvel`, and `control`, which is `Simulation.control`."""
-    every = mujoco.mjtState.mjSTATE_INTEGRATION.value
-    names = {
-        "time": (mujoco.mjtState.mjSTATE_TIME, ()),
-        "qpos": (mujoco.mjtState.mjSTATE_QPOS, model.nq),
-        "qvel": (mujoco.mjtState.mjSTATE_QVEL, model.nv),
-        "control": (mujoco.mjtState.mjSTATE_CTRL, (len(SIDES), len(JOINTS), 2)),
-    }
-    before = [mujoco.mj_stateSize(model, every & (component.value - 1)) for component, _ in names.values()]
-    return np.dtype(
-        {
-            "names": list(names),
-            "formats": [(float, shape) for _, shape in names.values()],
-            "offsets": [8 * size for size in before],
-            "itemsize": 8 * mujoco.mj_stateSize(model, every),
-        }
-    )
 
 
 class Simulation:
@@ -82,13 +62,15 @@ class Simulation:
         self.model = model or build_model(body, friction)
         self.models = [self.model] * num
         """The compiled model of each simulation."""
+        if (self.model.nq, self.model.nv, self.model.na, self.model.nu) != (DEGREES, DEGREES, 0, 2 * (DEGREES - 3)):
+            raise SpringfootError("a custom model must have the joints and the actuators of the default one")
         self._own_options = model is not None
         self._friction = friction
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, threads)
-        plant = self._batch.state.view(plant_dtype(self.model))[:, 0]
-        self._qpos, self._qvel = plant["qpos"], plant["qvel"]
-        self.control = plant["control"]
+        state = self._batch.state
+        self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
         """(N, side, joint, 2) K [N m/rad] and K theta_eq plus any feed-forward torque [N m]; changed in place."""
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
         self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
@@ -96,7 +78,7 @@ class Simulation:
         bodies["segments"], self._parts = segments_of(body), np.repeat(parts_of(body), num)
         self._ground = bodies["ground"]
         sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
-        self.arrays = Physics(bodies, plant, sensors, self._batch.warning[:, :, 1])
+        self.arrays = Physics(bodies, state, sensors, self._batch.warning[:, :, 1])
         """What kernels read and write."""
         self.now = Measurement.of(bodies["measured"])
         """The last measurement; its arrays change in place."""
