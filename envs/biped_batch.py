@@ -22,13 +22,14 @@ from .control.leg_controller import LegController, slope_table
 from .control.reference_walk import reference_walks, rows
 from .control.standing import WALKING, Standing, off_phase
 from .control.subjects import Subjects
+from .exact_state import ExactState
 from .physics.foot_contact import CONTACTS
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, JOINTS, SIDES
 from .physics.simulation import Simulation
 from .settings import BipedSettings
 from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
-from .step_result import INFO, StepResult, Tick
+from .step_result import StepResult, Tick, room
 from .task.ground import Ground
 from .task.initial_state import place, random_phase, start_table, walking_posture
 from .task.observation import SensorNoise
@@ -37,7 +38,7 @@ from .task.reward import Task
 from .timing import CONTROL_WINDOW
 
 
-class Biped:
+class Biped(ExactState):
     """N bodies in one task.
 
     Args:
@@ -65,6 +66,8 @@ class Biped:
         model: mujoco.MjModel | None = None,
         slope: SlopeConstants | None = None,
     ):
+        self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
+        self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope}
         self.settings = settings
         self.num_envs = num_envs
         self.dt = settings.step_seconds
@@ -107,6 +110,7 @@ class Biped:
         curves = self._springs.rest, self._springs.schedule, self._legs.table, incline
         self._tables = *(each.table for each in curves), self._task.table
         self._physics = tuple(self._simulation.arrays)
+        self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
         self._simulation.measure()
 
     @property
@@ -202,6 +206,9 @@ class Biped:
             self._task.fit(ids)
         self._legs.follow()
 
+    def _embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> None:
+        self._fit(self.subjects.embody(ids, height, mass))
+
     def observe(self) -> NDArray:
         """(N, D) float32 observation at this moment."""
         return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
@@ -235,7 +242,7 @@ class Biped:
                 self._after_window(tick)
                 begin_window(rows, physics, tables, springs.options, walking)
         tick = self._roll(running, walking, ids)
-        outcome = self._outcome()
+        outcome = room(self.num_envs)
         ended = end_step(rows, physics, tables, self._task.options, walking, running, outcome)
         self._after_window(tick)
         observation, reward, terminated, truncated, values = outcome
@@ -249,17 +256,6 @@ class Biped:
             truncated=truncated,
             values=values,
             termination=self._task.reasons(self._simulation.now, terminated) if ended else self._no_reason,
-        )
-
-    def _outcome(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-        """Room for what a step returns."""
-        num = self.num_envs
-        return (
-            np.empty((num, len(self.observation_low)), np.float32),
-            np.empty(num),
-            np.empty(num, bool),
-            np.empty(num, bool),
-            np.empty((num, len(INFO))),
         )
 
     def _decode(self, actions: NDArray, running: NDArray) -> NDArray:

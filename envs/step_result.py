@@ -9,6 +9,7 @@ from .physics.energy import WindowWork
 from .physics.kernel import kernel
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, ANKLE, SIDES
+from .task.observation_entries import OBSERVATION
 from .task.reward import TERMS
 
 REPORT = np.dtype(
@@ -112,3 +113,14 @@ class Tick:
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray
     """(N,) True for the environments that ran in this window."""
+
+
+def room(num: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Room for what a step of `num` environments returns: observation, reward, terminated, truncated, values."""
+    return (
+        np.empty((num, len(OBSERVATION)), np.float32),
+        np.empty(num),
+        np.empty(num, bool),
+        np.empty(num, bool),
+        np.empty((num, len(INFO))),
+    )

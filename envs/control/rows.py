@@ -16,6 +16,8 @@ SCALE = np.dtype([("length", float), ("time", float), ("mass", float), ("torque"
 mass x height, that of torque and stiffness."""
 SUBJECT = np.dtype(
     [
+        ("height", float),  # of the body [m]
+        ("mass", float),  # [kg]
         ("place", PLACE),
         ("scale", SCALE),
         ("speed", float),  # commanded now [m/s]

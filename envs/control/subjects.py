@@ -89,7 +89,7 @@ class Subjects:
         """(N,) speed commanded now, and that to which it goes [m/s]; time of the next target drawn [s]."""
         self.slope = own["slope"]
         """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
-        self.scale[:] = 1.0
+        own["height"], own["mass"], self.scale[:] = self._home.height, self._home.mass, 1.0
         self.speed[:] = self.target[:] = settings.speed
         self.slope[:], self._change[:] = radians(settings.slope_deg), np.inf
         self._changing = False
@@ -113,16 +113,28 @@ class Subjects:
             self._draw(random, {name: float(values[row]) for name, values in (given or {}).items()})
             for row, random in enumerate(randoms)
         ]
+        others = self._embody(ids, [body for body, _ in drawn])
+        for index, random, (_, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
+            self.speed[index] = self.target[index] = speed
+            self._change[index] = self._wait(0.0, random)
+        self._locate(ids)
+        return others
+
+    def embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> list[int]:
+        """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]; returns as `reset`."""
+        self._changing = True  # whether it was, the next step finds out
+        sizes = zip(height.tolist(), mass.tolist(), strict=True)
+        return self._embody(ids, [replace(self._home, height=each, mass=own) for each, own in sizes])
+
+    def _embody(self, ids: NDArray, bodies: Sequence[Body]) -> list[int]:
         others = []
-        for index, random, (body, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
+        for index, body in zip(ids.tolist(), bodies, strict=True):
             if body != self.bodies[index]:
                 others.append(index)
                 self.bodies[index] = body
                 length, mass = body.height / self._home.height, body.mass / self._home.mass
                 self.scale[index] = length, sqrt(length), mass, mass * length
-            self.speed[index] = self.target[index] = speed
-            self._change[index] = self._wait(0.0, random)
-        self._locate(ids)
+                self.rows["subject"][["height", "mass"]][index] = body.height, body.mass
         return others
 
     def command(self, ids: NDArray, speed: NDArray) -> None:

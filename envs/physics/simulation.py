@@ -84,6 +84,8 @@ class Simulation:
         """The last measurement; its arrays change in place."""
         self._record = {"sensordata": sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._held = np.full(self.control.shape, np.nan)  # in the last window that was watched
+        self.kept = {"body": bodies, "mujoco": state, "warnings": self._batch.warning, "held": self._held}
+        """All that changes, by name; arrays with N rows."""
         self.work: WindowWork
         """Torque, work and energy in the last window that was watched."""
 
