@@ -5,9 +5,11 @@ import gymnasium as gym
 from .biped_batch import Biped
 from .env import SegmentedFootBiped
 from .settings import BipedSettings, body_of, reference_gait, settings_from, settings_to_json
+from .step_result import TERMINATIONS
 from .vector_env import SegmentedFootBipedVector
 
 __all__ = [
+    "TERMINATIONS",
     "Biped",
     "BipedSettings",
     "SegmentedFootBiped",

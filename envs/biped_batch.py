@@ -102,7 +102,7 @@ class Biped(ExactState):
 
         self._random: list[np.random.Generator | None] = [None] * num_envs
         self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
-        self._no_reason = np.full(num_envs, "", object)
+        self._no_reason = np.zeros(num_envs, int)
         self._no_reason.flags.writeable = False
         self._steps = self._task.rows["steps"]
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))

@@ -3,24 +3,19 @@
 from typing import Any
 
 import gymnasium as gym
+import mujoco
 import numpy as np
-from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from springfoot.gait.errors import SpringfootError
 
 from .biped_batch import Biped
-from .control.subjects import DRAWN
-from .physics.rendering import RENDER_MODES, Camera
-from .setting_checks import check_start
+from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
 from .settings import settings_from
-from .step_result import INFO
-from .timing import ACTION_STEP
-
-METADATA: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": round(1 / ACTION_STEP)}
+from .step_result import INFO, report_start
 
 
-class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
+class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[reportIncompatibleVariableOverride]
     """A planar body with segmented feet that walks by the stiffness of its ankles and toes.
 
     ## Description
@@ -123,13 +118,33 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
 
     ## Episode end
     Termination: the hip is lower than 0.65 m (x height / 1.70 m), the trunk is tilted by more than 0.8 rad, or the
-    simulation diverges; `info["termination"]` says which ("" while walking).
-    Truncation: after `episode_seconds` (1000 steps by default).
+    simulation diverges. Truncation: after `episode_seconds` (1000 steps by default), which `spec.max_episode_steps`
+    follows. `gym.make(..., max_episode_steps=100)` ends episodes earlier, never later.
 
     ## Info
-    Of each action's name: `stiffness/` [N m/rad], `torque/` [N m], `equilibrium/` [rad], `work/stiffness/` and
-    `work/equilibrium/` [J], the work done in the step by changing stiffness and by moving the equilibrium. Of each
-    reward term `reward/`. `phase/left`, `phase/right` [0, 1), `time` [s], `speed` [m/s], `termination`.
+    NumPy numbers, under the same keys from `reset` and `step`. Of each action's name: `stiffness/` [N m/rad], `torque/`
+    [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J], the work done in
+    the step by changing stiffness and by moving the equilibrium. Of each reward term `reward/`. `phase/left`,
+    `phase/right` [0, 1), `time` [s], `speed` [m/s]. After `reset` phases and speed are those of the start, and all else
+    is 0: no spring acts before the first action. `termination` is a code; `springfoot.envs.TERMINATIONS` names it:
+
+    | Code | Name                   | Meaning                                                                        |
+    | ---- | ---------------------- | ------------------------------------------------------------------------------ |
+    | 0    |                        | not terminated: walking, or out of time                                        |
+    | 1    | fell: hip too low      | as under Episode end                                                           |
+    | 2    | fell: trunk too tilted | as under Episode end                                                           |
+    | 3    | diverged: INERTIA      | MuJoCo warned of a matrix it cannot invert                                     |
+    | 4    | diverged: CONTACTFULL  | MuJoCo's memory for contacts was full                                          |
+    | 5    | diverged: CNSTRFULL    | MuJoCo's memory for constraints was full                                       |
+    | 6    | diverged: BADQPOS      | a position was no finite number, or far too large                              |
+    | 7    | diverged: BADQVEL      | a velocity was                                                                 |
+    | 8    | diverged: BADQACC      | an acceleration was                                                            |
+    | 9    | diverged: BADCTRL      | a control was                                                                  |
+
+    ## MuJoCo
+    `model` and `data`, as Gymnasium's MuJoCo environments have them. The state lives in the arrays of a batch, so
+    `data` is a new copy at each access, to read and to render; writing to it changes nothing. `model` is that of the
+    present body, to be read: bodies are changed by settings and by the options of a reset.
 
     ## Arguments
     Every field of `springfoot.envs.settings.BipedSettings`, by theme, as plain JSON values:
@@ -195,8 +210,17 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         self.biped = Biped(self.settings, 1)
         self.metadata = METADATA | {"render_fps": round(1 / self.biped.dt)}
         self.observation_space, self.action_space = spaces_of(self.biped)
-        self._camera: Camera | None = None
         self._over = True
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model of the present body; see MuJoCo."""
+        return self.biped.model_of(0)
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """A new copy of the present state, after `mj_forward`; see MuJoCo."""
+        return self.biped.data(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -208,7 +232,8 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         self._over = False
         if self.render_mode == "human":
             self.render()
-        return self.biped.observe()[0], {}
+        values = report_start(self.biped.measurement, self.biped.leg_phase)
+        return self.biped.observe()[0], _info(values[0], np.int64(0))
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
         """Hold the stiffness that `action` (4,) stands for during a step, 20 ms by default."""
@@ -221,63 +246,20 @@ class SegmentedFootBiped(gym.Env[NDArray, NDArray]):
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
-        info: dict[str, Any] = dict(zip(INFO, result.values[0].tolist(), strict=True))
-        info["termination"] = str(result.termination[0])
+        info = _info(result.values[0], result.termination[0])
         return result.observation[0], float(result.reward[0]), terminated, truncated, info
 
     def render(self) -> Any:
         """A frame, uint8 (480, 640, 3), or None after drawing the window ("human"); `SpringfootError` without GL."""
-        mode = check_can_render(self.render_mode)
-        self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
-        return self._camera.show(self.biped.data(0), self.biped.model_of(0))
+        return self._camera_for().show(self.biped.data(0), self.biped.model_of(0))
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._camera is not None:
-            self._camera.close()
+        self._close_camera()
 
 
-def spaces_of(biped: Biped) -> tuple[Box, Box]:
-    """Observation and action space of one environment."""
-    low, high = biped.observation_low, biped.observation_high
-    return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
-
-
-def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The options of a reset; raises `SpringfootError` for an unknown one or a bad start."""
-    options, allowed = options or {}, ("start", *DRAWN, *more)
-    for name in options:
-        if name not in allowed:
-            raise SpringfootError(f"unknown reset option {name!r}; valid: {', '.join(allowed)}")
-    if "start" in options:
-        check_start(options["start"])
-    return options
-
-
-def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
-    """Bodies and speeds that the options of a reset set in N environments: (N,) by the names of `DRAWN`."""
-    given = {}
-    for name in DRAWN:
-        if name in options:
-            try:
-                given[name] = np.broadcast_to(np.asarray(options[name], float), (num,))
-            except (TypeError, ValueError):
-                raise SpringfootError(
-                    f"reset option {name!r} must be a number, or one for each of {num} environments, "
-                    f"got {options[name]!r:.60}"
-                ) from None
-    return given
-
-
-def check_render_mode(mode: str | None) -> str | None:
-    """The render mode; raises `SpringfootError` for an unknown one."""
-    if mode is not None and mode not in RENDER_MODES:
-        raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {mode!r}")
-    return mode
-
-
-def check_can_render(mode: str | None) -> str:
-    """The render mode; raises `SpringfootError` if there is none."""
-    if mode is None:
-        raise SpringfootError(f"make the environment with render_mode {' or '.join(map(repr, RENDER_MODES))} to render")
-    return mode
+def _info(values: NDArray, termination: np.integer) -> dict[str, Any]:
+    """NumPy numbers by name."""
+    info: dict[str, Any] = dict(zip(INFO, values, strict=True))
+    info["termination"] = termination
+    return info

@@ -1,9 +1,24 @@
 """Checks that more than one setting needs; each raises `SpringfootError`, naming the setting and what is allowed."""
 
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
 from springfoot.gait.errors import SpringfootError, as_float
+
+
+class UnknownSettingError(SpringfootError, TypeError):
+    """A setting that does not exist; also the `TypeError` that Python raises for an unknown keyword argument."""
+
+
+def check_names(given: Iterable[str], names: Sequence[str]) -> None:
+    """Refuse what is none of `names`, the settings, as Python refuses an unknown keyword argument."""
+    for name in given:
+        if name not in names:
+            likely = get_close_matches(name, names, n=3, cutoff=0.5)
+            which = f"likely: {', '.join(likely)}" if likely else f"valid: {', '.join(names)}"
+            raise UnknownSettingError(f"got an unexpected keyword argument {name!r}, which is no setting; {which}")
 
 
 def check_start(start: Any) -> None:

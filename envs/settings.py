@@ -7,7 +7,7 @@ of `SegmentedFootBiped` and what an evaluation sets anew follow from that.
 import json
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields
-from difflib import get_close_matches
+from math import ceil
 from numbers import Real
 from typing import Any, Literal, get_args
 
@@ -19,7 +19,7 @@ from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 from .physics.foot_contact import FRICTION
-from .setting_checks import check_choice, check_range, check_span, check_start, check_weights
+from .setting_checks import check_choice, check_names, check_range, check_span, check_start, check_weights
 from .timing import ACTION_STEP, CONTROL_WINDOW
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -196,6 +196,11 @@ class BipedSettings:
         """Time of one step of the environment [s]."""
         return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP
 
+    @property
+    def max_episode_steps(self) -> int:
+        """Steps after which an episode is truncated: `episode_seconds`, to the nearest step."""
+        return ceil(self.episode_seconds / self.step_seconds - 0.5)
+
     def _check_draws(self) -> None:
         for name, allowed, unit in (
             ("height_range", HEIGHT_RANGE, "m"),
@@ -254,13 +259,9 @@ CONDITION_SETTINGS = tuple(
 def settings_from(**values: Any) -> BipedSettings:
     """Settings from keyword arguments or JSON: lists become tuples, numbers become floats.
 
-    Raises `SpringfootError` for an unknown name or a bad value.
+    Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    names = [setting.name for setting in fields(BipedSettings)]
-    for name in values:
-        if name not in names:
-            likely = get_close_matches(name, names, n=3, cutoff=0.5) or names
-            raise SpringfootError(f"unknown setting {name!r}; valid: {', '.join(likely)}")
+    check_names(values, [setting.name for setting in fields(BipedSettings)])
     values = {name: _plain(value) for name, value in values.items()}
     if values.get("schedule") is not None:
         values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()

@@ -9,6 +9,7 @@ from .physics.energy import WindowWork
 from .physics.kernel import kernel
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, ANKLE, SIDES
+from .task.episode_end import TERMINATIONS
 from .task.observation_entries import OBSERVATION
 from .task.reward import TERMS
 
@@ -88,12 +89,17 @@ class StepResult:
     values: NDArray
     """(N, len(INFO)) in the order of `INFO`."""
     termination: NDArray
-    """(N,) why the episode was terminated, "" where it was not; do not write to it."""
+    """(N,) int, why the episode was terminated, a code of `TERMINATIONS`, 0 where it was not; do not write to it."""
 
     @property
     def info(self) -> dict[str, NDArray]:
         """Name -> (N,): `values` by their names in `INFO`, and `termination`."""
         return dict(zip(INFO, self.values.T, strict=True)) | {"termination": self.termination}
+
+    @property
+    def reasons(self) -> NDArray:
+        """(N,) `termination` in words."""
+        return np.array(TERMINATIONS)[self.termination]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,3 +130,16 @@ def room(num: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
         np.empty(num, bool),
         np.empty((num, len(INFO))),
     )
+
+
+def report_start(m: Measurement, leg_phase: NDArray) -> NDArray:
+    """`StepResult.values` before an episode's first step: the phases and the speed, all else 0, as nothing acts yet.
+
+    Args:
+        m: the measurement right after the reset.
+        leg_phase: (N, side) stride phase of each leg [0, 1).
+    """
+    values = np.zeros((len(leg_phase), len(INFO)))
+    rows = values.view(REPORT)[:, 0]
+    rows["phase"], rows["speed"] = leg_phase, m.com_velocity[:, 0]
+    return values

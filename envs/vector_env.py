@@ -13,18 +13,22 @@ from numpy.typing import NDArray
 from springfoot.gait.errors import SpringfootError, require_count
 
 from .biped_batch import Biped
-from .env import METADATA, bodies_and_speeds, check_can_render, check_options, check_render_mode, spaces_of
-from .physics.rendering import Camera
+from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
 from .settings import BipedSettings, settings_from
-from .step_result import INFO, StepResult
+from .step_result import INFO, StepResult, report_start
 
 _NAMES = (*INFO, "termination")
+_MASKS = tuple(f"_{name}" for name in _NAMES)
 
 
-class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
+class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOverride]
+    Face, VectorEnv[NDArray, NDArray, NDArray]
+):
     """N of `SegmentedFootBiped` in one batched simulation: same settings, spaces, rewards and bits.
 
-    Environment i of a vector seeded with s does what `SegmentedFootBiped` seeded with s + i does.
+    Environment i of a vector seeded with s does what `SegmentedFootBiped` seeded with s + i does. Its info comes as
+    arrays (N,) by name, each with Gymnasium's mask `_name` (N,) of where it holds. `biped.model_of(i)` is its MuJoCo
+    model, `biped.data(i)` a copy of its state.
 
     Args:
         num_envs: number N of environments.
@@ -32,12 +36,11 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
             action and resets), "SameStep" (`final_obs`, `final_info` in the info), "Disabled"
             (`reset(options={"reset_mask": mask})` by the caller).
         num_threads: threads of the physics; any number gives the same bits.
-        max_episode_steps: number of steps after which an episode is truncated, if `episode_seconds` is longer.
+        max_episode_steps: number of steps after which an episode is truncated, if `episode_seconds` is longer;
+            `spec.max_episode_steps` is the lesser of the two.
         render_mode: "rgb_array" (a frame of each environment), "human" (a window that shows the first) or None.
         settings: as for `SegmentedFootBiped`.
     """
-
-    _camera: Camera | None = None
 
     def __init__(
         self,
@@ -64,9 +67,6 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
         self._started = False
-        everyone = np.ones(num_envs, bool)
-        everyone.flags.writeable = False  # it is handed out at every step in which no environment resets
-        self._all_true: dict[str, Any] = dict.fromkeys((*_NAMES, *(f"_{name}" for name in _NAMES)), everyone)
 
     @property
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -88,7 +88,8 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         """
         chosen = check_options(options, ("reset_mask",))
         given = bodies_and_speeds(chosen, self.num_envs)
-        ids = np.flatnonzero(self._reset_mask(chosen.get("reset_mask")))
+        mask = self._reset_mask(chosen.get("reset_mask"))
+        ids = np.flatnonzero(mask)
         seeds = self._spread(seed)
         for index in ids.tolist():
             if seeds[index] is not None or self._generators[index] is None:
@@ -97,7 +98,7 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         self._over[ids] = False
         if self.render_mode == "human":
             self.render()
-        return self.biped.observe(), {}
+        return self.biped.observe(), _infos(self._start_values(), np.zeros(self.num_envs, int), mask)
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Hold the stiffnesses that `actions` (N, 4) stand for during a step, 20 ms by default."""
@@ -110,30 +111,30 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         else:
             self._over = ended
         if np.count_nonzero(resetting):
-            infos = _masked(result, ~resetting) | (_final(result, ended) if same_step else {})
+            final = _final(result, ended) if same_step else {}
             self._restart(np.flatnonzero(resetting))
             observation = self.biped.observe()
+            values = np.where(resetting[:, None], self._start_values(), result.values)
+            infos = _infos(values, np.where(resetting, 0, result.termination)) | final
         else:
-            infos = self._all_true.copy()
-            infos.update(zip(_NAMES, (*result.values.T, result.termination.copy()), strict=True))
-            observation = result.observation
+            observation, infos = result.observation, _infos(result.values, result.termination.copy())
         if self.render_mode == "human":
             self.render()
         return observation, result.reward, result.terminated, result.truncated, infos
 
     def render(self) -> Any:
         """A tuple of N frames, uint8 (480, 640, 3); "human" draws the first environment and gives None."""
-        mode = check_can_render(self.render_mode)
-        self._camera = self._camera or Camera(self.biped.model, mode, self.metadata["render_fps"])
-        if mode == "human":
-            return self._camera.show(self.biped.data(0), self.biped.model_of(0))
-        biped, camera = self.biped, self._camera
+        camera, biped = self._camera_for(), self.biped
+        if self.render_mode == "human":
+            return camera.show(biped.data(0), biped.model_of(0))
         return tuple(camera.show(biped.data(index), biped.model_of(index)) for index in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:
         """Close the window, if any."""
-        if self._camera is not None:
-            self._camera.close()
+        self._close_camera()
+
+    def _start_values(self) -> NDArray:
+        return report_start(self.biped.measurement, self.biped.leg_phase)
 
     def _restart(
         self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
@@ -173,13 +174,22 @@ class SegmentedFootBipedVector(VectorEnv[NDArray, NDArray, NDArray]):
         return mask
 
 
-def _masked(result: StepResult, mask: NDArray) -> dict[str, Any]:
-    """Gymnasium's form of a vector's info: fresh arrays by name, and for each a mask `_name` of where it holds."""
-    if not np.count_nonzero(mask):
-        return {}
-    values, reasons = np.where(mask, result.values.T, 0.0), result.termination.copy()
-    reasons[~mask] = None
-    return dict(zip(_NAMES, (*values, reasons), strict=True)) | {f"_{name}": mask.copy() for name in _NAMES}
+def _infos(values: NDArray, termination: NDArray, mask: NDArray | None = None) -> dict[str, Any]:
+    """Gymnasium's form of a vector's info: arrays by name, and for each a mask `_name` of where it holds.
+
+    Args:
+        values: (N, len(INFO)) as `StepResult.values`; the infos are views of it.
+        termination: (N,) codes; handed out as they are.
+        mask: (N,) where they hold, everywhere if None; elsewhere they are 0.
+    """
+    if mask is None:
+        mask = np.ones(len(values), bool)
+    else:
+        values, termination, mask = np.where(mask[:, None], values, 0.0), np.where(mask, termination, 0), mask.copy()
+    mask.flags.writeable = False  # all names share it
+    infos: dict[str, Any] = dict.fromkeys(_MASKS, mask)
+    infos.update(zip(_NAMES, (*values.T, termination), strict=True))
+    return infos
 
 
 def _final(result: StepResult, ended: NDArray) -> dict[str, Any]:
@@ -190,7 +200,7 @@ def _final(result: StepResult, ended: NDArray) -> dict[str, Any]:
     return {
         "final_obs": last,
         "_final_obs": ended.copy(),
-        "final_info": _masked(result, ended.copy()),
+        "final_info": _infos(result.values, result.termination, ended),
         "_final_info": ended.copy(),
     }
 

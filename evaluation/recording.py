@@ -244,7 +244,7 @@ def _walk(
             observation = result.observation
             returns[rows][active] += result.reward[active]
             fell = active & result.terminated
-            reason[rows][fell] = result.info["termination"][fell]
+            reason[rows][fell] = result.reasons[fell]
             progress(float(active.sum()) * biped.dt)
             active &= ~(result.terminated | result.truncated)
     return ticks, returns, reason, series

@@ -8,6 +8,8 @@ import argparse
 import gymnasium as gym
 import numpy as np
 
+from springfoot.envs import TERMINATIONS
+
 
 def main() -> None:
     """Walk one episode and say how it went."""
@@ -31,7 +33,7 @@ def main() -> None:
         total += float(reward)
         work += info["work/equilibrium/ankle_left"]
         ended = terminated or truncated
-    print(f"{info['time']:.2f} s, {info['termination'] or 'no fall'}, return {total:.1f}")
+    print(f"{info['time']:.2f} s, {TERMINATIONS[info['termination']] or 'no fall'}, return {total:.1f}")
     print(f"left ankle: {info['stiffness/ankle_left']:.0f} N m/rad, {work:+.1f} J by moving its equilibrium")
     print("last step's reward terms:", {name: round(float(v), 3) for name, v in info.items() if "reward/" in name})
     env.close()

@@ -11,6 +11,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from springfoot.agents import SegmentedFootBipedVecEnv
+from springfoot.envs import TERMINATIONS
 
 
 def main() -> None:
@@ -44,8 +45,8 @@ def main() -> None:
     while not done[0]:
         action, _ = ppo.predict(envs.normalize_obs(cast(np.ndarray, observation)), deterministic=True)
         observation, _, done, infos = walk.step(action)
-    episode = infos[0]["episode"]
-    print(f"walked {0.02 * episode['l']:.2f} s, return {episode['r']:.1f}, {infos[0]['termination'] or 'no fall'}")
+    episode, reason = infos[0]["episode"], TERMINATIONS[infos[0]["termination"]]
+    print(f"walked {0.02 * episode['l']:.2f} s, return {episode['r']:.1f}, {reason or 'no fall'}")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import warnings
 from typing import Any
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
@@ -17,7 +18,9 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import DEFAULT_WEIGHTS, THEME_OF, THEMES, BipedSettings, settings_from, settings_to_json
+from springfoot.envs.step_result import INFO, TERMINATIONS
 from springfoot.envs.task.observation_entries import OBSERVATION
+from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.errors import SpringfootError
 
 ID = "springfoot.envs:SegmentedFootBiped-v0"
@@ -77,7 +80,24 @@ def test_docstring_lists_every_key_of_info():
     for key in info:
         stem = re.sub(rf"/({'|'.join(ACTIONS)}|{'|'.join(DEFAULT_WEIGHTS)})$", "/", key)
         assert f"`{stem}`" in text, key
-    assert all(isinstance(value, (float, str)) for value in info.values())
+    assert [(row[0], row[1]) for row in rows_of("Info")] == [
+        (str(code), name) for code, name in enumerate(TERMINATIONS)
+    ]
+    warnings = {name.removeprefix("mjWARN_") for name in mujoco.mjtWarning.__members__} - {"mjNWARNING"}
+    assert warnings == {name.removeprefix("diverged: ") for name in TERMINATIONS if name.startswith("diverged: ")}
+
+
+def test_info_is_numpy_numbers_under_the_same_keys_from_reset_and_step():
+    env = SegmentedFootBiped(start=0.25)
+    _, first = env.reset(seed=0)
+    *_, info = env.step(np.zeros(4, np.float32))
+    types = [(name, type(value)) for name, value in info.items()]
+    assert types == [*((name, np.float64) for name in INFO), ("termination", np.int64)]
+    assert types == [(name, type(value)) for name, value in first.items()]
+    env.reset(seed=0)
+    speed = env.biped.measurement.com_velocity[0, 0]
+    assert first == dict.fromkeys(info, 0.0) | {"phase/left": 0.25, "phase/right": 0.75, "speed": speed}
+    assert speed == pytest.approx(1.2, abs=0.3)
 
 
 # Env ----------------------------------------------------------------------------------------------------------
@@ -154,9 +174,9 @@ def test_a_fall_terminates_with_its_reason_and_no_reward():
         _, reward, terminated, truncated, info = env.step(np.zeros(4))
         if terminated:
             break
-        assert info["termination"] == ""
+        assert info["termination"] == 0
     assert terminated and not truncated
-    assert info["termination"].startswith("fell: ")
+    assert TERMINATIONS[info["termination"]].startswith("fell: ")
     assert reward == 0.0
     assert info["reward/alive"] == 0.0
 
@@ -190,6 +210,16 @@ BAD = [
     (lambda: SegmentedFootBiped().reset(options={"start": 1.2}), r"\[0, 1\)"),
     (lambda: SegmentedFootBiped().render(), "render_mode"),
 ]
+
+
+@pytest.mark.parametrize("maker", [SegmentedFootBiped, SegmentedFootBipedVector, make, make_vec])
+def test_an_unknown_setting_is_refused_as_python_refuses_an_unknown_argument(maker):
+    with pytest.raises(TypeError, match=r"got an unexpected keyword argument 'heigth', .*: height") as caught:
+        maker(heigth=1.8)
+    assert isinstance(caught.value, SpringfootError)
+    with pytest.raises(TypeError, match=r"unexpected keyword argument 'frameskip', .*: height, mass, ") as caught:
+        maker(frameskip=2)
+    assert "\n" not in str(caught.value)
 
 
 def started(env):

@@ -9,13 +9,12 @@ from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.physics.measurement import BODY_ROW, Measurement
 from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
+from springfoot.envs.task.episode_end import TOO_LOW, TOO_TILTED
 from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.envs.task.reward import (
     EXCESS_SHARE,
     FORCE_TOLERANCE,
     TERMS,
-    TOO_LOW,
-    TOO_TILTED,
     Task,
     judge,
     total,
@@ -275,10 +274,10 @@ def test_a_fall_is_a_low_hip_or_a_tilted_trunk(height):
     measured = setup.measurement(np.full(6, 0.2))
     measured.base[:, 1] = [limit * 1.001, limit * 0.999, 1.0, 1.0, np.nan, 1.0]
     measured.base[:, 2] = [0.0, 0.0, 0.799, -0.801, 0.0, np.nan]
-    expected = ["", TOO_LOW, "", TOO_TILTED, TOO_LOW, TOO_TILTED]
+    expected = [0, TOO_LOW, 0, TOO_TILTED, TOO_LOW, TOO_TILTED]
     assert list(setup.task(6).fallen(measured)) == expected
     alive = setup.terms(measured, np.full(6, 0.2))["alive"]
-    np.testing.assert_array_equal(alive, [reason == "" for reason in expected])
+    np.testing.assert_array_equal(alive, [code == 0 for code in expected])
 
 
 def test_a_diverged_simulation_is_not_alive(thesis_body):

@@ -5,6 +5,22 @@ import mujoco
 from ..physics.kernel import kernel
 from ..physics.measurement import Measurement
 
+TERMINATIONS = (
+    "",
+    "fell: hip too low",
+    "fell: trunk too tilted",
+    "diverged: INERTIA",
+    "diverged: CONTACTFULL",
+    "diverged: CNSTRFULL",
+    "diverged: BADQPOS",
+    "diverged: BADQVEL",
+    "diverged: BADQACC",
+    "diverged: BADCTRL",
+)
+"""Why an episode was terminated, by its code; 0 while it is not. A divergence has the name of MuJoCo's warning."""
+TOO_LOW, TOO_TILTED = 1, 2
+"""The codes of falls."""
+
 
 @kernel
 def average(rows, window_forces, running) -> None:
@@ -28,7 +44,7 @@ def average(rows, window_forces, running) -> None:
                     rows[i].force[side, contact, axis] = total / len(window_forces)
 
 
-def divergence(m: Measurement, index: int) -> str:
-    """Why a simulation that diverged did, by the name of MuJoCo's warning."""
+def divergence(m: Measurement, index: int) -> int:
+    """Why a simulation that diverged did, a code of `TERMINATIONS`."""
     warning = mujoco.mjtWarning(int(m.diverged[index]))
-    return f"diverged: {warning.name.removeprefix('mjWARN_')}"
+    return TERMINATIONS.index(f"diverged: {warning.name.removeprefix('mjWARN_')}")

@@ -19,7 +19,7 @@ from ..physics.kernel import kernel
 from ..physics.model import HIP, LEFT, RIGHT
 from ..settings import DEFAULT_WEIGHTS, BipedSettings
 from ..timing import ACTION_STEP
-from .episode_end import divergence
+from .episode_end import TOO_LOW, TOO_TILTED, divergence
 from .observation import HIGH, LOW, observe, units_of
 from .observation_entries import OBSERVATION
 from .reward_reference import body_scales, reference_curves
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 MAX_PITCH = 0.8
 """A trunk tilted further than this, forward or backward, is a fall [rad]; chosen: walking stays within 0.04 rad."""
-TOO_LOW, TOO_TILTED = "fell: hip too low", "fell: trunk too tilted"
 
 POSE_TOLERANCE = 0.02
 """Pose error E at which its reward is 1/e [rad^2]; chosen: 2.8 deg at every joint."""
@@ -179,8 +178,8 @@ class Task:
         self.rows = np.zeros(len(subjects.bodies), TASK_ROW)
         """(N,) all that the task keeps of each environment."""
         weights, seconds = [self.weights[name] for name in TERMS], settings.step_seconds
-        limit = settings.episode_seconds / seconds - 0.5  # times are sums of steps
-        self.options = np.array([(weights, seconds, seconds / ACTION_STEP, limit)], TASK_OPTIONS)
+        share, limit = seconds / ACTION_STEP, settings.max_episode_steps
+        self.options = np.array([(weights, seconds, share, limit)], TASK_OPTIONS)
         """(1,) of `TASK_OPTIONS`."""
         curves = {walk: reference_curves(walk.plan, walk.human, seconds) for _, walk in rows}
         self.table = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows])).table
@@ -212,13 +211,13 @@ class Task:
         return bodies["measured"]["com"] - self.tracking(bodies)[:, :2]
 
     def reasons(self, m: "Measurement", terminated: NDArray) -> NDArray:
-        """(N,) why an episode is `terminated` (N,), "" where it is not."""
-        reasons = np.where(terminated, self.fallen(m), "").astype(object)
+        """(N,) why an episode is `terminated` (N,), as codes of `TERMINATIONS`."""
+        reasons = np.where(terminated, self.fallen(m), 0)
         for index in np.flatnonzero(terminated & (m.diverged >= 0)).tolist():
             reasons[index] = divergence(m, index)
         return reasons
 
     def fallen(self, m: "Measurement") -> NDArray:
-        """Why each environment has fallen, a string array (N,): empty while it has not."""
-        tilted = np.where(np.abs(m.base[:, 2]) <= MAX_PITCH, "", TOO_TILTED)
+        """(N,) why each body has fallen, as codes of `TERMINATIONS`; 0 while it has not."""
+        tilted = np.where(np.abs(m.base[:, 2]) <= MAX_PITCH, 0, TOO_TILTED)
         return np.where(m.base[:, 1] >= self.rows["scales"]["min_hip_height"], tilted, TOO_LOW)
