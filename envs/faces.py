@@ -56,6 +56,7 @@ class Face:
     def _close_camera(self) -> None:
         if self._camera is not None:
             self._camera.close()
+            self._camera = None
 
 
 def spaces_of(biped: Biped) -> tuple[Box, Box]:

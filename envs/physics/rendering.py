@@ -1,7 +1,10 @@
 """Pictures of one body. No other module needs OpenGL, and this one only when a frame is asked for."""
 
+import atexit
+import threading
 import time
 import warnings
+import weakref
 from typing import Any
 
 import mujoco
@@ -14,6 +17,8 @@ WIDTH, HEIGHT = 640, 480
 """Size of a frame [pixels]."""
 CAMERA = "track"
 """Name of the model's camera, which follows the body's CoM."""
+CLOSING_SECONDS = 5.0
+"""Longest wait for a window to be gone [s]; chosen, it takes a few frames."""
 
 NO_GL = (
     "cannot render: no OpenGL here ({}). Without a screen install libosmesa6 or libegl1 and set MUJOCO_GL=osmesa or "
@@ -24,7 +29,8 @@ NO_GL = (
 class Camera:
     """Draws bodies, one model at a time, in a window ("human") or into arrays ("rgb_array").
 
-    Raises `SpringfootError` with a hint where there is no OpenGL, or no screen for a window.
+    Open one window at a time in a process: each draws in a thread of its own, and GLFW is not made for several. Raises
+    `SpringfootError` with a hint where there is no OpenGL, or no screen for a window.
     """
 
     def __init__(self, model: mujoco.MjModel, mode: str, frames_per_second: float) -> None:
@@ -32,6 +38,7 @@ class Camera:
         self._period = 1 / frames_per_second
         self._next_frame = 0.0
         self._window: Any = None
+        self._drawing: list[threading.Thread] = []
         self._renderer: Any = None
         self._open(model)
 
@@ -39,9 +46,10 @@ class Camera:
         self._model = model
         if self._mode == "human":
             self._data = mujoco.MjData(model)
-            self._window = _open_window(model, self._data)
+            self._window, self._drawing = _open_window(model, self._data)
         else:
             self._renderer = _renderer(model)
+        atexit.register(_close, weakref.ref(self))  # runs before what ends OpenGL, as that was registered earlier
 
     def show(self, data: mujoco.MjData, model: mujoco.MjModel | None = None) -> NDArray | None:
         """One frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time.
@@ -64,10 +72,22 @@ class Camera:
 
     def close(self) -> None:
         """Give back window and OpenGL context; a second call does nothing."""
-        for drawing in (self._window, self._renderer):
-            if drawing is not None:
-                drawing.close()
+        if self._renderer is not None:
+            self._renderer.close()
+        if self._window is not None:
+            self._window.close()
+            for thread in self._drawing:
+                thread.join(CLOSING_SECONDS)
         self._window = self._renderer = None
+
+    def __del__(self) -> None:
+        self.close()
+
+
+def _close(camera: "weakref.ref[Camera]") -> None:
+    still_there = camera()
+    if still_there is not None:
+        still_there.close()
 
 
 def _renderer(model: mujoco.MjModel) -> Any:
@@ -77,7 +97,9 @@ def _renderer(model: mujoco.MjModel) -> Any:
         raise SpringfootError(NO_GL.format(_first_line(error))) from None
 
 
-def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
+def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Any, list[threading.Thread]]:
+    """A window, and the thread that draws it, where it has one of its own."""
+    others = threading.enumerate()
     try:
         import glfw
         import mujoco.viewer
@@ -87,12 +109,13 @@ def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Any:
             if not glfw.init():  # without this check launch_passive would wait for ever
                 raise RuntimeError("no screen")
         window = mujoco.viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+        drawing = [thread for thread in threading.enumerate() if thread not in others and thread.daemon]
     except Exception as error:
         raise SpringfootError(NO_GL.format(_first_line(error))) from None
     with window.lock():
         window.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         window.cam.fixedcamid = model.camera(CAMERA).id
-    return window
+    return window, drawing
 
 
 def _first_line(error: Exception) -> str:
