@@ -63,7 +63,6 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self.single_observation_space, self.single_action_space = spaces_of(self.biped)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
         self._started = False
@@ -71,7 +70,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
     @property
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The generator of each environment; None before its first reset."""
-        return tuple(self._generators)
+        return tuple(self.biped.generators)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -90,10 +89,10 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         given = bodies_and_speeds(chosen, self.num_envs)
         mask = self._reset_mask(chosen.get("reset_mask"))
         ids = np.flatnonzero(mask)
-        seeds = self._spread(seed)
+        seeds, generators = self._spread(seed), self.biped.generators
         for index in ids.tolist():
-            if seeds[index] is not None or self._generators[index] is None:
-                self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
+            if seeds[index] is not None or generators[index] is None:
+                generators[index], self._seeds[index] = seeding.np_random(seeds[index])
         self._restart(ids, chosen.get("start"), given)
         self._over[ids] = False
         if self.render_mode == "human":
@@ -140,13 +139,13 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
     ) -> None:
         given = {name: values[ids] for name, values in (given or {}).items()}
-        self.biped.reset(ids, [self._generators[index] for index in ids], start, given)
+        self.biped.reset(ids, [None] * len(ids), start, given)  # each goes on with its generator
 
     def _check_running(self) -> None:
         """Raise `SpringfootError` if an environment has to be reset before it can step."""
         if self._started and self.autoreset_mode is not AutoresetMode.DISABLED:
             return
-        waiting = np.array([generator is None for generator in self._generators])
+        waiting = np.array([generator is None for generator in self.biped.generators])
         if self.autoreset_mode is AutoresetMode.DISABLED:
             waiting |= self._over
         if waiting.any():
