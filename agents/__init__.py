@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from .baselines import BASELINES, PolicyFunction, baseline
 from .config import PRESETS, TrainingConfig
-from .policy import Policy, load_policy, save_policy
+from .conversion import policy_from_mlp, policy_from_sb3
+from .export import export_policy
+from .foreign_policy import ForeignPolicy
+from .policy import Policy, load_policy, read_policy, save_policy
 
 if TYPE_CHECKING:
     from .multi_seed import train_seeds
@@ -19,12 +22,17 @@ if TYPE_CHECKING:
 __all__ = [
     "BASELINES",
     "PRESETS",
+    "ForeignPolicy",
     "Policy",
     "PolicyFunction",
     "SegmentedFootBipedVecEnv",
     "TrainingConfig",
     "baseline",
+    "export_policy",
     "load_policy",
+    "policy_from_mlp",
+    "policy_from_sb3",
+    "read_policy",
     "resume",
     "save_policy",
     "train",

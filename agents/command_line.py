@@ -32,6 +32,6 @@ def policy_label(name: str) -> str:
     if kind == FROZEN and other:
         return f"{FROZEN}-{policy_label(other)}"
     path = Path(name)
-    if path.suffix != ".safetensors":
+    if path.suffix not in (".safetensors", ".onnx"):
         return path.resolve().name.replace(":", "-").replace(",", "-")
     return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem

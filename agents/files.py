@@ -5,7 +5,7 @@ import io
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
@@ -25,6 +25,28 @@ def write_atomically(path: Path, content: bytes) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def write_new(contents: Mapping[Path, bytes]) -> None:
+    """Write several new files, all of them or none; raise `SpringfootError`, with nothing written, if one exists."""
+    require_new_files(contents)
+    written: list[Path] = []
+    try:
+        for path, content in contents.items():
+            make_folder(path.parent)
+            write_atomically(path, content)
+            written.append(path)
+    except BaseException:
+        for path in written:
+            path.unlink(missing_ok=True)
+        raise
+
+
+def require_new_files(paths: Iterable[Path]) -> None:
+    """Raise `SpringfootError` if one of these files exists."""
+    for path in paths:
+        if path.exists():
+            raise SpringfootError(f"{path} already exists; out must be a new file")
 
 
 @contextmanager

@@ -4,28 +4,25 @@ The file's header has one entry, `springfoot`, whose JSON says what the tensors 
 where or when it was made. `Policy` needs NumPy only, so a policy runs where no learner is installed.
 """
 
-import hashlib
 import json
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save as to_safetensors
 
 from springfoot.envs.biped_batch import Biped
-from springfoot.envs.control.equilibrium import foot_curves
-from springfoot.envs.control.foot_springs import stiffness_of
-from springfoot.envs.control.leg_controller import leg_curves
-from springfoot.envs.control.reference_walk import rows
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
 
 from .files import write_atomically
+from .fingerprint import fingerprint, require_same
+from .foreign_policy import ForeignPolicy, function_policy, is_function, observation_rows, onnx_policy
+from .numpy_player import ACTIVATIONS
 
 FORMAT_VERSION = 1
 """Version of the file layout; a reader refuses any other."""
@@ -35,22 +32,19 @@ VARIANCE_FLOOR = 1e-8
 """Added to each observation's variance before the root, as in stable-baselines3's VecNormalize."""
 
 
+Output = Literal["clip", "tanh"]
+"""What makes an action in [-1, 1] of the last layer's output, as PPO does (clip) or SAC (tanh)."""
+
+
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
 RUN = "run.json"
 """Name of a run folder's record: configuration, evaluations, status."""
 
 
-_MODEL_NUMBERS = (
-    *("body_mass", "body_inertia", "body_pos", "body_ipos", "jnt_range", "jnt_actfrcrange", "dof_damping"),
-    *("dof_armature", "geom_size", "geom_pos", "pair_friction", "pair_solref", "pair_solreffriction", "pair_solimp"),
-    "actuator_gainprm",
-)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Policy:
-    """A deterministic policy: normalised observation -> tanh layers -> mean action, clipped to [-1, 1].
+    """A deterministic policy: normalised observation -> layers -> mean action in [-1, 1].
 
     Calling it maps observations (N, D), or one (D,), to actions (N, 4) or (4,), float32. The result of a row
     does not depend on the other rows. Raises `SpringfootError` for another width or for an observation that
@@ -69,8 +63,14 @@ class Policy:
     """Of the observations in training, shape (D,)."""
     observation_variance: np.ndarray
     """Of the observations in training, shape (D,)."""
-    observation_clip: float = 10.0
-    """Largest magnitude of a normalised observation."""
+    observation_clip: float | None = 10.0
+    """Largest magnitude of a normalised observation; None for no limit."""
+    variance_floor: float = VARIANCE_FLOOR
+    """Added to each variance before the root."""
+    activation: str = "tanh"
+    """Name of what stands between the layers, one of `ACTIVATIONS`."""
+    output: Output = "clip"
+    """What makes actions of the last layer's output."""
 
     @property
     def layer_sizes(self) -> list[int]:
@@ -84,53 +84,31 @@ class Policy:
             "format_version": FORMAT_VERSION,
             "network": {
                 "layer_sizes": self.layer_sizes,
-                "activation": "tanh",
+                "activation": self.activation,
+                "output": self.output,
                 "observation_clip": self.observation_clip,
-                "variance_floor": VARIANCE_FLOOR,
+                "variance_floor": self.variance_floor,
             },
             "settings": settings_to_json(self.settings),
             "fingerprint": self.fingerprint,
         }
 
+    @property
+    def observation_deviation(self) -> np.ndarray:
+        """(D,) what the distance of an observation from its mean is divided by."""
+        return np.sqrt(self.observation_variance + self.variance_floor)
+
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Mean actions (N, 4) in [-1, 1] for observations (N, D)."""
-        rows = np.asarray(observation, dtype=np.float64)
-        if rows.ndim not in (1, 2) or rows.shape[-1] != len(self.observation_mean):
-            raise SpringfootError(f"observations must be (N, {len(self.observation_mean)}), got {rows.shape}")
-        if not np.isfinite(rows).all():
-            raise SpringfootError("observations must be finite, got NaN or infinity")
-        deviation = np.sqrt(self.observation_variance + VARIANCE_FLOOR)
-        rows = ((rows - self.observation_mean) / deviation).clip(-self.observation_clip, self.observation_clip)
+        rows = observation_rows(observation, len(self.observation_mean))
+        rows = (rows - self.observation_mean) / self.observation_deviation
+        if self.observation_clip is not None:
+            rows = rows.clip(-self.observation_clip, self.observation_clip)
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            rows = np.tanh(rows) if layer else rows
+            rows = ACTIVATIONS[self.activation](rows) if layer else rows
             # einsum adds in the same order for any N; BLAS does not, and a batch must equal its rows alone.
             rows = np.einsum("...i,oi->...o", rows, weight.astype(np.float64), optimize=False) + bias
-        return rows.clip(-1.0, 1.0).astype(np.float32)
-
-
-def fingerprint(biped: Biped) -> dict[str, str]:
-    """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
-
-    The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed.
-    Numbers count to six significant digits, so that compilers and processors agree.
-    """
-    model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
-    numbers: list[Any] = []
-    for legs, walk in rows(biped.walks):
-        curves = (leg_curves(legs, walk), *foot_curves(biped.settings, legs, walk))
-        numbers += [*asdict(legs).values(), *(curve[::50] for curve in curves)]
-    return {
-        "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
-        "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),
-        "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
-        "legs": _digest(asdict(biped.constants[0]), *numbers),
-    }
-
-
-def _digest(names: Iterable[str], *numbers: Any) -> str:
-    values = np.concatenate([np.ravel(item).astype(np.float64) for item in numbers])
-    values[np.abs(values) < 1e-9] = 0.0  # rounding noise has no significant digits
-    return hashlib.sha256(" ".join([*names, *(f"{value:.6g}" for value in values)]).encode()).hexdigest()
+        return (np.tanh(rows) if self.output == "tanh" else rows.clip(-1.0, 1.0)).astype(np.float32)
 
 
 def save_policy(path: str | Path, policy: Policy) -> None:
@@ -158,12 +136,29 @@ def find_policy(name: str | Path) -> Path:
             raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of train.py")
         path /= BEST
     elif not path.is_file():
-        raise SpringfootError(f"no policy {name}: give a .safetensors file, a run folder or 'pretrained'")
+        raise SpringfootError(
+            f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'"
+        )
     return path
 
 
-def load_policy(name: str | Path) -> Policy:
-    """The policy in a file, a run folder (its best) or `pretrained`, checked against this springfoot.
+_NUMBERS = ("observation_clip", "variance_floor")
+
+
+def load_policy(name: str | Path) -> Policy | ForeignPolicy:
+    """The policy in a file, a run folder (its best), `pretrained`, or the function that `module:function` names.
+
+    A .safetensors file is read by `read_policy`, an .onnx file by `onnx_policy`; neither executes anything. Only a
+    `name` that is a text of the form `module:function` runs code: `function_policy` imports that module.
+    """
+    if isinstance(name, str) and is_function(name):
+        return function_policy(name)
+    path = find_policy(name)
+    return onnx_policy(path) if path.suffix == ".onnx" else read_policy(name)
+
+
+def read_policy(name: str | Path) -> Policy:
+    """The policy in a .safetensors file, a run folder (its best) or `pretrained`, checked against this springfoot.
 
     Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of
     another format version, incomplete or not finite, or made for other spaces, another model or other legs than
@@ -177,24 +172,22 @@ def load_policy(name: str | Path) -> Policy:
         )
     try:
         network, values = header["network"], header["settings"]
-        clip, sizes = float(network["observation_clip"]), list(network["layer_sizes"])
+        clip, floor = (None if network[key] is None else float(network[key]) for key in _NUMBERS)
+        activation, output, sizes = network["activation"], network.get("output", "clip"), list(network["layer_sizes"])
         stored = dict(header["fingerprint"])
         settings = settings_from(**values)
         biped = Biped(settings, 1)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         what = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {what}") from None
-    if network.get("activation") != "tanh" or network.get("variance_floor") != VARIANCE_FLOOR or not clip > 0:
+    known = activation in ACTIVATIONS and output in get_args(Output)
+    if not known or floor is None or not floor >= 0 or not (clip is None or clip > 0):
         raise SpringfootError(f"{name}: its header asks for a network this version does not have: {network}")
     if len(sizes) < 2 or (sizes[0], sizes[-1]) != (len(biped.observation_names), len(biped.action_names)):
         raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to action")
     _check_tensors(name, tensors, sizes)
     current = fingerprint(biped)
-    if different := [part for part in current if current[part] != stored.get(part)]:
-        raise SpringfootError(
-            f"{name} was trained on another version of this environment: other {' and '.join(different)}; "
-            "train it again, or use the version of springfoot it came from"
-        )
+    require_same(name, stored, current)
     layers = range(len(sizes) - 1)
     return Policy(
         settings=settings,
@@ -204,6 +197,9 @@ def load_policy(name: str | Path) -> Policy:
         observation_mean=tensors["observation.mean"],
         observation_variance=tensors["observation.variance"],
         observation_clip=clip,
+        variance_floor=floor,
+        activation=activation,
+        output=output,
     )
 
 

@@ -17,13 +17,8 @@ from springfoot.envs.timing import ACTION_STEP
 from springfoot.gait.errors import SpringfootError
 
 from .config import TrainingConfig
+from .conversion import actor_of, ignoring_unvaried
 from .policy import Policy
-
-NEVER_VARIED = 1e-6
-"""Variance below which an observation told the policy nothing in training [unit squared]; one that varies has more than
-1e-5."""
-IGNORED = 1e12
-"""Variance that such an observation gets in the policy, so that no value of it reaches the network."""
 
 
 class Learner:
@@ -64,20 +59,19 @@ class Learner:
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
         """The actor's mean actions as they are now, with the observation statistics as they are now."""
-        network = self.ppo.policy
-        hidden = [layer for layer in network.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
-        layers = [*hidden, network.action_net]
+        layers, _, _ = actor_of(self.ppo.policy)
         # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         seen = self._statistics()["observation"]
-        variance = np.where(seen.var < NEVER_VARIED, IGNORED, seen.var)
-        return Policy(
-            settings=self._environment,
-            fingerprint=fingerprint,
-            weights=tuple(layer.weight.detach().numpy().copy() for layer in layers),
-            biases=tuple(layer.bias.detach().numpy().copy() for layer in layers),
-            observation_mean=seen.mean.copy(),
-            observation_variance=variance,
-            observation_clip=self.normalized.clip_obs,
+        return ignoring_unvaried(
+            Policy(
+                settings=self._environment,
+                fingerprint=fingerprint,
+                weights=tuple(weight.detach().numpy().copy() for weight, _ in layers),
+                biases=tuple(bias.detach().numpy().copy() for _, bias in layers),
+                observation_mean=seen.mean.copy(),
+                observation_variance=seen.var,
+                observation_clip=self.normalized.clip_obs,
+            )
         )
 
     def state(self) -> dict[str, np.ndarray]:

@@ -30,7 +30,8 @@ from springfoot.gait.errors import SpringfootError
 
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
-from .policy import BEST, LAST, RUN, fingerprint, load_policy, read_tensors, save_policy
+from .fingerprint import fingerprint
+from .policy import BEST, LAST, RUN, read_policy, read_tensors, save_policy
 from .ppo import Learner
 from .progress import Progress
 from .sb3_vec_env import SegmentedFootBipedVecEnv
@@ -80,7 +81,7 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     done = header.get("timesteps")
     if type(done) is not int or done < 0:
         raise SpringfootError(f"{out / STATE} does not say how many timesteps it has done")
-    load_policy(out / LAST)  # raises for a policy of another version of the environment
+    read_policy(out / LAST)  # raises for a policy of another version of the environment
     total = config.timesteps if timesteps is None else done + timesteps
     if total <= done:
         raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")

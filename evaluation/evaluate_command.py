@@ -23,7 +23,8 @@ class EvaluateFlags:
     """
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
-    """A .safetensors file, a run folder (its best policy), or one of: pretrained, untrained, random,
+    """A .safetensors or .onnx file, a run folder (its best policy), module:function (your own code, of observations
+    (N, D) or (D,); it is imported and run), or one of: pretrained, untrained, random,
     constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule;
     schedule:FACTOR for a multiple), quasi_stiffness, thesis, thesis_printed. frozen:POLICY is a trained policy's mean
     stiffness over the stride, played open loop at the same equilibrium."""

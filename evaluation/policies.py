@@ -1,7 +1,7 @@
 """A policy by its name, and the environment it is evaluated in: the one place where names of policies are understood.
 
-A name is a .safetensors file, a run folder (its best policy), `pretrained`, a baseline (`springfoot.agents.baselines`),
-or `frozen:POLICY`, the open-loop copy of one that was trained.
+A name is a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `module:function`, a baseline
+(`springfoot.agents.baselines`), or `frozen:POLICY`, the open-loop copy of one that was trained.
 """
 
 from dataclasses import replace
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from springfoot.agents.baselines import BASELINES, FROZEN, PolicyFunction, baseline, has_feedback, own_settings
+from springfoot.agents.foreign_policy import is_function
 from springfoot.agents.policy import load_policy
 from springfoot.envs.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
@@ -23,8 +24,9 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -
     """A policy by name and the environment it is evaluated in.
 
     Args:
-        name: a .safetensors file, a run folder (its best policy), `pretrained`, a baseline of `agents.baselines`, or
-            `frozen:POLICY`, the mean K of one of the first three, which first walks for it (`open_loop_copy`).
+        name: a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `module:function`, a baseline
+            of `agents.baselines`, or `frozen:POLICY`, the mean K of one of the first four, which first walks for it
+            (`open_loop_copy`).
         given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
         seed: of the baseline `random`.
         threads: of the physics where a copy is made; any number gives the same bits.
@@ -38,10 +40,11 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -
         conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
         settings = settings_from(**(own_settings(name, conditions) | wanted))
         return baseline(name, settings, seed), settings
-    if name != "pretrained" and not Path(name).exists():
+    if name != "pretrained" and not Path(name).exists() and not is_function(name):
         known = ", ".join(["pretrained", *BASELINES])
         raise SpringfootError(
-            f"no policy {name!r}: give a .safetensors file, a run folder, or one of {known}, or {FROZEN}:POLICY"
+            f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, module:function, or one of {known}, "
+            f"or {FROZEN}:POLICY"
         )
     policy = load_policy(name)
     return policy, settings_from(**(settings_to_json(policy.settings) | wanted))

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .study import Study
 
-HELP = """usage: springfoot {train,evaluate,study} ...
+HELP = """usage: springfoot {train,evaluate,export,study} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
+  springfoot export POLICY          write it as a file that runs without springfoot: ONNX, torch or NumPy
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
 
 Each takes --help."""
@@ -62,6 +63,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 from springfoot.evaluation.evaluate_command import evaluate_main
 
                 return evaluate_main(rest, "springfoot evaluate")
+            case ["export", *rest]:
+                from springfoot.agents.export_command import export_main
+
+                return export_main(rest, "springfoot export")
             case ["study", *rest]:
                 return study_main(rest)
             case [] | ["-h" | "--help"]:
@@ -78,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
-    print(f"springfoot: error: no command {words[0]!r}; there are train, evaluate and study", file=sys.stderr)
+    print(f"springfoot: error: no command {words[0]!r}; there are train, evaluate, export and study", file=sys.stderr)
     return 2
 
 

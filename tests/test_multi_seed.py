@@ -12,7 +12,7 @@ import pytest
 import train
 from springfoot.agents import multi_seed as seeds
 from springfoot.agents import train_command
-from springfoot.agents.policy import BEST, load_policy
+from springfoot.agents.policy import BEST, read_policy
 
 SCRIPT, RUN = Path(train.__file__), "run.json"
 SHORT = [
@@ -94,7 +94,7 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
     assert record["status"] == "interrupted"
     assert record["seeds"][0]["status"] == "interrupted" and record["seeds"][0]["timesteps"] >= 1024
     assert record["seeds"][1]["status"] in ("interrupted", "not begun")
-    assert load_policy(folder / "seed-0").observation_mean.shape
+    assert read_policy(folder / "seed-0").observation_mean.shape
 
 
 def test_ctrl_c_before_anything_runs_is_no_failure(tmp_path):

@@ -178,7 +178,8 @@ ERRORS = [
     ),
     (
         "frozen:nobody",
-        f"no policy 'nobody': give a .safetensors file, a run folder, or one of pretrained, {', '.join(BASELINES)}, "
+        "no policy 'nobody': give a .safetensors or .onnx file, a run folder, module:function, or one of pretrained, "
+        f"{', '.join(BASELINES)}, "
         "or frozen:POLICY",
     ),
 ]

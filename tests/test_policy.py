@@ -9,7 +9,8 @@ import pytest
 from safetensors.numpy import load, save
 
 from springfoot.agents.files import write_atomically
-from springfoot.agents.policy import Policy, fingerprint, load_policy, save_policy
+from springfoot.agents.fingerprint import fingerprint
+from springfoot.agents.policy import Policy, load_policy, read_policy, save_policy
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.settings import BipedSettings, settings_from
@@ -41,7 +42,7 @@ def observations(policy):
 
 def test_a_saved_policy_acts_the_same_to_the_bit(policy, observations, tmp_path):
     save_policy(tmp_path / "policy.safetensors", policy)
-    again = load_policy(tmp_path / "policy.safetensors")
+    again = read_policy(tmp_path / "policy.safetensors")
     assert np.array_equal(again(observations), policy(observations))
     assert again.settings == SETTINGS
     assert again.header == policy.header
@@ -130,7 +131,10 @@ def changed(policy, path, header=None, tensors=None):
         ({"settings": {"mass": -1.0}}, {}, "mass must be"),
         ({"settings": [1]}, {}, "header is not valid"),
         ({"network": {}}, {}, "header has no 'observation_clip'"),
-        ({"network": {"observation_clip": 10, "layer_sizes": [3, 4], "activation": "relu"}}, {}, "network"),
+        ({"network": NETWORK | {"layer_sizes": [3, 4], "activation": "gelu"}}, {}, "a network this version does not"),
+        ({"network": NETWORK | {"layer_sizes": [3, 4], "output": "sign"}}, {}, "a network this version does not"),
+        ({"network": NETWORK | {"layer_sizes": [3, 4], "variance_floor": -1}}, {}, "a network this version does not"),
+        ({"network": NETWORK | {"layer_sizes": [3, 4], "observation_clip": 0}}, {}, "a network this version does not"),
         ({"network": NETWORK | {"layer_sizes": []}}, {}, r"layers \[\] do not lead from observation to action"),
         ({"network": NETWORK | {"layer_sizes": [3, 4]}}, {}, r"layers \[3, 4\] do not lead"),
         ({"fingerprint": None}, {}, "header is not valid"),

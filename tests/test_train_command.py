@@ -16,7 +16,7 @@ import train
 from springfoot.agents import train_command
 from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.flags import SettingsFlags, given
-from springfoot.agents.policy import load_policy
+from springfoot.agents.policy import read_policy
 from springfoot.envs.settings import THEME_OF, THEMES, BipedSettings
 
 SCRIPT, RUN = Path(train.__file__), "run.json"
@@ -140,7 +140,7 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
     assert "0 of 1,024 steps · return " in progress and "1,024 of 1,024 steps · return " in progress
     assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
     assert f"springfoot evaluate {tmp_path / 'run'}" in out
-    assert load_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
+    assert read_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -163,7 +163,7 @@ def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number)
     assert f"springfoot train --resume {folder}" in out
     record = json.loads((folder / RUN).read_text())
     assert record["status"] == "interrupted"
-    policy = load_policy(folder)
+    policy = read_policy(folder)
     action = policy(policy.observation_mean)
     assert action.shape == (4,) and (abs(action) <= 1).all()
     if number == signal.SIGINT:

@@ -1,0 +1,295 @@
+"""Exported policies: the same actions and stiffness in onnxruntime, torch and NumPy, and the walk they make."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+
+from springfoot.agents import Policy, export_policy, load_policy, numpy_player, policy_from_mlp, read_policy
+from springfoot.agents.contract import contract_of
+from springfoot.agents.export import FORMATS
+from springfoot.agents.numpy_player import ACTIVATIONS
+from springfoot.agents.policy import Output
+from springfoot.agents.training import evaluate_returns
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.settings import settings_from, settings_to_json
+from springfoot.envs.task.observation import OBSERVATION
+from springfoot.gait.errors import SpringfootError
+from springfoot.studies.command import main
+
+D = len(OBSERVATION)
+LOW, HIGH = np.array([(entry.low, entry.high) for entry in OBSERVATION]).T
+
+
+def play_onnx(path):
+    session = onnxruntime.InferenceSession(path)
+    return lambda rows: session.run(None, {"observation": rows})
+
+
+def play_torch(path):
+    program = torch.export.load(path).module()
+    return lambda rows: [part.numpy() for part in program(torch.from_numpy(rows))]
+
+
+def play_numpy(path):
+    """By the player that was written beside the file."""
+    spec = importlib.util.spec_from_file_location("player", path.with_name(f"play_{path.stem}.py"))
+    assert spec is not None and spec.loader is not None
+    player = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(player)
+    return player.load(path)
+
+
+PLAY = {"onnx": play_onnx, "torch": play_torch, "numpy": play_numpy}
+
+
+def exported(policy, folder, to):
+    """The file, run as its users run it."""
+    out = folder / f"walk{FORMATS[to]}"
+    export_policy(policy, out, to)
+    return PLAY[to](out)
+
+
+def observations(policy):
+    """10 000: at the ends of their bounds, beyond the clip of the normalised ones, zeros, anywhere, and as walked."""
+    random = np.random.default_rng(0)
+    rows = random.uniform(LOW, HIGH, (10_000, D))
+    rows[:2000] = np.where(random.random((2000, D)) < 0.5, LOW, HIGH)
+    reach = np.minimum(policy.observation_deviation, 1.0)
+    for first, size in ((2000, 1.0), (4000, 0.1), (6000, 12.0)):
+        rows[first : first + 2000] = policy.observation_mean + size * reach * random.normal(size=(2000, D))
+    rows[0], rows[1], rows[2], rows[3] = LOW, HIGH, 0.0, policy.observation_mean
+    return rows.astype(np.float32)
+
+
+def drawn(activation="tanh", output: Output = "clip", sizes=(D, 48, 24, 4), clip: float | None = 10.0, **settings):
+    """A policy of random weights that reaches both ends of its actions."""
+    random = np.random.default_rng(2)
+    layers = [(random.normal(0, 1 / np.sqrt(i), (o, i)), random.normal(0, 0.2, o)) for i, o in pairwise(sizes)]
+    layers[-1] = (0.5 * layers[-1][0], layers[-1][1])
+    return policy_from_mlp(
+        layers,
+        settings,
+        activation=activation,
+        output=output,
+        observation_mean=random.normal(size=D),
+        observation_variance=np.where(np.arange(D) % 7, random.uniform(0.5, 2.0, D), 1e-6 if clip else 1.0),
+        observation_clip=clip,
+    )
+
+
+POLICIES = {
+    "pretrained": lambda: read_policy("pretrained"),
+    **{name: lambda name=name: drawn(name) for name in ACTIVATIONS},
+    "as SAC": lambda: drawn("relu", "tanh", height=1.9, mass=90.0),
+    "without clip": lambda: drawn("elu", sizes=(D, 16, 4), clip=None),
+    "linear": lambda: drawn(sizes=(D, 4)),
+    "ankle": lambda: drawn(stiffness_joints="ankle", ankle_stiffness_range=(30.0, 700.0)),
+    "residual": lambda: drawn(action_mode="residual"),
+}
+
+
+@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("name", POLICIES)
+def test_an_export_acts_as_the_policy_does(name, to, tmp_path):
+    policy = POLICIES[name]()
+    rows, play = observations(policy), exported(policy, tmp_path, to)
+    action, sets = play(rows)
+    expected = policy(rows)
+    assert action.shape == (10_000, 4) and np.abs(action - expected).max() <= 1e-5
+    assert expected.std() > 0.2 and np.abs(expected).max() > 0.99
+    contract = json.loads((tmp_path / f"walk{FORMATS[to]}.json").read_text())
+    (entry,) = (contract[key] for key in ("stiffness", "stiffness_factor") if key in contract)
+    columns = [ACTIONS.index(each["name"]) for each in entry["entries"]]
+    low, high = np.array([(each["low"], each["high"]) for each in entry["entries"]]).T
+    scaled = low * (high / low) ** (0.5 * (expected[:, columns] + 1.0))
+    assert sets.shape == scaled.shape and np.abs(sets / scaled - 1.0).max() <= 3e-5
+    alone, _ = play(rows[:1])
+    assert alone.shape == (1, 4) and alone == pytest.approx(expected[:1], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"height": 1.9, "mass": 90.0, "carried_ratio": 0.2}, {"stiffness_joints": "toe"}]
+)
+def test_the_stiffness_is_what_the_environment_sets_in_the_body_of_the_contract(settings, tmp_path):
+    policy = drawn(**settings)
+    biped = Biped(policy.settings, 3)
+    biped.reset(np.arange(3), [0, 1, 2])
+    rows = biped.observe()
+    _, stiffness = exported(policy, tmp_path, "numpy")(rows)
+    contract = contract_of(policy)
+    body, load = contract["body"], policy.settings.carried_ratio * policy.settings.mass
+    own = (policy.settings.mass + load) / body["mass_kg"] * policy.settings.height / body["height_m"]
+    result = biped.step(policy(rows))
+    for column, entry in enumerate(contract["stiffness"]["entries"]):
+        set_to = result.info[f"stiffness/{entry['name']}"]
+        assert set_to == pytest.approx(stiffness[:, column] * own, rel=1e-6)
+
+
+def test_a_residual_export_says_which_schedule_its_factor_multiplies(tmp_path):
+    policy = drawn(action_mode="residual", height=1.9, mass=90.0)
+    biped = Biped(policy.settings, 8)
+    biped.reset(np.arange(8), list(range(8)))
+    rows, phase = biped.observe(), biped.leg_phase[:, 0]
+    _, factor = exported(policy, tmp_path, "numpy")(rows)
+    schedule = contract_of(policy)["schedule"]
+    assert schedule["speed_m_s"] == [1.2]
+    ankle = np.interp(phase, np.arange(100) / 100, schedule["ankle"][0], period=1.0)
+    own = 90.0 / 63.0 * 1.9 / 1.7
+    assert biped.step(policy(rows)).info["stiffness/ankle_left"] == pytest.approx(factor[:, 0] * ankle * own, rel=1e-6)
+
+
+def test_the_contract_names_everything_in_its_order_and_nothing_of_where_or_when():
+    policy = read_policy("pretrained")
+    contract = contract_of(policy)
+    assert [entry["name"] for entry in contract["observation"]["entries"]] == [entry.name for entry in OBSERVATION]
+    assert [entry["name"] for entry in contract["action"]["entries"]] == list(ACTIONS)
+    ends = {entry["name"]: (entry["low"], entry["high"]) for entry in contract["stiffness"]["entries"]}
+    assert ends["ankle_left"] == policy.settings.ankle_stiffness_range
+    assert ends["toe_right"] == policy.settings.toe_stiffness_range
+    assert settings_from(**contract["settings"]) == policy.settings and contract["step_seconds"] == 0.02
+    assert contract["fingerprint"] == policy.fingerprint
+    assert set(contract) == {
+        *("contract_version", "observation", "action", "stiffness", "body", "step_seconds", "network", "settings"),
+        *("fingerprint", "versions"),
+    }
+
+
+def test_exporting_twice_gives_the_same_bytes(tmp_path):
+    policy = drawn()
+    for folder in ("one", "two"):
+        for to in ("onnx", "numpy"):
+            export_policy(policy, tmp_path / folder / f"walk{FORMATS[to]}", to)
+    names = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert names == ["play_walk.py", "walk.npz", "walk.npz.json", "walk.onnx", "walk.onnx.json"]
+    assert all((tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes() for name in names)
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_the_walk_that_an_export_makes_earns_what_the_policys_does(to, tmp_path):
+    policy = read_policy("pretrained")
+    alone = dict.fromkeys(("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg"))
+    settings = settings_from(**(settings_to_json(policy.settings) | alone | {"episode_seconds": 10.0}))
+    biped, play = Biped(settings, 8), exported(policy, tmp_path, to)
+    ours, _, fell = evaluate_returns(biped, policy, 0)
+    theirs, _, they_fell = evaluate_returns(biped, lambda rows: np.asarray(play(rows)[0]), 0)
+    assert theirs.mean() == pytest.approx(ours.mean(), rel=0.005)
+    assert np.array_equal(fell, they_fell)
+
+
+def test_the_onnx_file_is_a_policy_again_with_the_settings_it_was_trained_in(tmp_path):
+    policy = drawn(speed=1.3, action_mode="residual")
+    out = tmp_path / "walk.onnx"
+    export_policy(policy, out, "onnx")
+    again, rows = load_policy(out), observations(policy)
+    assert again.settings == policy.settings and np.abs(again(rows) - policy(rows)).max() <= 1e-5
+    assert again(rows[0]).shape == (4,)
+    out.with_name("walk.onnx.json").unlink()  # it carries its contract
+    assert load_policy(out).settings == policy.settings
+
+
+def test_torch_and_the_player_need_no_springfoot(tmp_path):
+    policy = drawn()
+    for to in ("torch", "numpy"):
+        export_policy(policy, tmp_path / f"walk{FORMATS[to]}", to)
+    rows = observations(policy)[:5]
+    np.save(tmp_path / "rows.npy", rows)
+    for code in (
+        "import torch; program = torch.export.load('walk.pt2').module(); action, _ = program(torch.from_numpy(rows))",
+        "from play_walk import load; action, _ = load('walk.npz')(rows); assert 'torch' not in sys.modules",
+    ):
+        code = f"import sys; sys.modules['springfoot'] = None; import numpy as np; rows = np.load('rows.npy'); {code}"
+        code += "; np.save('action.npy', np.asarray(action))"
+        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert np.load(tmp_path / "action.npy") == pytest.approx(policy(rows), abs=1e-5)
+
+
+def test_the_player_is_short():
+    assert len(Path(numpy_player.__file__).read_text(encoding="utf-8").splitlines()) <= 40
+
+
+def test_every_number_in_the_onnx_file_is_of_float32_or_an_index(tmp_path):
+    export_policy(drawn(), tmp_path / "walk.onnx", "onnx")
+    model = onnx.load(tmp_path / "walk.onnx")
+    assert {tensor.data_type for tensor in model.graph.initializer} == {onnx.TensorProto.FLOAT, onnx.TensorProto.INT64}
+    assert [value.name for value in (*model.graph.input, *model.graph.output)] == ["observation", "action", "stiffness"]
+
+
+WITHOUT = """
+import sys
+
+class NotInstalled:
+    def find_spec(name, path=None, target=None):
+        if name.partition(".")[0] in ("torch", "stable_baselines3", "onnx", "onnxruntime"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, NotInstalled)
+from springfoot.studies.command import main
+for to, out in (("numpy", "a.npz"), ("onnx", "a.onnx"), ("torch", "a.pt2")):
+    print(main(["export", "pretrained", "--to", to, "--out", out]))
+"""
+
+
+def test_numpy_needs_no_torch_and_what_is_missing_is_said(tmp_path):
+    done = subprocess.run([sys.executable, "-c", WITHOUT], cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout.splitlines()[1:] == ["0", "2", "2"], done.stderr
+    assert done.stderr.splitlines() == [
+        "springfoot export: error: to onnx needs the package onnx: pip install 'springfoot[onnx]'",
+        "springfoot export: error: to torch needs the package torch: pip install 'springfoot[train]'",
+    ]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "a.npz.json", "play_a.py"]
+
+
+@pytest.mark.parametrize(
+    ("policy", "to", "out", "said"),
+    [
+        ("pretrained", "onnx", "old.onnx", "old.onnx already exists; out must be a new file"),
+        ("pretrained", "torch", "new.pt2", "new.pt2.json already exists; out must be a new file"),
+        ("pretrained", "numpy", "old.npz", "play_old.py already exists; out must be a new file"),
+        ("pretrained", "onnx", "new.npz", "out must end in .onnx for onnx, got new.npz"),
+        ("pretrained", "onnx", "old.onnx/new.onnx", "cannot make the folder old.onnx: File exists"),
+        ("schedule", "onnx", "new.onnx", "schedule has no weights to export: "),
+        ("frozen:pretrained", "onnx", "new.onnx", "frozen:pretrained has no weights to export: "),
+        ("old.onnx", "numpy", "new.npz", "old.onnx has no weights to export: "),
+        ("mine:act", "numpy", "new.npz", "mine:act has no weights to export: "),
+        ("nobody", "onnx", "new.onnx", "no policy nobody: give "),
+    ],
+)
+def test_what_cannot_be_exported_is_one_line_and_nothing_is_written(
+    policy, to, out, said, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    for name in ("old.onnx", "new.pt2.json", "play_old.py"):
+        (tmp_path / name).write_text("kept")
+    assert main(["export", policy, "--to", to, "--out", out]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"springfoot export: error: {said}") and error.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new.pt2.json", "old.onnx", "play_old.py"]
+    assert (tmp_path / "old.onnx").read_text() == "kept"
+
+
+def test_the_command_says_what_it_wrote_and_how_to_go_on(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "pretrained", "--to", "onnx", "--out", "deep/walk.onnx"]) == 0
+    results, following = capsys.readouterr().out.splitlines()
+    assert results == f"Results: {Path('deep/walk.onnx')}, {Path('deep/walk.onnx.json')}"
+    assert following == f"Next:    springfoot evaluate {Path('deep/walk.onnx')}"
+
+
+def test_a_write_that_fails_leaves_nothing(tmp_path):
+    policy = replace(drawn(), fingerprint={})
+    (tmp_path / "walk.onnx.json").mkdir()
+    with pytest.raises(SpringfootError, match=r"walk.onnx.json already exists"):
+        export_policy(policy, tmp_path / "walk.onnx", "onnx")
+    assert isinstance(policy, Policy) and [path.name for path in tmp_path.iterdir()] == ["walk.onnx.json"]
