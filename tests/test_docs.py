@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import tyro
 
+from springfoot.agents.export_command import ExportFlags
 from springfoot.agents.train_command import TrainFlags
+from springfoot.evaluation import prepare
 from springfoot.evaluation.evaluate_command import EvaluateFlags
 from springfoot.gait import human_gait
 from springfoot.studies.command import STUDIES, main, study_class
@@ -68,8 +70,18 @@ def test_links_lead_somewhere(page):
 
 
 def test_readme_examples_run_in_their_order(folder):
-    code = "\n".join(BLOCKS).replace("range(500)", "range(50)")
-    assert len(BLOCKS) == 5
+    code = "\n".join(BLOCKS).replace("range(500)", "range(50)").replace("1_000_000", "1")
+    assert len(BLOCKS) == 6
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert prepare("mine.safetensors", {})[1].action_mode == "absolute"
+
+
+def test_the_examples_of_the_page_on_policies_run(folder):
+    page = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
+    for command in commands_in(re.findall(r"```sh.*?```", page, re.DOTALL)[0]):
+        assert main(shlex.split(command)[1:]) == 0
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
 
@@ -104,6 +116,7 @@ def test_every_command_that_a_document_names_is_understood(command):
     if program[:2] == ("springfoot", "study") and program[2:]:
         tyro.cli(study_class(program[2]), args=words)  # exits where it does not understand
     elif program[0] == "springfoot" and program[1] != "study" and words:
-        tyro.cli({"train": TrainFlags, "evaluate": EvaluateFlags}[program[1]], args=words)
+        flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags}
+        tyro.cli(flags[program[1]], args=words)
     else:
         assert program[0] != "springfoot" or words in ([], ["--help"], ["NAME"])

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from springfoot.evaluation import prepare
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 RUNS = {
     "one_walk.py": (["--ankle", "250", "--seconds", "1"], "1.00 s, no fall, return "),
@@ -36,5 +38,7 @@ def test_example_does_what_it_says(name, tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert said in done.stdout
+    if name == "train_with_sb3.py":
+        assert prepare(str(tmp_path / "mine.safetensors"), {})[1].action_mode == "absolute"
     if name == "plot_schedule.py":
         assert (tmp_path / "schedule.png").read_bytes().startswith(b"\x89PNG")
