@@ -49,6 +49,7 @@ def torch_bytes(policy: Policy, scale: Scale) -> bytes:
     two = torch.zeros(2, policy.layer_sizes[0])  # of one, torch would make a program for one alone
     shapes = {"observation": {0: torch.export.Dim("N")}}
     program = torch.export.export(_Program(policy, scale).requires_grad_(False), (two,), dynamic_shapes=shapes)
+    program.example_inputs = None  # torch would keep them as a pickle
     file = BytesIO()
     torch.export.save(program, file)
     return file.getvalue()

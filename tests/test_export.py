@@ -4,6 +4,7 @@ import importlib.util
 import json
 import subprocess
 import sys
+import zipfile
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -217,6 +218,14 @@ def test_torch_and_the_player_need_no_springfoot(tmp_path):
 
 def test_the_player_is_short():
     assert len(Path(numpy_player.__file__).read_text(encoding="utf-8").splitlines()) <= 40
+
+
+def test_no_export_holds_a_pickle(tmp_path):
+    for to in ("torch", "numpy"):
+        export_policy(drawn(), tmp_path / f"walk{FORMATS[to]}", to)
+        with zipfile.ZipFile(tmp_path / f"walk{FORMATS[to]}") as file:
+            assert not any(b"\x80\x02" in file.read(name)[:2] for name in file.namelist())
+            assert not any(file.getinfo(name).file_size for name in file.namelist() if name.endswith((".pt", ".pkl")))
 
 
 def test_every_number_in_the_onnx_file_is_of_float32_or_an_index(tmp_path):
