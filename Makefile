@@ -54,7 +54,7 @@ check: install build/typing/made
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
-	$(BIN)/lint-imports
+	PYTHONPATH=build/typing $(BIN)/lint-imports
 	$(BIN)/python -m pytest
 
 format: install
@@ -64,10 +64,11 @@ format: install
 bench: install
 	$(BIN)/python -m benchmarks.bench
 
-# What pyright cannot see: the rooms behind an editable install's finder, and the names MuJoCo compiles in (no stubs yet).
+# What pyright and import-linter cannot see: the rooms behind an editable install's finder; and the names MuJoCo compiles in
+# (no stubs yet).
 build/typing/made: Makefile
 	rm -rf build/typing && mkdir -p build/typing/springfoot build/typing/mujoco-stubs
-	ln -s $(addprefix ../../../,gait envs agents evaluation studies) build/typing/springfoot/
+	ln -s $(addprefix ../../../,package/__init__.py package/py.typed gait envs agents evaluation studies) build/typing/springfoot/
 	echo partial > build/typing/mujoco-stubs/py.typed
 	printf '%s\n' 'from typing import Any' 'def __getattr__(name: str) -> Any: ...' > build/typing/mujoco-stubs/__init__.pyi
 	@touch $@

@@ -1,0 +1,13 @@
+"""How stiff should ankles and toes be? A laboratory of five rooms, each imported by its name:
+
+- `springfoot.gait`: the science of walking;
+- `springfoot.envs`: the walking body as Gymnasium environments;
+- `springfoot.agents`: training, policies and baselines;
+- `springfoot.evaluation`: how human a walk is;
+- `springfoot.studies`: many walks held against each other.
+"""
+
+__all__ = ["__version__"]
+
+__version__ = "0.1.0.dev0"
+"""Semantic version, as an installer sees it: pyproject.toml reads this line."""

@@ -1,0 +1,34 @@
+"""What pyproject.toml cannot say: the README of a package index, where no file of the repository lies beside it."""
+
+import re
+import runpy
+import tomllib
+from pathlib import Path
+
+from setuptools import setup
+
+HERE = Path(__file__).parent
+LINK = re.compile(r"(!?)\[([^\]]+)\]\((?!https://)([^)]+)\)")
+"""A picture or a link to a file of the repository: mark, text, path."""
+
+
+def readme() -> str:
+    """The README with its links made absolute by `Source` of `[project.urls]`; while there is none, their texts alone.
+
+    A release links to its tag, what comes before it to the newest commit, addressed as GitHub and GitLab do.
+    """
+    project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    source = project.get("urls", {}).get("Source")
+    version = runpy.run_path(str(HERE / "package" / "__init__.py"))["__version__"]
+    commit = "HEAD" if "dev" in version else f"v{version}"
+
+    def absolute(link: re.Match[str]) -> str:
+        mark, text, path = link.groups()
+        if source is None:
+            return f"*{text}*" if mark else text
+        return f"{mark}[{text}]({source}/{'raw' if mark else 'blob'}/{commit}/{path})"
+
+    return LINK.sub(absolute, (HERE / "README.md").read_text(encoding="utf-8"))
+
+
+setup(long_description=readme(), long_description_content_type="text/markdown")
