@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .control.decisions import DecisionTimes

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from springfoot.gait.arrays import NDArray
 
 from .physics.energy import WindowWork
 from .physics.kernel import kernel

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from springfoot.envs.control.foot_springs import stiffness_ranges
@@ -11,6 +10,7 @@ from springfoot.envs.physics.foot_contact import contact_offsets
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings import body_of
 from springfoot.gait import GRAVITY, Body
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 
 from .recording import TICK, Recording

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from springfoot.envs.settings import reference_gait
 from springfoot.gait import HumanGait
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
 
 from .metrics import JOINT_CURVES, MOMENT_CURVES, Gait

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.model import JOINTS
 from springfoot.envs.settings import body_of, reference_gait, settings_to_json
 from springfoot.gait import scores as score
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
 
 from .open_loop import feedback

@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import PolicyFunction, follow
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, THEME_OF, BipedSettings, body_of
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import SPRINGS
 

@@ -10,7 +10,7 @@ from zipfile import BadZipFile
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from springfoot.agents.baselines import PolicyFunction
 from springfoot.envs.biped_batch import Biped
@@ -28,6 +28,7 @@ from springfoot.envs.settings import (
     settings_to_json,
 )
 from springfoot.envs.step_result import Tick
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.com_plan import ComPlan
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
 
 

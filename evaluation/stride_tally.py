@@ -6,7 +6,6 @@ Human-facing edge: angles in degrees, forces in body weights (BW), moments in N 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.energy import ledger_entries
@@ -15,6 +14,7 @@ from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_
 from springfoot.envs.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, next_after, on_percent
 
 from .recording import TICK, Recording

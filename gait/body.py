@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import NDArray
 from .errors import require_within
 
 GRAVITY = 9.81

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator, PPoly
 
+from .arrays import NDArray
 from .body import Body
 from .bout_com import AFTER, BEFORE, com_from_rest_to_rest, quintics, step_lengths_of, zmp_knots
 from .bout_feet import BoutFoot, Point, bout_feet, bout_legs, foot_postures, standing_height

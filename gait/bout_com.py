@@ -5,10 +5,11 @@ bout, places x [m] forward of the ankles in standing there.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 from scipy.linalg import solve_banded
 
+from .arrays import NDArray
 from .body import GRAVITY
 from .plan import WalkPlan
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
 from .com_plan import Point

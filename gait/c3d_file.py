@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import NDArray
 from .cycle import Contacts
 from .errors import SpringfootError
 from .human import FORCES

@@ -10,10 +10,11 @@ from itertools import pairwise
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly, PPoly
 
+from .arrays import NDArray
 from .body import gravity
 
 STEP_SAMPLES = 240

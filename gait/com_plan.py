@@ -8,8 +8,9 @@ instead: same steps, time and height, over a ZMP that is where people's is.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import Body
 from .cart_table import ComMotion, periodic_com
 from .human import HumanGait

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .arrays import NDArray
 
 CONTACT_THRESHOLD_BW = 0.05
 """A foot is on the ground above this vertical force [body weights]; chosen: 31 N at 63 kg (plates: 20 to 30 N)."""

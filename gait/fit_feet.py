@@ -9,10 +9,10 @@ straightest knee allows; a swing in the floor costs too.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from . import feet
+from .arrays import NDArray
 from .body import Body
 from .com_plan import PEOPLES_SHARE
 from .feet import feet_under_zmp

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import NDArray
 from .errors import SpringfootError
 from .human import COLUMNS, DIGITS, fourier_series, stance_series
 

@@ -14,8 +14,9 @@ from importlib import resources
 from math import sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import HEIGHT_RANGE, REFERENCE_HEIGHT
 from .errors import SpringfootError, require_within
 

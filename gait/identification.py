@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .errors import SpringfootError, require_count, require_number, require_within
 from .spring_fit import Estimate, fit_spring, intervals
 

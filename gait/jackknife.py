@@ -7,9 +7,9 @@ have to do with each other (the estimator CV3 of MacKinnon, Nielsen & Webb 2022,
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtrit
 
+from .arrays import NDArray
 from .spring_fit import CONFIDENCE, Estimate
 
 WORST_CONDITION = 1e10

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import GRAVITY, Body, gravity
 from .errors import SpringfootError
 from .feet import turned

@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from .arrays import NDArray
 from .body import Body, gravity
 from .errors import SpringfootError, require_number
 from .feet import turned

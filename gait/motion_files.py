@@ -14,8 +14,8 @@ from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import NDArray
 from .cycle import Contacts
 from .errors import SpringfootError
 from .human import COLUMNS, FORCES

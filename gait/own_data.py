@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import NDArray
 from .body import MASS_RANGE
 from .c3d_file import c3d_trial
 from .cycle import CONTACT_THRESHOLD_BW, PERCENT

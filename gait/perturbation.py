@@ -23,8 +23,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .errors import SpringfootError, require_number, require_within
 from .jackknife import fit_by_trial
 from .spring_fit import Estimate

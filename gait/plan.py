@@ -13,9 +13,10 @@ from math import cos, pi, radians, sqrt
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from .arrays import NDArray
 from .body import GRAVITY, Body
 from .cart_table import ComMotion, periodic_com
 from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point

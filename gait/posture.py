@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import Body
 from .cart_table import ComMotion
 from .errors import SpringfootError

@@ -10,9 +10,10 @@ from functools import lru_cache
 from math import inf
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_discrete_are
 
+from .arrays import NDArray
 from .body import GRAVITY
 from .errors import SpringfootError, require_number, require_within
 

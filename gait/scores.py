@@ -11,8 +11,9 @@ from math import isfinite
 from typing import SupportsFloat
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import GRAVITY
 from .errors import SpringfootError
 

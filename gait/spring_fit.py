@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
+
+from .arrays import NDArray
 
 CONFIDENCE = 0.95
 """Confidence of every interval."""

@@ -9,8 +9,9 @@ from math import radians
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import NDArray
 from .body import Body
 from .errors import SpringfootError, require_within
 from .human import human_gait

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import NDArray
 from .body import GRAVITY, Body
 from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .errors import SpringfootError

@@ -21,9 +21,10 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from .arrays import NDArray
 from .body import Body
 from .errors import SpringfootError, require_count
 

@@ -12,7 +12,6 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import PolicyFunction, and_copy
 from springfoot.agents.command_line import policy_label
@@ -26,6 +25,7 @@ from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import BATCH, Recording, record_each
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import require_count
 
 from .quantities import COMPARED_JOINTS, OPEN_LOOP, open_loop_note

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import tyro
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import PolicyFunction, and_copy, own_settings
 from springfoot.agents.flags import SettingsFlags, given, optional_flags
@@ -20,6 +19,7 @@ from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
+from springfoot.gait.arrays import NDArray
 
 from .intervals import RESAMPLES, mean_interval, paired_p, share_interval
 from .quantities import rmse_text, walks_csv

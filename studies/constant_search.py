@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import constant, schedule
 from springfoot.agents.files import csv_text
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
+from springfoot.gait.arrays import NDArray
 
 from .comparison import PushedFlags, pushed
 from .intervals import RESAMPLES, mean_interval

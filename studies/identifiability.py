@@ -17,7 +17,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import schedule
 from springfoot.agents.markdown import table, text_of
@@ -31,6 +30,7 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import TICK, Recording, record
 from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import SPRINGS, TOE_STIFFNESS, Segment, StiffnessSchedule

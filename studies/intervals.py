@@ -1,8 +1,9 @@
 """How sure a number is: intervals of means and shares, and tests of two rows that walked the same episodes."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest, bootstrap
+
+from springfoot.gait.arrays import NDArray
 
 RESAMPLES = 10_000
 """Resamples of the bootstrap."""

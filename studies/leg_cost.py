@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import own_settings
 from springfoot.envs.biped_batch import Biped
@@ -21,6 +20,7 @@ from springfoot.envs.control.reference_walk import FED
 from springfoot.envs.control.standing import SLOW_SPEED
 from springfoot.envs.physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES, TOE
 from springfoot.envs.settings import BipedSettings
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
 from springfoot.gait.human import HumanGait

@@ -16,13 +16,13 @@ from typing import Annotated, Any, ClassVar, Literal
 import cma
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from springfoot.agents.files import csv_text
 from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name
 from springfoot.envs.control.leg_controller import KNOTS
 from springfoot.envs.settings import BipedSettings, Feedforward
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.human import human_gait
 from springfoot.gait.plan import Cadence

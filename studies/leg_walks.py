@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import CONSTANT_STIFFNESS
 from springfoot.envs.biped_batch import Biped
@@ -18,6 +17,7 @@ from springfoot.envs.physics.measurement import Measurement
 from springfoot.envs.physics.model import contact_material
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.step_result import Tick
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.stiffness import TOE_STIFFNESS
 

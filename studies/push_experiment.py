@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from springfoot.agents.baselines import PolicyFunction, has_feedback
@@ -20,6 +19,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import TICK, Recording
 from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.identification import PhaseSpring, identify
 from springfoot.gait.perturbation import PushedSpring, identify_pushed

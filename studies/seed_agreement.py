@@ -19,7 +19,6 @@ import tyro
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import and_copy
 from springfoot.agents.command_line import policy_label
@@ -30,6 +29,7 @@ from springfoot.evaluation.gait_figure import STYLE
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
 

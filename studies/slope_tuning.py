@@ -15,7 +15,6 @@ from typing import Annotated, Any, ClassVar
 import cma
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from springfoot.agents.files import csv_text
@@ -24,6 +23,7 @@ from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import SlopeConstants, slope_constants_from
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.step_result import Tick
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 

@@ -18,7 +18,7 @@ import numpy as np
 import tyro
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.files import csv_text
@@ -31,6 +31,7 @@ from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import TICK, Recording, record
 from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import PermutationMethod, bootstrap, pearsonr
+
+from springfoot.gait.arrays import NDArray
 
 from .stiffness_steps import CELLS, DURATIONS, FIXED, MOVEMENT, PHASES, SPRINGS, PairedWalks
 

@@ -10,7 +10,6 @@ from itertools import pairwise, product
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.agents.baselines import PolicyFunction, leg_phase
 from springfoot.envs.biped_batch import Biped
@@ -21,6 +20,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.envs.step_result import Tick
 from springfoot.evaluation.recording import TICK
 from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, on_percent, sample
 from springfoot.gait.errors import SpringfootError

@@ -9,12 +9,12 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from PIL import Image
 
 from springfoot.evaluation.gait_figure import PEOPLE, PLAN, STYLE
 from springfoot.gait import GRAVITY, Body, HumanGait, WalkPlan, human_gait
 from springfoot.gait import thesis as printed_thesis
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.human import ANGLES, human_cop
 from springfoot.gait.kinetics import foot_force
 from springfoot.gait.leg import joint_positions, segment_turns

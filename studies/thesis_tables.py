@@ -3,10 +3,10 @@
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.agents.markdown import table
 from springfoot.gait import GRAVITY, Body, WalkPlan, human_gait, plan_walk
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.kinetics import (
     foot_force,
     inverse_dynamics,

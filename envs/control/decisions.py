@@ -3,8 +3,8 @@
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.human import HumanGait
 from springfoot.gait.stiffness import ankle_events, toe_events
 

@@ -1,8 +1,8 @@
 """Equilibrium angles of ankle and toe springs, and their stiffness where no action sets it: curves over the stride."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.human import HumanGait
 from springfoot.gait.stiffness import StiffnessSchedule

@@ -4,8 +4,9 @@ What each ankle and toe has is (side, 2), the last axis being ankle and toe; fla
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
 from ..physics.kernel import kernel

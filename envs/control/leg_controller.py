@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from math import radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
 from ..physics.kernel import kernel

@@ -1,7 +1,9 @@
 """Stride phases, and curves over the stride that are tabulated once and read at many phases."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from springfoot.gait.arrays import NDArray
 
 from ..physics.kernel import kernel
 from .rows import PLACE

@@ -12,8 +12,8 @@ from itertools import product
 from math import ceil, floor, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.com_plan import ComPlan, over_peoples_zmp
 from springfoot.gait.human import HumanGait

@@ -16,9 +16,9 @@ from functools import lru_cache
 from math import inf, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
 from ..physics.kernel import kernel

@@ -10,8 +10,8 @@ from dataclasses import replace
 from math import radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 

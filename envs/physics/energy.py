@@ -10,8 +10,8 @@ from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 
 from .kernel import kernel

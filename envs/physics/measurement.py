@@ -5,8 +5,8 @@ from math import cos, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
 from .foot_contact import CONTACTS, contact_offsets

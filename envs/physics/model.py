@@ -12,8 +12,8 @@ from math import sqrt
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.leg import JOINTS
 

@@ -8,8 +8,8 @@ import weakref
 from typing import Any
 
 import mujoco
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 RENDER_MODES = ("human", "rgb_array")

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 

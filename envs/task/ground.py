@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from math import radians
 
 import numpy as np
-from numpy.typing import NDArray
+
+from springfoot.gait.arrays import NDArray
 
 from ..control.subjects import Subjects
 from ..physics.measurement import Measurement

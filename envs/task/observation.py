@@ -5,8 +5,8 @@ from functools import lru_cache
 from math import cos, pi, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 
 from ..physics.foot_contact import CONTACTS

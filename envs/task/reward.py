@@ -9,7 +9,8 @@ from math import exp
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from springfoot.gait.arrays import NDArray
 
 from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable

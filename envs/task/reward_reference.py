@@ -4,8 +4,8 @@ from functools import lru_cache
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.com_plan import ComPlan
 from springfoot.gait.human import ANGLES, HumanGait
