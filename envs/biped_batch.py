@@ -8,7 +8,6 @@ bits as N batches of one.
 
 from collections.abc import Callable, Mapping, Sequence
 
-import mujoco
 import numpy as np
 
 from springfoot.gait.arrays import NDArray
@@ -26,7 +25,7 @@ from .exact_state import ExactState
 from .physics.foot_contact import CONTACTS
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, JOINTS, SIDES
-from .physics.simulation import Simulation
+from .physics.simulation import MjData, MjModel, Simulation
 from .settings import BipedSettings
 from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
 from .step_result import StepResult, Tick, room
@@ -63,7 +62,7 @@ class Biped(ExactState):
         legs: Sequence[LegConstants] | None = None,
         variant: NDArray | None = None,
         rest: NDArray | None = None,
-        model: mujoco.MjModel | None = None,
+        model: MjModel | None = None,
         slope: SlopeConstants | None = None,
     ):
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
@@ -114,11 +113,11 @@ class Biped(ExactState):
         self._simulation.measure()
 
     @property
-    def model(self) -> mujoco.MjModel:
+    def model(self) -> MjModel:
         """The compiled model of the settings' body."""
         return self._simulation.model
 
-    def model_of(self, index: int) -> mujoco.MjModel:
+    def model_of(self, index: int) -> MjModel:
         """The compiled model of environment `index`'s body."""
         return self._simulation.models[index]
 
@@ -142,7 +141,7 @@ class Biped(ExactState):
         """(N,) as `envs.control.standing.Standing.mode`: walking, standing, starting, stopping or stopped; a copy."""
         return np.full(self.num_envs, WALKING) if self._standing is None else self._standing.mode.copy()
 
-    def data(self, index: int) -> mujoco.MjData:
+    def data(self, index: int) -> MjData:
         """A copy of environment `index`'s state, to render or to inspect."""
         return self._simulation.data(index)
 

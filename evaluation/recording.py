@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -21,6 +20,7 @@ from springfoot.envs.control.subjects import DRAWN
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import JOINTS, SIDES
+from springfoot.envs.physics.simulation import MjModel
 from springfoot.envs.settings import (
     DRAWN_SETTINGS,
     BipedSettings,
@@ -125,7 +125,7 @@ def record(
     episodes: int = 20,
     seed: int = 0,
     threads: int = 2,
-    model: mujoco.MjModel | None = None,
+    model: MjModel | None = None,
     legs: LegConstants | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> Recording:
@@ -209,7 +209,7 @@ def _walk(
     episodes: int,
     seed: int,
     threads: int,
-    other: tuple[mujoco.MjModel | None, LegConstants | None],
+    other: tuple[MjModel | None, LegConstants | None],
     progress: Callable[[float], object],
 ) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
     """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`; `other`

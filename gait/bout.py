@@ -8,7 +8,7 @@ knots plus each shift times the response to a unit of it, and the two shifts mak
 """
 
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -141,7 +141,13 @@ class Bout:
 
 
 def plan_bout(
-    body: Body, speed: float = 1.2, steps: int = 8, cadence: Cadence = "people", *, first: Side = "right", **settings
+    body: Body,
+    speed: float = 1.2,
+    steps: int = 8,
+    cadence: Cadence = "people",
+    *,
+    first: Side = "right",
+    **settings: Any,
 ) -> Bout:
     """Plans a bout of `steps` steps, and one that brings the feet side by side, at `speed` [m/s] in its middle.
 
