@@ -7,12 +7,13 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help install walk test test-wheel check format bench clean
+.PHONY: help install walk test test-wheel test-sdist check format bench clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
 	@echo "make test     run the tests"
-	@echo "make test-wheel  build the wheel and evaluate with it alone, in a clean environment and an empty folder"
+	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
+	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
@@ -37,18 +38,35 @@ walk: install
 test: install
 	$(BIN)/python -m pytest
 
-# As users get it: built from what git knows, without torch, away from this folder.
+# A folder with the source distribution of what git knows, and an empty one.
+define PACK
+set -e; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; mkdir "$$folder/git" "$$folder/empty"; \
+git archive HEAD | tar -x -C "$$folder/git"; make_sdist='from setuptools import build_meta; build_meta.build_sdist("..")'; \
+(cd "$$folder/git"; "$(abspath $(BIN))/python" -c "$$make_sdist" > "$$folder/log" 2>&1) || { cat "$$folder/log"; exit 1; }
+endef
+
+# As users get it: in an empty folder, first with what the environments need alone; then each extra is missed, and comes.
 test-wheel: install
-	@set -e; folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
-	git archive HEAD | tar -x -C "$$folder"; \
-	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$$folder/dist" "$$folder"; \
-	$(PYTHON) -m venv "$$folder/venv"; \
-	"$$folder/venv/bin/pip" install --quiet --disable-pip-version-check --constraint constraints.txt \
-	  "springfoot[evaluate] @ file://$$(ls "$$folder"/dist/*.whl)"; \
-	mkdir "$$folder/empty"; cd "$$folder/empty"; PATH="$$folder/venv/bin:$$PATH"; set -x; \
-	springfoot --help; springfoot study --help; springfoot study criteria --quick; \
-	springfoot evaluate pretrained --episodes 1; ls runs/*; \
-	! python -c "import torch" 2> /dev/null
+	@$(PACK); constraints=$$PWD/constraints.txt; $(PYTHON) -m venv "$$folder/venv"; PATH="$$folder/venv/bin:$$PATH"; \
+	pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$$folder" "$$folder"/*.tar.gz; \
+	add() { pip install --quiet --disable-pip-version-check --constraint "$$constraints" \
+	  "springfoot$$1 @ file://$$(echo "$$folder"/*.whl)"; }; \
+	cd "$$folder/empty"; set -x; \
+	add; pip list --disable-pip-version-check; \
+	python -W error -c 'import gymnasium as gym, springfoot; print(springfoot.__version__); \
+	  env = gym.make("springfoot.envs:SegmentedFootBiped-v0"); env.reset(seed=0); env.step(env.action_space.sample()); \
+	  envs = gym.make_vec("springfoot.envs:SegmentedFootBiped-v0", num_envs=4); envs.reset(seed=0)'; \
+	springfoot --help; springfoot study --help; \
+	springfoot evaluate pretrained 2>&1 | grep -F "pip install 'springfoot[evaluate]'"; \
+	add "[evaluate]"; \
+	springfoot evaluate pretrained --episodes 1; springfoot study criteria --quick; \
+	springfoot train --out runs/walk 2>&1 | grep -F "pip install 'springfoot[train]'"; \
+	add "[train]"; \
+	springfoot train --timesteps 20000 --out runs/walk; springfoot evaluate runs/walk --episodes 1; ls runs/*
+
+# The unpacked source distribution passes its own tests, in an environment that it makes itself.
+test-sdist: install
+	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; $(MAKE) test VENV=.venv
 
 check: install build/typing/made
 	$(BIN)/ruff format --check .

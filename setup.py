@@ -12,14 +12,11 @@ LINK = re.compile(r"(!?)\[([^\]]+)\]\((?!https://)([^)]+)\)")
 """A picture or a link to a file of the repository: mark, text, path."""
 
 
-def readme() -> str:
-    """The README with its links made absolute by `Source` of `[project.urls]`; while there is none, their texts alone.
+def index_page(source: str | None, version: str) -> str:
+    """The README with its links made absolute by the repository's address `source`, or None: their texts alone.
 
     A release links to its tag, what comes before it to the newest commit, addressed as GitHub and GitLab do.
     """
-    project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    source = project.get("urls", {}).get("Source")
-    version = runpy.run_path(str(HERE / "package" / "__init__.py"))["__version__"]
     commit = "HEAD" if "dev" in version else f"v{version}"
 
     def absolute(link: re.Match[str]) -> str:
@@ -31,4 +28,10 @@ def readme() -> str:
     return LINK.sub(absolute, (HERE / "README.md").read_text(encoding="utf-8"))
 
 
-setup(long_description=readme(), long_description_content_type="text/markdown")
+if __name__ == "__main__":
+    project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    version = runpy.run_path(str(HERE / "package" / "__init__.py"))["__version__"]
+    setup(
+        long_description=index_page(project.get("urls", {}).get("Source"), version),
+        long_description_content_type="text/markdown",
+    )

@@ -6,6 +6,8 @@ What draws imports matplotlib and Pillow; it is imported when first asked for.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from springfoot.extras import naming_extras
+
 from .criteria import HUMAN_LIKE, WALKS, Criterion, unmet
 from .metrics import Gait, measure
 from .open_loop import open_loop_copy
@@ -52,4 +54,5 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     def __getattr__(name: str) -> Any:
         if name not in _DRAWS:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"{__name__}.{_DRAWS[name]}"), name)
+        with naming_extras():
+            return getattr(import_module(f"{__name__}.{_DRAWS[name]}"), name)

@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from springfoot.extras import naming_extras
+
 if TYPE_CHECKING:
     from .body_sweep import draw_pairs, walk_pairs
     from .comparison import contenders
@@ -47,4 +49,5 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     def __getattr__(name: str) -> Any:
         if name not in _MODULE:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
+        with naming_extras():
+            return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)

@@ -7,6 +7,8 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from springfoot.extras import EXTRA_OF
+
 if TYPE_CHECKING:
     from .study import Study
 
@@ -43,10 +45,6 @@ STUDIES = {
 """Name of each study on the command line -> its class, imported when it is asked, and its question."""
 
 
-LEARNERS = ("cma", "stable_baselines3", "tensorboard", "torch")
-"""Packages that the extra `train` has and `evaluate` has not."""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `springfoot`; returns the exit code, 2 for bad input and for a package that is not installed.
 
@@ -75,9 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:  # while it imports; the commands themselves end in good order
         return 130
     except ModuleNotFoundError as error:
-        if error.name is None or error.name.startswith("springfoot"):
+        if error.name not in EXTRA_OF:
             raise
-        extra = "train" if words[0] == "train" or error.name in LEARNERS else "evaluate"
+        extra = "train" if words[0] == "train" else EXTRA_OF[error.name]
         print(
             f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
             file=sys.stderr,

@@ -1,0 +1,31 @@
+"""Which extra of springfoot brings a package that is not installed."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+EXTRA_OF = {
+    "PIL": "evaluate",
+    "cma": "train",
+    "ezc3d": "c3d",
+    "matplotlib": "evaluate",
+    "rich": "evaluate",
+    "safetensors": "evaluate",
+    "stable_baselines3": "train",
+    "tensorboard": "train",
+    "torch": "train",
+    "tqdm": "evaluate",
+    "tyro": "evaluate",
+}
+"""Name in an import statement -> extra."""
+
+
+@contextmanager
+def naming_extras() -> Iterator[None]:
+    """Around imports: the error of a package that is not installed says what installs it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA_OF:
+            raise
+        advice = f"the package {error.name} is missing: pip install 'springfoot[{EXTRA_OF[error.name]}]'"
+        raise ModuleNotFoundError(advice, name=error.name) from None
