@@ -64,9 +64,10 @@ test-wheel: install
 	add "[train]"; \
 	springfoot train --timesteps 20000 --out runs/walk; springfoot evaluate runs/walk --episodes 1; ls runs/*
 
-# The unpacked source distribution passes its own tests, in an environment that it makes itself.
+# The unpacked source distribution passes its own tests, in an environment that it makes itself. Not $(MAKE): with
+# --dry-run, which a test gives, that line would run.
 test-sdist: install
-	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; $(MAKE) test VENV=.venv
+	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test VENV=.venv
 
 check: install build/typing/made
 	$(BIN)/ruff format --check .
@@ -84,9 +85,10 @@ bench: install
 
 # What pyright and import-linter cannot see: the rooms behind an editable install's finder; and the names MuJoCo compiles in
 # (no stubs yet).
-build/typing/made: Makefile
+ROOT_FILES = $(wildcard package/*.py) package/py.typed
+build/typing/made: Makefile $(ROOT_FILES)
 	rm -rf build/typing && mkdir -p build/typing/springfoot build/typing/mujoco-stubs
-	ln -s $(addprefix ../../../,package/__init__.py package/py.typed gait envs agents evaluation studies) build/typing/springfoot/
+	ln -s $(addprefix ../../../,$(ROOT_FILES) gait envs agents evaluation studies) build/typing/springfoot/
 	echo partial > build/typing/mujoco-stubs/py.typed
 	printf '%s\n' 'from typing import Any' 'def __getattr__(name: str) -> Any: ...' > build/typing/mujoco-stubs/__init__.pyi
 	@touch $@
