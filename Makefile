@@ -53,7 +53,7 @@ test-wheel: install
 	  "springfoot$$1 @ file://$$(echo "$$folder"/*.whl)"; }; \
 	cd "$$folder/empty"; set -x; \
 	add; pip list --disable-pip-version-check; \
-	python -W error -c 'import gymnasium as gym, springfoot; print(springfoot.__version__); \
+	springfoot --version; python -W error -c 'import gymnasium as gym; \
 	  env = gym.make("springfoot.envs:SegmentedFootBiped-v0"); env.reset(seed=0); env.step(env.action_space.sample()); \
 	  envs = gym.make_vec("springfoot.envs:SegmentedFootBiped-v0", num_envs=4); envs.reset(seed=0)'; \
 	springfoot --help; springfoot study --help; \

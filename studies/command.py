@@ -7,6 +7,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from springfoot import __version__
 from springfoot.extras import EXTRA_OF
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ HELP = """usage: springfoot {train,evaluate,export,study} ...
   springfoot export POLICY          write it as a file that runs without springfoot: ONNX, torch or NumPy
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
 
-Each takes --help."""
+Each takes --help; springfoot --version says which this is."""
 
 STUDIES = {
     "compare": ("comparison.Compare", "Does a policy walk better than every baseline?"),
@@ -69,6 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return study_main(rest)
             case [] | ["-h" | "--help"]:
                 print(HELP)
+                return 0
+            case ["--version"]:
+                print(f"springfoot {__version__}")
                 return 0
     except KeyboardInterrupt:  # while it imports; the commands themselves end in good order
         return 130

@@ -23,6 +23,7 @@ from packaging.utils import canonicalize_name
 import setup
 import springfoot
 from springfoot.extras import EXTRA_OF
+from springfoot.studies.command import main
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("gait", "envs", "agents", "evaluation", "studies")
@@ -113,9 +114,10 @@ def test_wheel_holds_every_file_of_the_rooms(wheel, known):
     assert "springfoot/py.typed" in packed
 
 
-def test_the_version_stands_once(metadata):
+def test_the_version_stands_once(metadata, capsys):
     assert "version" in PROJECT["project"]["dynamic"]
     assert version("springfoot") == metadata["Version"] == springfoot.__version__
+    assert main(["--version"]) == 0 and capsys.readouterr().out == f"springfoot {springfoot.__version__}\n"
     assert f"\nversion: {springfoot.__version__}\n" in (ROOT / "CITATION.cff").read_text()  # a format without imports
 
 
