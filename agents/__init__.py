@@ -7,12 +7,15 @@ can be loaded and run where torch is not installed.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .baselines import BASELINES, PolicyFunction, baseline
-from .config import PRESETS, TrainingConfig
-from .conversion import policy_from_mlp, policy_from_sb3
-from .export import export_policy
-from .foreign_policy import ForeignPolicy
-from .policy import Policy, load_policy, read_policy, save_policy
+from springfoot.extras import naming_extras
+
+with naming_extras():
+    from .baselines import BASELINES, PolicyFunction, baseline
+    from .config import PRESETS, TrainingConfig
+    from .conversion import policy_from_mlp, policy_from_sb3
+    from .export import export_policy
+    from .foreign_policy import ForeignPolicy
+    from .policy import Policy, load_policy, read_policy, save_policy
 
 if TYPE_CHECKING:
     from .multi_seed import train_seeds
@@ -51,4 +54,5 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     def __getattr__(name: str) -> Any:
         if name not in _NEEDS_TORCH:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"{__name__}.{_NEEDS_TORCH[name]}"), name)
+        with naming_extras():
+            return getattr(import_module(f"{__name__}.{_NEEDS_TORCH[name]}"), name)

@@ -10,7 +10,7 @@ from math import inf, nan, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
 from springfoot.envs.control.foot_springs import action_of
@@ -20,6 +20,7 @@ from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.observation_entries import OBSERVATION
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import PRINTED_SWING, THESIS_SWING, TOE_STIFFNESS, StiffnessSchedule, thesis_schedule

@@ -9,7 +9,6 @@ from math import e
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_springs import stiffness_of
@@ -18,6 +17,7 @@ from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.observation import OBSERVATION
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
 
 from .policy import Policy

@@ -9,10 +9,10 @@ from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, require_number
 
 from .fingerprint import fingerprint

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from springfoot.extras import EXTRA_OF
 from springfoot.gait.errors import SpringfootError
 
 from .contract import Scale, contract_of, scale_of
@@ -36,7 +37,7 @@ def export_policy(policy: Policy, out: str | Path, to: str) -> list[Path]:
     try:
         content = {"onnx": _onnx, "torch": _torch, "numpy": _numpy}[to](policy, scale, contract)
     except ModuleNotFoundError as error:
-        extra = {"onnx": "onnx", "torch": "train"}[to]
+        extra = EXTRA_OF.get(error.name or "", to)
         raise SpringfootError(f"to {to} needs the package {error.name}: pip install 'springfoot[{extra}]'") from None
     player = [(resources.files("springfoot.agents") / "numpy_player.py").read_bytes()] if to == "numpy" else []
     write_new(dict(zip(files, [content, contract.encode(), *player], strict=True)))
@@ -84,5 +85,5 @@ def _numpy(policy: Policy, scale: Scale, contract: str) -> bytes:
     for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
         arrays |= {f"weight_{layer}": weight, f"bias_{layer}": bias}
     file = BytesIO()
-    np.savez(file, **arrays)
+    np.savez(file, allow_pickle=False, **arrays)
     return file.getvalue()

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .fingerprint import fingerprint, require_same

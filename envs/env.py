@@ -3,14 +3,14 @@
 from typing import Any
 
 import gymnasium as gym
-import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .biped_batch import Biped
 from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
+from .physics.simulation import MjData, MjModel
 from .settings import settings_from
 from .step_result import INFO, report_start
 
@@ -221,12 +221,12 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         self.biped.generators[0] = generator
 
     @property
-    def model(self) -> mujoco.MjModel:
+    def model(self) -> MjModel:
         """The compiled model of the present body; see MuJoCo."""
         return self.biped.model_of(0)
 
     @property
-    def data(self) -> mujoco.MjData:
+    def data(self) -> MjData:
         """A new copy of the present state, after `mj_forward`; see MuJoCo."""
         return self.biped.data(0)
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 

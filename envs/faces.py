@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
 
+from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .biped_batch import Biped

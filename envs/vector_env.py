@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Space
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -61,8 +62,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self.biped = Biped(self.settings, num_envs, num_threads)
         self.metadata = METADATA | {"autoreset_mode": self.autoreset_mode, "render_fps": round(1 / self.biped.dt)}
         self.single_observation_space, self.single_action_space = spaces_of(self.biped)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space: Space[NDArray] = batch_space(self.single_observation_space, num_envs)
+        self.action_space: Space[NDArray] = batch_space(self.single_action_space, num_envs)
         self._seeds = [-1] * num_envs
         self._over = np.ones(num_envs, bool)
         self._started = False

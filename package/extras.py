@@ -8,6 +8,8 @@ EXTRA_OF = {
     "cma": "train",
     "ezc3d": "c3d",
     "matplotlib": "evaluate",
+    "onnx": "onnx",
+    "onnxruntime": "onnx",
     "rich": "evaluate",
     "safetensors": "evaluate",
     "stable_baselines3": "train",

@@ -7,7 +7,7 @@ physics step); contact forces are the mean over the window's physics steps, so t
 
 from collections.abc import Sequence
 from math import cos, sin, tan
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
@@ -22,6 +22,11 @@ from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot_contact import CONTACTS, FRICTION
 from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
+
+MjModel: TypeAlias = Any
+"""A `mujoco.MjModel`; MuJoCo has no type stubs, and what it leaves unknown would be unknown in our users' files."""
+MjData: TypeAlias = Any
+"""A `mujoco.MjData`, likewise."""
 
 
 class Physics(NamedTuple):
@@ -54,7 +59,7 @@ class Simulation:
         body: Body,
         num: int,
         threads: int = 1,
-        model: mujoco.MjModel | None = None,
+        model: MjModel | None = None,
         friction: float = FRICTION,
     ):
         self.body = body
@@ -180,7 +185,7 @@ class Simulation:
         self.now.torque[:] = 0.0
         return self.now
 
-    def data(self, index: int) -> mujoco.MjData:
+    def data(self, index: int) -> MjData:
         """A copy of the state of simulation `index` after `mj_forward`, to render or to inspect."""
         data = self._batch.get_data(index)
         mujoco.mj_forward(self.models[index], data)

@@ -1,7 +1,8 @@
 """How far a body is from its plan."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from springfoot.gait.arrays import NDArray
 
 from ..control.phase_table import read
 from ..physics.kernel import kernel
