@@ -122,11 +122,6 @@ class Biped(ExactState):
         return self._simulation.models[index]
 
     @property
-    def generators(self) -> list[np.random.Generator | None]:
-        """The generator of each environment, None before its first reset; the list itself, to be changed in place."""
-        return self._random
-
-    @property
     def measurement(self) -> Measurement:
         """The measurement at the end of the last control window, or right after a reset."""
         return Measurement.of(self._simulation.arrays.bodies["measured"].copy())

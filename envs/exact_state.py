@@ -28,9 +28,9 @@ class ExactState(ABC):
         """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]."""
 
     @property
-    def generators(self) -> tuple[np.random.Generator | None, ...]:
-        """The generator of each environment itself; None before its first reset."""
-        return tuple(self._random)
+    def generators(self) -> list[np.random.Generator | None]:
+        """The generator of each environment, None before its first reset; the list itself, to be changed in place."""
+        return self._random
 
     def state(self, ids: NDArray | None = None) -> dict[str, Any]:
         """The exact state of environments `ids` (K,), of all if None, between two steps.

@@ -121,7 +121,7 @@ def test_a_copy_is_made_from_the_same_arguments():
 
 def test_a_batch_that_has_not_begun_can_be_copied():
     biped = pickle.loads(pickle.dumps(Biped(settings_from(), 2)))
-    assert biped.generators == (None, None)
+    assert biped.generators == [None, None]
     biped.reset(np.arange(2), [3, 4])
     assert biped.step(np.zeros((2, 4))).reward.all()
 

@@ -10,8 +10,6 @@ own code and of all that it uses: the kernels it calls, in whatever file, and co
 what it uses.
 """
 
-import builtins
-import dis
 from collections.abc import Callable
 from hashlib import sha256
 from typing import Any, TypeVar
@@ -35,15 +33,11 @@ def kernel(function: Function) -> Function:
 
 
 def _fingerprint(function: Callable[..., Any]) -> str:
-    """What a function does: of its code and all that it uses. Raises NameError for what does not stand above it."""
+    """Tells what a function does from all else: by its code, and by the values of all names in it that are known."""
     code: Any = function.__code__  # type: ignore[attr-defined]
+    known: dict[str, Any] = function.__globals__  # type: ignore[attr-defined]
     found = [code.co_code.hex(), repr(code.co_consts), repr(code.co_varnames), repr(code.co_names)]
-    for name in sorted({each.argval for each in dis.get_instructions(code) if each.opname == "LOAD_GLOBAL"}):
-        known = function.__globals__  # type: ignore[attr-defined]
-        if name in known:
-            found.append(f"{name} = {_meaning(known[name])}")
-        elif not hasattr(builtins, name):
-            raise NameError(f"kernel {function.__name__} uses {name}, which must stand above it")
+    found += [f"{name} = {_meaning(known[name])}" for name in code.co_names if name in known]
     return sha256("\n".join(found).encode()).hexdigest()[:12]
 
 
