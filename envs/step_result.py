@@ -7,7 +7,7 @@ import numpy as np
 from springfoot.gait.arrays import NDArray
 
 from .physics.energy import WindowWork
-from .physics.kernel import kernel
+from .physics.kernel import part
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, ANKLE, SIDES
 from .task.episode_end import TERMINATIONS
@@ -47,7 +47,7 @@ and `work/equilibrium/` [J] of the step. Of each reward term: `reward/`, unweigh
 """
 
 
-@kernel
+@part
 def report(rows, controls, bodies, terms, options, values) -> None:
     """Fill `StepResult.values` of one step.
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
-from ..physics.kernel import kernel
+from ..physics.kernel import kernel, part
 from ..physics.measurement import plant_of
 from ..physics.model import ANKLE
 from ..physics.simulation import Physics
@@ -67,7 +67,7 @@ SPRING_OPTIONS = np.dtype(
 """How settings and body of the tables make springs."""
 
 
-@kernel
+@part
 def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
     """Request new stiffness, to act after the delay.
 
@@ -105,7 +105,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                     own.work_stiffness[side, joint] = 0.5 * (after - before) * deflection**2
 
 
-@kernel
+@part
 def _arrive(own, angle):
     """Let the request of `delay` windows ago act, and shift the past requests by one window."""
     for side in range(2):
@@ -118,7 +118,7 @@ def _arrive(own, angle):
                 own.requests[past, side, joint] = own.requests[past - 1, side, joint]
 
 
-@kernel
+@part
 def move(rows, bodies, state, rest, incline, options, walking) -> None:
     """Begin a control window: K and K theta_eq of ankles and toes go into the control.
 

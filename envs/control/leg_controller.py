@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
 
-from ..physics.kernel import kernel
+from ..physics.kernel import kernel, part
 from ..physics.measurement import plant_of
 from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..timing import CONTROL_WINDOW
@@ -55,7 +55,7 @@ def slope_table(constants: SlopeConstants) -> PhaseTable:
     return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
 
 
-@kernel
+@part
 def _between(low, high, weight):
     return low + weight * (high - low)
 
@@ -77,13 +77,13 @@ def _follow(constants, rows):
         gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / scale.time
 
 
-@kernel
+@part
 def _too_fast(m, row):
     """Error of the CoM's forward speed against the plan [m/s], as the gains see it."""
     return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
 
 
-@kernel
+@part
 def drive(rows, bodies, state, table, incline) -> None:
     """Begin a control window: stiffness [N m/rad] and drive torque [N m] of hips and knees go into the control.
 
@@ -117,12 +117,12 @@ def drive(rows, bodies, state, table, incline) -> None:
                 control[side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
 
 
-@kernel
+@part
 def _load(force):
     return force[0, 1] + force[1, 1] + force[2, 1]
 
 
-@kernel
+@part
 def advance(rows, bodies, walking) -> None:
     """Let one window pass.
 

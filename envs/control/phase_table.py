@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from springfoot.gait.arrays import NDArray
 
-from ..physics.kernel import kernel
+from ..physics.kernel import kernel, part
 from .rows import PLACE
 
 SAMPLES = 1000
@@ -22,7 +22,7 @@ def leg_phases(left: NDArray) -> NDArray:
 _FIRST = np.zeros(1, PLACE)
 
 
-@kernel
+@part
 def read(table, place, phase, curves) -> None:
     """Read one phase.
 

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
-from ..physics.kernel import kernel
+from ..physics.kernel import kernel, part
 from ..physics.measurement import Measurement, plant_of
 from ..physics.model import ANKLE, HIP, KNEE
 from ..physics.simulation import Physics
@@ -106,7 +106,7 @@ def _switch(rows, bodies, running, time, stop_at):
     return changed
 
 
-@kernel
+@part
 def _draw(body, m):
     """Move the rest angles of the hips until their torque takes over the push of the feet against each other."""
     front = 0 if m.ankle[0, 0] > m.ankle[1, 0] else 1

@@ -14,7 +14,7 @@ import numpy as np
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 
-from .kernel import kernel
+from .kernel import kernel, part
 from .model import ARMATURE, JOINTS, KNEE, SIDES, damping_times
 
 LEDGER = np.dtype(
@@ -160,7 +160,7 @@ def _sum_changes(control, held, angle, energy):
                     energy[i].equilibrium_changes[joint] += 0.5 * k * (after * after - before * before)
 
 
-@kernel
+@part
 def _part_energy(own, part, x, z, x_rate, z_rate, turn, spin):
     """Kinetic and potential energy [J] of one part whose joint is at (x, z), turned up-forward by `turn`."""
     forward, up = own.com[part]
@@ -175,8 +175,8 @@ def _add_mechanical(parts, position, rate, energy):
     for i in range(len(energy)):
         own, total = parts[i], 0.0
         q, v = position[i], rate[i]
-        for part in range(2):
-            total += _part_energy(own, part, q[0], q[1], v[0], v[1], -q[2], -v[2])
+        for piece in range(2):
+            total += _part_energy(own, piece, q[0], q[1], v[0], v[1], -q[2], -v[2])
         for side in range(2):
             x, z, x_rate, z_rate, turn, spin = q[0], q[1], v[0], v[1], -q[2], -v[2]
             for joint in range(4):

@@ -23,13 +23,24 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """Compile `function` with numba at its first call; dividing by zero gives infinity, as in NumPy."""
-    function.__qualname__ += f"_{_fingerprint(function)}"
+    named = _named(function)
     compiled: Any
     try:
-        compiled = njit(cache=True, error_model="numpy")(function)
+        compiled = njit(cache=True, error_model="numpy")(named)
     except RuntimeError:  # neither the package's folder nor the user's cache can be written
-        compiled = njit(error_model="numpy")(function)
+        compiled = njit(error_model="numpy")(named)
     return compiled
+
+
+def part(function: Function) -> Function:
+    """As `kernel`, for what kernels alone call: it is kept with them and not by itself."""
+    compiled: Any = njit(error_model="numpy")(_named(function))
+    return compiled
+
+
+def _named(function: Function) -> Function:
+    function.__qualname__ += f"_{_fingerprint(function)}"
+    return function
 
 
 def _fingerprint(function: Callable[..., Any]) -> str:

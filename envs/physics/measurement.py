@@ -10,7 +10,7 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
 from .foot_contact import CONTACTS, contact_offsets
-from .kernel import kernel
+from .kernel import kernel, part
 from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
 
 DEGREES = len(BASE) + len(SIDES) * len(JOINTS)
@@ -141,12 +141,12 @@ def segments_of(body: Body) -> NDArray:
     return segments
 
 
-@kernel
+@part
 def _turned(offset, c, s):
     return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c
 
 
-@kernel
+@part
 def _locate(segments, position, rate, m):
     """Planar forward kinematics.
 
@@ -178,7 +178,7 @@ def _locate(segments, position, rate, m):
     m.com[0], m.com[1], m.com_velocity[0], m.com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
 
 
-@kernel
+@part
 def _above(ground, m):
     """Turn heights and upward velocities in the world into those relative to the ground, in place."""
     slope = ground[0]
@@ -192,7 +192,7 @@ def _above(ground, m):
             m.contact[side, k, 1] -= slope * m.contact[side, k, 0] + ground[1 + side]
 
 
-@kernel
+@part
 def _read_joints(segments, plant, m):
     beta, limit = segments.beta, segments.limit
     for side in range(2):
@@ -204,7 +204,7 @@ def _read_joints(segments, plant, m):
             m.torque[side, joint] = min(max(spring, -limit[joint]), limit[joint])
 
 
-@kernel
+@part
 def _average(sensors, force):
     steps = len(sensors)
     for side in range(2):
@@ -216,7 +216,7 @@ def _average(sensors, force):
             force[side, contact, 0], force[side, contact, 1] = forward / steps, up / steps
 
 
-@kernel
+@part
 def plant_of(state, i) -> Any:
     """The beginning of row `i` of MuJoCo's state (N, numbers), of `PLANT`; what is written to it is the state."""
     return state[i, :_PLANT_NUMBERS].view(PLANT)[0]

@@ -2,7 +2,7 @@
 
 import mujoco
 
-from ..physics.kernel import kernel
+from ..physics.kernel import part
 from ..physics.measurement import Measurement
 
 TERMINATIONS = (
@@ -22,7 +22,7 @@ TOO_LOW, TOO_TILTED = 1, 2
 """The codes of falls."""
 
 
-@kernel
+@part
 def average(rows, window_forces, running) -> None:
     """Count a step of environments `running` (N,), and average their contact forces over its W control windows.
 

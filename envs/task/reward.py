@@ -16,7 +16,7 @@ from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
-from ..physics.kernel import kernel
+from ..physics.kernel import part
 from ..physics.model import HIP, LEFT, RIGHT
 from ..settings import DEFAULT_WEIGHTS, BipedSettings
 from ..timing import ACTION_STEP
@@ -58,7 +58,7 @@ TASK_OPTIONS = np.dtype(
 """How settings make rewards."""
 
 
-@kernel
+@part
 def _near_zmp(scale, control, planned, m, forces, i):
     """exp(-(distance / tolerance)^2) of the CoP of both feet, mean over the windows of a step, from the planned ZMP."""
     load = moment = 0.0
@@ -76,7 +76,7 @@ def _near_zmp(scale, control, planned, m, forces, i):
     return exp(-(((moment / load - m.ankle[leader, 0] - ahead) / scale.tolerance[3]) ** 2))
 
 
-@kernel
+@part
 def _pose_error(scale, pitch, angle, people):
     error = 0.0
     for joint in range(4):
@@ -85,7 +85,7 @@ def _pose_error(scale, pitch, angle, people):
     return error
 
 
-@kernel
+@part
 def _force_distance(scale, forces, i, side, people):
     """Body weights by which one foot's forces in the windows of a step leave people's range."""
     count = len(forces)
@@ -101,7 +101,7 @@ def _force_distance(scale, forces, i, side, people):
     return EXCESS_SHARE * excess + beyond_forward + beyond_up
 
 
-@kernel
+@part
 def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     """Fill `terms` (N, len(TERMS)): the reward's terms, unweighted and dimensionless, in the order of `TERMS`.
 
@@ -149,7 +149,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
 
 
-@kernel
+@part
 def total(terms, options, reward) -> None:
     """Fill `reward` (N,): weighted sum of `terms` (N, len(TERMS)), in proportion to the time of a step, 1 for 20 ms; 0
     where `alive` is 0. `options` (1,) of `TASK_OPTIONS`."""

@@ -5,12 +5,12 @@ import numpy as np
 from springfoot.gait.arrays import NDArray
 
 from ..control.phase_table import read
-from ..physics.kernel import kernel
+from ..physics.kernel import kernel, part
 from ..physics.model import LEFT, RIGHT
 from .reward_reference import REFERENCE
 
 
-@kernel
+@part
 def curves_at(table, control, curves) -> NDArray:
     """People and plan at the present phases of both legs, (side,) of `REFERENCE`; a view of `curves` (side, C)."""
     for side in range(2):
@@ -18,7 +18,7 @@ def curves_at(table, control, curves) -> NDArray:
     return curves.view(REFERENCE)[:, 0]
 
 
-@kernel
+@part
 def error_of(control, planned, m) -> tuple[float, float, float]:
     """CoM minus plan: x [m], z [m], forward speed [m/s]. The x of the plan is from the ankle of the leg whose stance
     began last."""
