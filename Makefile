@@ -7,13 +7,14 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help install walk test test-wheel test-sdist check format bench clean
+.PHONY: help install walk test test-wheel test-sdist test-learners check format bench clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
 	@echo "make test     run the tests"
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
+	@echo "make test-learners  train with every library of docs/learners.md, each outside $(VENV); goes on after a stop"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
@@ -60,14 +61,28 @@ test-wheel: install
 	springfoot evaluate pretrained 2>&1 | grep -F "pip install 'springfoot[evaluate]'"; \
 	add "[evaluate]"; \
 	springfoot evaluate pretrained --episodes 1; springfoot study criteria --quick; \
+	springfoot export pretrained --to numpy --out pretrained.npz; \
 	springfoot train --out runs/walk 2>&1 | grep -F "pip install 'springfoot[train]'"; \
 	add "[train]"; \
-	springfoot train --timesteps 20000 --out runs/walk; springfoot evaluate runs/walk --episodes 1; ls runs/*
+	springfoot train --timesteps 20000 --out runs/walk; springfoot evaluate runs/walk --episodes 1; ls runs/*; \
+	springfoot export runs/walk --to torch --out walk.pt2; add "[onnx]"; \
+	springfoot export runs/walk --to onnx --out walk.onnx; springfoot evaluate walk.onnx --episodes 1
 
 # The unpacked source distribution passes its own tests, in an environment that it makes itself. Not $(MAKE): with
 # --dry-run, which a test gives, that line would run.
 test-sdist: install
 	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test VENV=.venv
+
+test-learners: install build/learners/many/installed build/learners/rllib/installed
+	$(BIN)/python -m benchmarks.learners
+
+# All of constraints.txt but filelock, of which Tianshou wants an older one, and Gymnasium, which RLlib pins.
+build/learners/%/installed: examples/learners/requirements-%.txt constraints.txt pyproject.toml
+	$(PYTHON) -m venv build/learners/$*
+	grep -vE '^(filelock|gymnasium)==' constraints.txt > build/learners/$*/constraints.txt
+	build/learners/$*/bin/pip install --disable-pip-version-check --constraint build/learners/$*/constraints.txt \
+	  --requirement $< --editable ".[evaluate]" torch
+	@touch $@
 
 check: install build/typing/made
 	$(BIN)/ruff format --check .
