@@ -141,7 +141,7 @@ def train(learner: Learner, python: Path, out: Path) -> None:
 
 def judge(before: PolicyFunction, after: PolicyFunction, must_learn: bool) -> dict[str, Any]:
     """`compare` of two policies over the same episodes of `TASK`."""
-    return compare(*(_returns(policy) for policy in (before, after)), must_learn)
+    return compare(_returns(before), _returns(after), must_learn)
 
 
 def compare(before: NDArray, after: NDArray, must_learn: bool) -> dict[str, Any]:
