@@ -4,6 +4,7 @@ import json
 from importlib import resources
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def _torch(policy: Policy, scale: Scale, contract: str) -> bytes:
 
 
 def _numpy(policy: Policy, scale: Scale, contract: str) -> bytes:
-    arrays = {
+    arrays: dict[str, Any] = {
         "mean": policy.observation_mean,
         "deviation": policy.observation_deviation,
         "clip": np.array(np.inf if policy.observation_clip is None else policy.observation_clip),
@@ -85,5 +86,5 @@ def _numpy(policy: Policy, scale: Scale, contract: str) -> bytes:
     for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
         arrays |= {f"weight_{layer}": weight, f"bias_{layer}": bias}
     file = BytesIO()
-    np.savez(file, allow_pickle=False, **arrays)
+    np.savez(file, **arrays)
     return file.getvalue()

@@ -120,7 +120,7 @@ def result_of(learner: Learner, folder: Path) -> dict[str, Any]:
     began = perf_counter()
     result: dict[str, Any] = {"key": key, "versions": _versions(python, learner.packages)}
     if learner.example == "sb3_recurrent":
-        result |= _judge_recurrent(learner, python, path.with_suffix(".zip").resolve())
+        result |= _judge_recurrent(learner, python, path.with_suffix(".safetensors").resolve())
     else:
         train(replace(learner, timesteps=0), python, before)
         train(learner, python, after)

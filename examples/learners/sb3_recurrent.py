@@ -1,8 +1,8 @@
 """sb3-contrib's RecurrentPPO. A policy with a memory is no policy file, but a function that `evaluate.py` can name.
 
-python examples/learners/sb3_recurrent.py --out recurrent.zip
-cd examples/learners && RECURRENT=../../recurrent.zip python ../../evaluate.py sb3_recurrent:act
-Tried with sb3-contrib 2.9.2. Its files are pickles, which run code when read: read only your own.
+python examples/learners/sb3_recurrent.py --out recurrent.safetensors
+cd examples/learners && RECURRENT=../../recurrent.safetensors python ../../evaluate.py sb3_recurrent:act
+Tried with sb3-contrib 2.9.2. Weights and statistics are kept as plain arrays: sb3's own files run code when read.
 """
 
 import os
@@ -12,48 +12,49 @@ from typing import Any
 import numpy as np
 import torch
 import tyro
+from safetensors.torch import load_file, save_file
 from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from springfoot.agents import SegmentedFootBipedVecEnv
 
+HOW: dict[str, Any] = {"n_steps": 64, "batch_size": 256, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.98}
+NETWORK = {"net_arch": [64], "lstm_hidden_size": 32, "log_std_init": -0.9}
 TASK: dict[str, Any] = {"episode_seconds": 10.0, "push_newton": 150.0}
+STATISTICS = ("mean", "var")
 LAST_ACTION = slice(34, 38)  # of the observation, all 0 at the start of an episode
 
 
-def main(out: str = "recurrent.zip", timesteps: int = 131_072, seed: int = 0) -> None:
-    """Train, and write the model and, beside it, its statistics."""
+def _untrained(num_envs: int, seed: int = 0) -> tuple[Any, Any]:
+    envs = VecNormalize(SegmentedFootBipedVecEnv(num_envs, **TASK), gamma=0.98)
+    return RecurrentPPO("MlpLstmPolicy", envs, seed=seed, policy_kwargs=NETWORK, **HOW), envs
+
+
+def main(out: str = "recurrent.safetensors", timesteps: int = 131_072, seed: int = 0) -> None:
+    """Train, and write weights and statistics."""
     torch.set_num_threads(1)
-    envs = VecNormalize(SegmentedFootBipedVecEnv(16, **TASK), gamma=0.98)
-    network = {"net_arch": [64], "lstm_hidden_size": 32, "log_std_init": -0.9}
-    schedule: dict[str, Any] = {"n_steps": 64, "batch_size": 256, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.98}
-    model = RecurrentPPO("MlpLstmPolicy", envs, policy_kwargs=network, seed=seed, **schedule)
+    model, envs = _untrained(16, seed)
     model.learn(timesteps)
-    model.save(out)
-    envs.save(f"{out}.statistics")
+    save_file(model.policy.state_dict() | {name: torch.tensor(getattr(envs.obs_rms, name)) for name in STATISTICS}, out)
 
 
 @cache
 def _trained() -> tuple[Any, Any]:
-    out, envs = os.environ["RECURRENT"], SegmentedFootBipedVecEnv(1, **TASK)
-    return RecurrentPPO.load(out), VecNormalize.load(f"{out}.statistics", envs)
-
-
-memory: Any = None
+    (model, envs), arrays = _untrained(1), load_file(os.environ["RECURRENT"])
+    envs.obs_rms.mean, envs.obs_rms.var = (arrays.pop(name).numpy() for name in STATISTICS)
+    model.policy.load_state_dict(arrays)
+    return model, envs
 
 
 def act(observation: np.ndarray) -> np.ndarray:
     """Actions (N, 4) for observations (N, D) of the same N episodes, step after step."""
-    global memory
     model, statistics = _trained()
-    starts = ~observation[:, LAST_ACTION].any(axis=1)
-    if memory is not None and memory[0].shape[1] != len(observation):
-        memory = None
-    seen = statistics.normalize_obs(observation)
-    action, memory = model.predict(seen, memory, episode_start=starts, deterministic=True)
+    starts, seen = ~observation[:, LAST_ACTION].any(axis=1), statistics.normalize_obs(observation)
+    known = act.memory if act.memory is not None and act.memory[0].shape[1] == len(observation) else None
+    action, act.memory = model.predict(seen, known, episode_start=starts, deterministic=True)
     return action
 
 
-act.settings = TASK
+act.settings, act.memory = TASK, None
 if __name__ == "__main__":
     tyro.cli(main)
