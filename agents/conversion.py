@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
+from gymnasium import ObservationWrapper
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings, settings_from
@@ -78,7 +79,7 @@ def policy_from_mlp(
     for name, value in (("observation_mean", mean), ("observation_variance", variance)):
         if value.shape != (width,):
             raise SpringfootError(f"{name} must be ({width},), is {value.shape}")
-    if (variance + variance_floor <= 0).any():
+    if (variance < 0).any() or (variance + variance_floor <= 0).any():
         raise SpringfootError("observation_variance with variance_floor must be positive")
     return Policy(
         settings=settings,
@@ -112,7 +113,8 @@ def policy_from_sb3(
 
     For every observation it acts as `model.predict(normalizer.normalize_obs(observation), deterministic=True)` does, to
     the precision of float32; with `ignore_unvaried`, for those that training could meet. Raises `SpringfootError`, one
-    line, for a network that is no MLP of one activation, and where settings are missing.
+    line, for a network that is no MLP of one activation, behind a Gymnasium wrapper of observations, and where settings
+    are missing.
     """
     if settings is None:
         try:
@@ -127,6 +129,11 @@ def policy_from_sb3(
         raise SpringfootError("the model acts on another range than [-1, 1]: a wrapper rescales the actions")
     layers, activation, output = actor_of(model.policy)
     policy = policy_from_mlp(layers, settings, activation=activation, output=output, **statistics_of(normalizer))
+    if model.get_env() is not None and any(model.get_env().env_is_wrapped(ObservationWrapper)):
+        raise SpringfootError(
+            "a wrapper changes the observations before the model sees them: train with VecNormalize instead, "
+            "or give its statistics to policy_from_mlp"
+        )
     return ignoring_unvaried(policy) if ignore_unvaried else policy
 
 

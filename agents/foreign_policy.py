@@ -64,7 +64,11 @@ class ForeignPolicy:
         """Actions (N, 4) in [-1, 1] for observations (N, D)."""
         rows = observation_rows(observation, self.width).astype(np.float32)
         batch = np.atleast_2d(rows)
-        actions = np.asarray(self.act(batch), np.float64)
+        returned = self.act(batch)
+        try:
+            actions = np.asarray(returned, np.float64)
+        except (TypeError, ValueError):
+            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned no numbers") from None
         if actions.shape != (len(batch), len(ACTIONS)):
             raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned {actions.shape}")
         if not np.isfinite(actions).all():

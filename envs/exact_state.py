@@ -46,7 +46,8 @@ class ExactState(ABC):
         """Put environments `ids` (K,), all if None, into the state of K environments of a batch of the same settings.
 
         What they then do has the bits of what those go on to do. Generators are set in place.
-        Raises `SpringfootError`, leaving all state unchanged, for a state that is not of K such environments.
+        Raises `SpringfootError`, leaving all state unchanged, for a state of other names, shapes or generators; it
+        holds no settings, and they are not compared.
         """
         chosen = np.arange(len(self._random)) if ids is None else ids
         numbers = dict(self._numbers())
@@ -58,9 +59,15 @@ class ExactState(ABC):
                 raise SpringfootError(f"the state does not fit: {name!r} must be {shape}, got {np.shape(state[name])}")
         if len(state["generators"]) != len(chosen):
             raise SpringfootError(f"the state does not fit: {len(chosen)} generators, got {len(state['generators'])}")
-        self._embody(chosen, state["control.subject.height"], state["control.subject.mass"])
+        try:
+            given = {name: np.asarray(state[name]).astype(values.dtype) for name, values in numbers.items()}
+            for own in state["generators"]:
+                _generator(None, own)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise SpringfootError(f"the state does not fit: {' '.join(str(error).split())}") from None
+        self._embody(chosen, given["control.subject.height"], given["control.subject.mass"])
         for name, values in numbers.items():
-            values[chosen] = state[name]
+            values[chosen] = given[name]
         for index, own in zip(chosen.tolist(), state["generators"], strict=True):
             self._random[index] = _generator(self._random[index], own)
 
@@ -86,6 +93,8 @@ def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | N
     if state is None:
         return None
     kind = getattr(np.random, state["bit_generator"])
+    if not (isinstance(kind, type) and issubclass(kind, np.random.BitGenerator)):
+        raise ValueError(f"{state['bit_generator']} is no bit generator of NumPy's")
     if present is None or type(present.bit_generator) is not kind:
         present = np.random.Generator(kind())
     present.bit_generator.state = dict(state)

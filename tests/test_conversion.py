@@ -245,3 +245,9 @@ def test_weights_that_make_no_policy_are_refused_with_one_line(layers, how, said
         policy_from_mlp(layers, **{"settings": {}, "activation": "tanh"} | how)
     assert "\n" not in str(refused.value)
     assert said in (None, str(refused.value))
+
+
+def test_a_wrapper_that_changes_observations_is_not_overlooked():
+    env = gym.wrappers.NormalizeObservation(gym.make("springfoot.envs:SegmentedFootBiped-v0"))
+    with pytest.raises(SpringfootError, match="a wrapper changes the observations before the model sees them"):
+        policy_from_sb3(PPO("MlpPolicy", env, device="cpu"))

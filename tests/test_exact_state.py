@@ -161,3 +161,17 @@ def test_a_state_that_does_not_fit_is_refused_and_nothing_changes(change, messag
     with pytest.raises(SpringfootError, match=message):
         biped.restore(state)
     np.testing.assert_array_equal(biped.observe(), before)
+
+
+@pytest.mark.parametrize("generators", [[], ["x"], [1], [{"bit_generator": "seed"}], [{}]], ids=repr)
+def test_a_broken_generator_leaves_the_state_as_it_is(generators):
+    biped = Biped(settings_from(), 1)
+    biped.reset(np.arange(1), [0])
+    before = biped.state()
+    other = Biped(settings_from(), 1)
+    other.reset(np.arange(1), [1])
+    with pytest.raises(SpringfootError, match="the state does not fit"):
+        biped.restore(other.state() | {"generators": generators})
+    after = biped.state()
+    assert after.pop("generators") == before.pop("generators")
+    assert all(np.array_equal(after[name], before[name], equal_nan=True) for name in before)
