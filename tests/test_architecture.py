@@ -1,4 +1,4 @@
-"""The house stays easy to see: no file too long, and no public name that means different things in two rooms."""
+"""The house stays easy to see: no file too long, no public name with two meanings; and no file is run by reading it."""
 
 import ast
 from collections import defaultdict
@@ -36,3 +36,24 @@ def test_no_public_name_means_different_things_in_two_packages():
         for name in names_defined_in(path):
             rooms_of[name].add(path.relative_to(REPOSITORY).parts[0])
     assert {name: sorted(rooms) for name, rooms in rooms_of.items() if len(rooms) > 1} == {}
+
+
+SOURCES = sorted(path for room in ("package", "examples", "benchmarks") for path in (REPOSITORY / room).rglob("*.py"))
+SOURCES += [*FILES, *sorted(REPOSITORY.glob("*.py"))]
+UNPICKLERS = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
+LOADERS = {"torch.load", "PPO.load", "VecNormalize.load"}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(REPOSITORY)))
+def test_nothing_executes_what_a_file_says(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = {alias.name.partition(".")[0] for alias in node.names}
+            assert not UNPICKLERS & names, f"{path}:{node.lineno}"
+        elif isinstance(node, ast.ImportFrom):
+            assert (node.module or "").partition(".")[0] not in UNPICKLERS, f"{path}:{node.lineno}"
+        elif isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            assert called not in {"eval", "exec"}, f"{path}:{node.lineno}"
+            assert ".".join(called.split(".")[-2:]) not in LOADERS, f"{path}:{node.lineno}"
+            assert "allow_pickle" not in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"

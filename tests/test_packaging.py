@@ -1,6 +1,5 @@
-"""The package as others get it: complete, importable floor by floor, free of pickle and of anyone's paths."""
+"""The package as others get it: complete, importable floor by floor, free of anyone's paths."""
 
-import ast
 import json
 import re
 import shutil
@@ -273,28 +272,6 @@ except SystemExit:
     learner = {"stable_baselines3", *(extra - {"springfoot", "stable-baselines3"})}
     assert "springfoot.evaluation.evaluate_command" in loaded
     assert not learner & set(loaded)
-
-
-SOURCES = [path for path in files("package", *ROOMS, "examples", "benchmarks") if path.suffix == ".py"] + [
-    path.relative_to(ROOT) for path in sorted(ROOT.glob("*.py"))
-]
-UNPICKLERS = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
-LOADERS = {"torch.load", "PPO.load", "VecNormalize.load"}
-
-
-@pytest.mark.parametrize("path", SOURCES, ids=str)
-def test_nothing_executes_what_a_file_says(path):
-    for node in ast.walk(ast.parse((ROOT / path).read_text())):
-        if isinstance(node, ast.Import):
-            names = {alias.name.partition(".")[0] for alias in node.names}
-            assert not UNPICKLERS & names, f"{path}:{node.lineno}"
-        elif isinstance(node, ast.ImportFrom):
-            assert (node.module or "").partition(".")[0] not in UNPICKLERS, f"{path}:{node.lineno}"
-        elif isinstance(node, ast.Call):
-            called = ast.unparse(node.func)
-            assert called not in {"eval", "exec"}, f"{path}:{node.lineno}"
-            assert ".".join(called.split(".")[-2:]) not in LOADERS, f"{path}:{node.lineno}"
-            assert "allow_pickle" not in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"
 
 
 def test_no_file_names_a_place_on_somebodys_machine(known):

@@ -1,115 +1,19 @@
-"""The task: observation within bounds, reward against closed forms, falls at limits, same bits for any N."""
+"""The reward against closed forms, falls at their limits, the same bits for any N."""
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from planned_body import Setup, leg_phases
 
-from springfoot.envs.control.reference_walk import reference_walks, rows
-from springfoot.envs.control.subjects import Subjects
-from springfoot.envs.physics.measurement import BODY_ROW, Measurement
-from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
-from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from
+from springfoot.envs.physics.measurement import Measurement
+from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
+from springfoot.envs.settings import DEFAULT_WEIGHTS, BipedSettings
 from springfoot.envs.task.episode_end import TOO_LOW, TOO_TILTED
-from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.envs.task.reward import (
     EXCESS_SHARE,
     FORCE_TOLERANCE,
-    TERMS,
-    Task,
-    judge,
-    total,
 )
-from springfoot.gait.body import GRAVITY, Body
-from springfoot.gait.com_plan import over_peoples_zmp
+from springfoot.gait.body import GRAVITY
 from springfoot.gait.errors import SpringfootError
-from springfoot.gait.human import human_gait
-from springfoot.gait.plan import plan_walk
-
-
-class Setup:
-    """A task with the body, plan and people's curves it was made from."""
-
-    def __init__(self, **settings):
-        self.settings = settings_from(**settings)
-        self.body = Body(self.settings.height, self.settings.mass)
-        self.human = human_gait(self.settings.speed, self.settings.height)
-        self.plan = over_peoples_zmp(plan_walk(self.body, self.settings.speed))
-        self.walks = reference_walks(self.settings)
-
-    def task(self, num) -> Task:
-        """For so many environments."""
-        return self.at(np.zeros(num))[0]
-
-    def at(self, left_phase, measurement=None) -> tuple[Task, NDArray, NDArray]:
-        """Task, rows of the control, and rows of the bodies, at these phases and as measured."""
-        legs = leg_phases(np.atleast_1d(left_phase))
-        subjects = Subjects(self.settings, np.array([self.settings.speed]), len(legs))
-        subjects.rows["legs"]["phase"] = legs
-        bodies = np.zeros(len(legs), BODY_ROW)
-        for name, values in vars(measurement or self.measurement(legs[:, LEFT])).items():
-            bodies["measured"][name] = values
-        return Task(self.settings, list(rows(self.walks)), subjects), subjects.rows, bodies
-
-    def tracking(self, measurement, left_phase) -> NDArray:
-        task, _, bodies = self.at(left_phase, measurement)
-        return task.tracking(bodies)
-
-    def measurement(self, left_phase, **other) -> Measurement:
-        """The body on its plan with people's joint angles, trunk upright, the leading ankle at x = 10 m."""
-        phase = np.atleast_1d(np.asarray(left_phase, float))
-        n, legs = len(phase), leg_phases(phase)
-        step = 2 * np.minimum(legs[:, LEFT], legs[:, RIGHT])
-        x, z = self.plan.com(step)
-        angle = np.stack([self.human.mean(name, legs) for name in ("thigh", "knee", "ankle", "toe")], -1)
-        values = {
-            "time": np.zeros(n),
-            "base": np.tile([10.0, self.body.leg_length, 0.0], (n, 1)),
-            "base_velocity": np.zeros((n, 3)),
-            "angle": angle,
-            "velocity": np.zeros((n, 2, 4)),
-            "torque": np.zeros((n, 2, 4)),
-            "com": np.stack([10 + x, z], -1),
-            "com_velocity": np.tile([self.settings.speed, 0.0], (n, 1)),
-            "ankle": np.stack([np.where(legs < 0.5, 10.0, 9.0), np.full((n, 2), 0.1)], -1),
-            "contact": np.zeros((n, 2, 3, 2)),
-            "force": np.zeros((n, 2, 3, 2)),
-            "diverged": np.full(n, -1),
-        }
-        return Measurement(**(values | other))
-
-    def people_force(self, left_phase, windows=2):
-        """People's forces (W, N, 2, 3, 2) [N] amid the step that ends at `left_phase`, all on the ball."""
-        legs = leg_phases(np.atleast_1d(left_phase)) - 0.01 / self.plan.stride_time
-        force = np.zeros((windows, len(legs), 2, 3, 2))
-        for axis, name in enumerate(("grf_forward", "grf_vertical")):
-            force[..., 1, axis] = self.human.mean(name, legs) * self.body.mass * GRAVITY
-        return force
-
-    def terms(self, measurement, left_phase, **other):
-        n = len(np.atleast_1d(left_phase))
-        values = {
-            "action": np.zeros((n, 4)),
-            "last_action": np.zeros((n, 4)),
-            "stiffness": np.tile([300.0, 60.0], (n, 2, 1)) * self.body.mass_scale * self.body.length_scale,
-            "force_windows": self.people_force(left_phase),
-        }
-        values |= other
-        task, controls, bodies = self.at(left_phase, measurement)
-        controls["decision"]["action"], controls["decision"]["last_action"] = values["action"], values["last_action"]
-        controls["springs"]["stiffness"] = values["stiffness"]
-        terms = np.empty((n, len(TERMS)))
-        judge(task.rows, controls, bodies, task.table, task.options, values["force_windows"], terms)
-        return dict(zip(TERMS, terms.T, strict=True))
-
-    def reward(self, terms) -> NDArray:
-        total_of = np.empty(len(terms["alive"]))
-        total(np.stack([*terms.values()], -1), self.task(len(total_of)).options, total_of)
-        return total_of
-
-
-def leg_phases(left):
-    left = np.asarray(left, float)
-    return np.stack([left, (left + 0.5) % 1], -1)
 
 
 @pytest.fixture(scope="module")
@@ -285,90 +189,6 @@ def test_a_diverged_simulation_is_not_alive(thesis_body):
     np.testing.assert_array_equal(thesis_body.terms(measured, [0.2, 0.2])["alive"], [1.0, 0.0])
 
 
-def observe(setup, measured, left_phase, **other):
-    n = len(left_phase)
-    values = {
-        "last_action": np.zeros((n, 4)),
-        "force": np.zeros((n, 2, 3, 2)),
-    }
-    values |= other
-    task, controls, bodies = setup.at(left_phase, measured)
-    controls["decision"]["last_action"], task.rows["force"] = values["last_action"], values["force"]
-    return task.observe(bodies)
-
-
-def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
-    setup = Setup(height=1.5, mass=80, speed=0.9)
-    measured = setup.measurement([0.1, 0.7])
-    measured.base[:, 1:] = [0.7, 0.1]
-    measured.base_velocity[:] = [0.9, -0.1, 0.5]
-    measured.angle[:] = np.arange(8).reshape(2, 4) / 10
-    measured.velocity[:] = -np.arange(8).reshape(2, 4)
-    force = np.zeros((2, 2, 3, 2))
-    force[..., 1] = np.arange(6).reshape(2, 3) * 100.0
-    action = np.tile([0.1, 0.2, 0.3, 0.4], (2, 1))
-    planned = setup.human.mean("ankle", np.array([0.1, 0.6]))
-    seen = observe(setup, measured, [0.1, 0.7], last_action=action, force=force)
-    row, other = (dict(zip(setup.task(2).names, values, strict=True)) for values in seen)
-
-    leg = setup.body.leg_length
-    froude, rate = np.sqrt(GRAVITY * leg), np.sqrt(leg / GRAVITY)
-    expected = {
-        "hip_height": 0.7 / leg,
-        "pitch": 0.1,
-        "hip_left": 0.0,
-        "toe_left": 0.3,
-        "hip_right": 0.4,
-        "ankle_right": 0.6,
-        "hip_velocity_x": 0.9 / froude,
-        "hip_velocity_z": -0.1 / froude,
-        "pitch_rate": 0.5 * rate,
-        "knee_rate_left": -1 * rate,
-        "toe_rate_right": -7 * rate,
-        "phase_sin": np.sin(0.2 * np.pi),
-        "phase_cos": np.cos(0.2 * np.pi),
-        "phase_sin_2": np.sin(0.4 * np.pi),
-        "phase_cos_2": np.cos(0.4 * np.pi),
-        "load_heel_left": 0.0,
-        "load_toe_left": 200 / (80 * GRAVITY),
-        "load_heel_right": 300 / (80 * GRAVITY),
-        "com_x_error": 0.0,
-        "com_z_error": 0.0,
-        "last_action_ankle_left": 0.1,
-        "last_action_toe_right": 0.4,
-        "planned_ankle_left": planned[LEFT],
-        "planned_ankle_right": planned[RIGHT],
-        "leading_leg": 1.0,
-        "command_speed": setup.body.froude_speed(0.9),
-        "height_ratio": 1.5 / 1.7,
-    }
-    for name, value in expected.items():
-        assert row[name] == pytest.approx(value, rel=1e-6, abs=1e-4), name
-    assert other["leading_leg"] == -1.0
-    assert other["com_x_error"] == pytest.approx(0.0, abs=1e-4)
-
-
-def test_observation_is_finite_and_within_bounds_whatever_happens(thesis_body):
-    task = thesis_body.task(3)
-    measured = thesis_body.measurement([0.2, 0.3, 0.4])
-    for values, wild in ((measured.angle, 1e9), (measured.velocity, -1e9), (measured.base_velocity, np.nan)):
-        values[:] = wild
-    measured.com[:] = np.inf
-    seen = observe(thesis_body, measured, [0.2, 0.3, 0.4])
-    assert seen.dtype == np.float32
-    assert seen.shape == (3, len(OBSERVATION)) == (3, len(task.low))
-    assert np.isfinite(seen).all()
-    assert ((seen >= task.low) & (seen <= task.high)).all()
-    assert np.isfinite(task.low).all() and np.isfinite(task.high).all()
-    assert (task.low < task.high).all()
-
-
-def test_names_are_unique_and_name_the_actions():
-    names = [entry.name for entry in OBSERVATION]
-    assert len(set(names)) == len(names)
-    assert [name.removeprefix("last_action_") for name in names if name.startswith("last_action_")] == list(ACTIONS)
-
-
 def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
     rng = np.random.default_rng(0)
     n, setup = 64, thesis_body
@@ -385,7 +205,7 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
 
     def results(rows):
         measured = Measurement(diverged=base.diverged[rows], **{name: value[rows] for name, value in numbers.items()})
-        seen = observe(setup, measured, left[rows], last_action=last[rows], force=force[0, rows])
+        seen = setup.observe(measured, left[rows], last_action=last[rows], force=force[0, rows])
         own = {"action": action[rows], "last_action": last[rows], "stiffness": stiffness[rows]}
         terms = setup.terms(measured, left[rows], **own, force_windows=force[:, rows])
         return np.column_stack([seen, setup.reward(terms), *terms.values()])
