@@ -102,6 +102,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | grf            | 5      | exp(-D/0.4), D body weights by which the feet's forces leave people's range     |
     | stiffness_rate | -0.1   | squared change of the action, per 20 ms                                         |
     | stiffness      | -0.02  | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
+    | effort         | 0      | positive power of all joints over weight x commanded speed (cost of transport)  |
 
     ## Starting state
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at

@@ -55,13 +55,13 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:
-    """Refuse unknown reward terms, and weights whose sign is not that of the term's weight in `defaults`."""
+    """Refuse unknown reward terms, and weights whose sign is not that of the term's in `defaults`, where 0 is a cost."""
     if not isinstance(weights, dict):
         raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {weights!r}")
     for name, weight in weights.items():
         if name not in defaults:
             raise SpringfootError(f"reward_weights has no term {name!r}; valid: {', '.join(defaults)}")
-        cost = defaults[name] < 0
+        cost = defaults[name] <= 0
         if not is_number(weight) or (weight > 0 if cost else weight < 0):
             allowed = "<= 0 (a cost)" if cost else ">= 0 (a reward)"
             raise SpringfootError(f"reward_weights[{name!r}] must be a finite number {allowed}, got {weight!r}")

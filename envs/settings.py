@@ -62,8 +62,9 @@ DEFAULT_WEIGHTS = {
     "grf": 5.00,
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
+    "effort": 0.0,
 }
-"""Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, a negative one is a cost."""
+"""Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
 
 
 _BODY, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = ({"theme": name} for name in THEMES)

@@ -30,6 +30,7 @@ STUDIES = {
     "bodies": ("body_sweep.Bodies", "Does a policy walk with any body at any speed?"),
     "criteria": ("criteria_met.CriteriaMet", "Which criteria of a human-like walk does a policy meet?"),
     "front": ("front.Front", "Which criteria has no policy together, and by how much are they missed?"),
+    "mix": ("policy_mixing.Mix", "Which weighted mean of related policies meets most criteria? (searches)"),
     "conditions": ("conditions.Conditions", "How does a policy walk elsewhere, and how do other springs?"),
     "ablations": ("ablations.Ablations", "What does each part of the training contribute? (trains)"),
     "stiffness-cost": ("stiffness_cost.StiffnessCost", "What does a cost on stiffness take and give? (trains)"),

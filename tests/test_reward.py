@@ -113,6 +113,15 @@ def test_costs_count_what_they_say(thesis_body):
     np.testing.assert_allclose(terms["stiffness"], 0.5 * ((4 + 0.25) + (1 + 1)) / 1.25)
 
 
+@pytest.mark.parametrize("height", [1.7, 1.3])
+def test_effort_is_the_cost_of_transport_of_the_moment(height):
+    setup, random = Setup(height=height, mass=45, speed=1.0), np.random.default_rng(0)
+    torque, velocity = 50 * random.normal(size=(2, len(PHASES), 2, 4))
+    terms = setup.terms(setup.measurement(PHASES, torque=torque, velocity=velocity), PHASES)
+    power = np.maximum(torque * velocity, 0.0).sum((1, 2))
+    np.testing.assert_allclose(terms["effort"], power / (45 * GRAVITY * 1.0), rtol=1e-12)
+
+
 def test_force_is_rewarded_within_people_and_less_with_each_body_weight_beyond(thesis_body):
     phase = np.array([0.15])
     measured, force = thesis_body.measurement(phase), thesis_body.people_force(phase)

@@ -44,9 +44,12 @@ FORCE_TOLERANCE = 0.4
 push-off far too strong costs hardly more than one a little too strong."""
 
 
-TERMS: tuple[str, ...] = ("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf", "stiffness_rate", "stiffness")
-"""The reward's terms, in the order in which they are summed."""
-ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS = range(len(TERMS))
+TERMS: tuple[str, ...] = (
+    *("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf"),
+    *("stiffness_rate", "stiffness", "effort"),
+)
+"""The reward's terms, in the order in which they are summed: rewards, then costs."""
+ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, EFFORT = range(len(TERMS))
 TASK_OPTIONS = np.dtype(
     [
         ("weights", float, len(TERMS)),  # of the reward's terms
@@ -102,6 +105,15 @@ def _force_distance(scale, forces, i, side, people):
 
 
 @part
+def _positive_power(m):
+    power = 0.0
+    for side in range(2):
+        for joint in range(4):
+            power += max(m.torque[side, joint] * m.velocity[side, joint], 0.0)
+    return power
+
+
+@part
 def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     """Fill `terms` (N, len(TERMS)): the reward's terms, unweighted and dimensionless, in the order of `TERMS`.
 
@@ -112,7 +124,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave people's range: vertical beyond 1.2
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
-    [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg.
+    [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg; `effort`, positive power of hips, knees,
+    ankles and toes at the step's end over body weight times commanded speed: the cost of transport of that moment.
 
     Args:
         rows: (N,) of `TASK_ROW`.
@@ -147,6 +160,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
         terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
         terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
+        terms[i, EFFORT] = _positive_power(m) / (scale.weight * control.subject.speed)
 
 
 @part
