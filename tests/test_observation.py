@@ -84,3 +84,15 @@ def test_names_are_unique_and_name_the_actions():
     names = [entry.name for entry in OBSERVATION]
     assert len(set(names)) == len(names)
     assert [name.removeprefix("last_action_") for name in names if name.startswith("last_action_")] == list(ACTIONS)
+
+
+def test_contact_loads_are_in_weights_of_the_body_with_what_it_carries(thesis_body):
+    loaded = Setup(carried_ratio=0.25)
+    force = np.zeros((1, 2, 3, 2))
+    force[..., 1] = 100.0
+    entry = [each.name for each in OBSERVATION].index("load_ball_left")
+    alone, carrying = (
+        setup.observe(setup.measurement([0.1]), [0.1], force=force)[0, entry] for setup in (thesis_body, loaded)
+    )
+    assert alone == pytest.approx(100.0 / (63.0 * GRAVITY), rel=1e-6)
+    assert carrying == pytest.approx(alone / 1.25, rel=1e-6)
