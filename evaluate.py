@@ -3,6 +3,7 @@
 import sys
 
 from springfoot.evaluation.evaluate_command import evaluate_main
+from springfoot.terminal import at_terminal
 
 if __name__ == "__main__":
-    sys.exit(evaluate_main())
+    sys.exit(at_terminal(evaluate_main))

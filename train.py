@@ -3,6 +3,7 @@
 import sys
 
 from springfoot.agents.train_command import train_main
+from springfoot.terminal import at_terminal
 
 if __name__ == "__main__":
-    sys.exit(train_main())
+    sys.exit(at_terminal(train_main))

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, printable
 
 from .baselines import FROZEN
 
@@ -19,8 +19,10 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
     try:
         return work() or 0
+    except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
+        raise
     except (SpringfootError, OSError, MemoryError) as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
+        print(f"{name}: error: {printable(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130

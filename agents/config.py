@@ -5,8 +5,15 @@ from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import Any
 
+from springfoot.envs.physics.simulation import MOST_THREADS
+from springfoot.envs.setting_checks import MOST_ENVIRONMENTS
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.gait.errors import MOST_COUNT, SpringfootError, quoted, require_count, require_number
+
+WIDEST, DEEPEST = 8192, 32
+"""Units of the widest hidden layer, and most of those layers; chosen."""
+_LARGEST = 1e3  # rate of learning or clip range; chosen
+_SIDE_BY_SIDE = ("num_envs", "eval_episodes")
 
 TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
 """The default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range where it is 0."""
@@ -53,18 +60,23 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         for name in ("timesteps", "num_envs", "minibatches", "epochs", "eval_interval", "eval_episodes"):
-            require_count(name, getattr(self, name))
+            require_count(name, getattr(self, name), 1, MOST_ENVIRONMENTS if name in _SIDE_BY_SIDE else MOST_COUNT)
         require_count("seed", self.seed, 0, 2**31 - 1)
-        require_count("threads", self.threads, 0)
+        require_count("threads", self.threads, 0, MOST_THREADS)
         require_count("update_steps", self.update_steps, max(self.num_envs, 2 * self.minibatches))
         for name in ("learning_rate", "clip_range"):
-            require_number(name, getattr(self, name), 0, above=True)
+            require_number(name, getattr(self, name), 0, _LARGEST, above=True)
         require_number("gamma", self.gamma, 0, 1, above=True)
         for name in ("gae_lambda", "learning_rate_end"):
             require_number(name, getattr(self, name), 0, 1)
         require_number("log_std", self.log_std, -5, 2)
-        if not self.hidden or any(type(width) is not int or width < 1 for width in self.hidden):
-            raise SpringfootError(f"hidden must be one or more positive whole numbers, got {self.hidden!r}")
+        layers = self.hidden if isinstance(self.hidden, tuple) else ()
+        if not layers or any(type(width) is not int or width < 1 for width in layers):
+            raise SpringfootError(f"hidden must be one or more positive whole numbers, got {quoted(self.hidden)}")
+        if max(layers) > WIDEST or len(layers) > DEEPEST:
+            raise SpringfootError(
+                f"hidden must be at most {DEEPEST} layers of at most {WIDEST} units, got {quoted(self.hidden)}"
+            )
 
 
 PRESETS: dict[str, TrainingConfig] = {

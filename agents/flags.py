@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import tyro
 
 from springfoot.envs.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
+from springfoot.gait.errors import quoted
 from springfoot.gait.own_data import read_gait
 
 
@@ -33,11 +34,14 @@ def _read_json(words: list[str]) -> dict[str, Any]:
     """A dictionary from JSON text, or from the JSON file of that name."""
     text = words[0]
     if not text.lstrip().startswith("{"):
-        path = Path(text)
-        if not path.is_file():
-            raise ValueError(f"{text!r} is neither JSON text in braces nor the name of a JSON file")
-        text = path.read_text(encoding="utf-8")
-    value = json.loads(text)
+        try:
+            text = Path(text).read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            raise ValueError(f"{quoted(text)} is neither JSON text in braces nor the name of a JSON file") from None
+    try:
+        value = json.loads(text)
+    except RecursionError:
+        raise ValueError("the JSON is nested too deeply") from None
     if not isinstance(value, dict):
         raise ValueError("the JSON must be an object in braces")
     return value

@@ -26,6 +26,7 @@ from .physics.foot_contact import CONTACTS
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, JOINTS, SIDES
 from .physics.simulation import MjData, MjModel, Simulation
+from .setting_checks import real_numbers
 from .settings import BipedSettings
 from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
 from .step_result import StepResult, Tick, room
@@ -259,7 +260,7 @@ class Biped(ExactState):
 
     def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
         """The actions that take effect, in [-1, 1]; an environment that is not `running` keeps its last one."""
-        action = np.array(actions, float, order="C")
+        action = real_numbers("actions", actions)
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
         taken = self._decisions.take(action, running)

@@ -11,6 +11,7 @@ from springfoot.gait.errors import SpringfootError
 from .biped_batch import Biped
 from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
 from .physics.simulation import MjData, MjModel
+from .setting_checks import check_seed, real_numbers
 from .settings import settings_from
 from .step_result import INFO, report_start
 
@@ -236,7 +237,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     ) -> tuple[NDArray, dict[str, Any]]:
         """Start an episode; `options` may set its `start`, `height`, `mass` and `speed` (see Starting state)."""
         chosen = check_options(options)
-        super().reset(seed=seed)
+        super().reset(seed=check_seed(seed))
         self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), bodies_and_speeds(chosen, 1))
         self._over = False
         if self.render_mode == "human":
@@ -248,7 +249,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         """Hold the stiffness that `action` (4,) stands for during a step, 20 ms by default."""
         if self._over:
             raise SpringfootError("no episode is running: call reset() before step()")
-        action = np.asarray(action)
+        action = real_numbers("action", action)
         if action.shape != self.action_space.shape:
             raise SpringfootError(f"action must have shape {self.action_space.shape}, got {action.shape}")
         result = self.biped.step(action[None])

@@ -1,5 +1,6 @@
 """What both Gymnasium faces share: spaces, spec, options of a reset, pictures, and what is pickled."""
 
+from collections.abc import Mapping
 from copy import copy
 from typing import Any
 
@@ -8,12 +9,12 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 
 from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, quoted
 
 from .biped_batch import Biped
 from .control.subjects import DRAWN
 from .physics.rendering import RENDER_MODES, Camera
-from .setting_checks import check_start
+from .setting_checks import check_start, real_numbers
 from .settings import BipedSettings
 from .timing import ACTION_STEP
 
@@ -67,10 +68,12 @@ def spaces_of(biped: Biped) -> tuple[Box, Box]:
 
 def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
     """The options of a reset; raises `SpringfootError` for an unknown one or a bad start."""
-    options, allowed = options or {}, ("start", *DRAWN, *more)
+    options, allowed = {} if options is None else options, ("start", *DRAWN, *more)
+    if not isinstance(options, Mapping):
+        raise SpringfootError(f"reset options must be a dictionary, got {quoted(options)}")
     for name in options:
         if name not in allowed:
-            raise SpringfootError(f"unknown reset option {name!r}; valid: {', '.join(allowed)}")
+            raise SpringfootError(f"unknown reset option {quoted(name)}; valid: {', '.join(allowed)}")
     if "start" in options:
         check_start(options["start"])
     return options
@@ -82,17 +85,17 @@ def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
     for name in DRAWN:
         if name in options:
             try:
-                given[name] = np.broadcast_to(np.asarray(options[name], float), (num,))
-            except (TypeError, ValueError):
+                given[name] = np.broadcast_to(real_numbers(name, options[name]), (num,))
+            except ValueError:
                 raise SpringfootError(
                     f"reset option {name!r} must be a number, or one for each of {num} environments, "
-                    f"got {options[name]!r:.60}"
+                    f"got {quoted(options[name])}"
                 ) from None
     return given
 
 
 def check_render_mode(mode: str | None) -> str | None:
     """The render mode; raises `SpringfootError` for an unknown one."""
-    if mode is not None and mode not in RENDER_MODES:
-        raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {mode!r}")
+    if mode is not None and not (isinstance(mode, str) and mode in RENDER_MODES):
+        raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {quoted(mode)}")
     return mode

@@ -5,7 +5,25 @@ from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
-from springfoot.gait.errors import SpringfootError, as_float
+import numpy as np
+
+from springfoot.gait.arrays import NDArray
+from springfoot.gait.errors import SpringfootError, as_float, quoted, require_count, require_number
+from springfoot.gait.stiffness import STIFFNESS_RANGE
+
+STIFFNESS_BOUNDS = (1e-3, STIFFNESS_RANGE[1])
+"""Softest and stiffest spring of an action [N m/rad]; chosen: beyond, products of stiffnesses leave the numbers."""
+MOST_WEIGHT = 1e6
+"""Largest magnitude of a reward's weight [-]; chosen."""
+LONGEST_EPISODE = 1e9
+"""Longest episode [s]; chosen, 30 years."""
+MOST_PUSH = 1e5
+"""Hardest push [N]; chosen."""
+SHORTEST_PUSH_INTERVAL = 0.01
+"""Shortest time for one push [s]: a control window, in which the force is held."""
+_NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}  # NumPy's kinds
+MOST_ENVIRONMENTS = 1_000_000
+"""Largest batch; chosen."""
 
 
 class UnknownSettingError(SpringfootError, TypeError):
@@ -23,8 +41,14 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
 
 def check_start(start: Any) -> None:
     """Refuse what is neither "random" nor "standing" nor a stride phase in [0, 1)."""
-    if start not in ("random", "standing") and not (is_number(start) and 0 <= start < 1):
-        raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {start!r}")
+    known = start in ("random", "standing") if isinstance(start, str) else is_number(start) and 0 <= start < 1
+    if not known:
+        raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {quoted(start)}")
+
+
+def check_seed(seed: Any) -> int | None:
+    """A seed as a whole number, or None; refuse all else."""
+    return None if seed is None else require_count("seed", seed, 0, 2**63 - 1)
 
 
 def is_number(value: Any) -> bool:
@@ -34,15 +58,31 @@ def is_number(value: Any) -> bool:
 
 def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
     """Refuse a value that is none of `choices`."""
-    if value not in choices:
-        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+    if not isinstance(value, str) or value not in choices:
+        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {quoted(value)}")
 
 
 def check_range(name: str, value: Any, unit: str) -> None:
     """Refuse what is not a pair 0 < low < high."""
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
     if not numbers or not 0 < value[0] < value[1]:
-        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {value!r}")
+        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {quoted(value)}")
+
+
+def check_bounds(settings: Any) -> None:
+    """Refuse settings, each possible by itself, beyond which an observation or a reward might be no finite number."""
+    low, high = STIFFNESS_BOUNDS
+    for name in ("ankle_stiffness_range", "toe_stiffness_range"):
+        softest, stiffest = getattr(settings, name)
+        if softest < low or stiffest > high:
+            raise SpringfootError(
+                f"{name} must be within [{low:g}, {high:g}] N m/rad, got {quoted((softest, stiffest))}"
+            )
+    require_number("episode_seconds", settings.episode_seconds, 0.0, LONGEST_EPISODE, "s")
+    require_number("push_newton", settings.push_newton, 0.0, MOST_PUSH, "N")
+    require_number("push_interval", settings.push_interval, SHORTEST_PUSH_INTERVAL, unit="s")
+    for name, weight in settings.reward_weights.items():
+        require_number(f"reward_weights[{name!r}]", weight, -MOST_WEIGHT, MOST_WEIGHT)
 
 
 def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -> None:
@@ -50,18 +90,37 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
     if value is not None and not (numbers and allowed[0] <= value[0] < value[1] <= allowed[1]):
         raise SpringfootError(
-            f"{name} must be (low, high) with low < high in [{allowed[0]:g}, {allowed[1]:g}] {unit}, got {value!r}"
+            f"{name} must be (low, high) with low < high in [{allowed[0]:g}, {allowed[1]:g}] {unit}, "
+            f"got {quoted(value)}"
         )
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:
     """Refuse unknown reward terms, and weights whose sign is not that of the term's in `defaults`, where 0 is a cost."""
     if not isinstance(weights, dict):
-        raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {weights!r}")
+        raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {quoted(weights)}")
     for name, weight in weights.items():
         if name not in defaults:
-            raise SpringfootError(f"reward_weights has no term {name!r}; valid: {', '.join(defaults)}")
+            raise SpringfootError(f"reward_weights has no term {quoted(name)}; valid: {', '.join(defaults)}")
         cost = defaults[name] <= 0
         if not is_number(weight) or (weight > 0 if cost else weight < 0):
             allowed = "<= 0 (a cost)" if cost else ">= 0 (a reward)"
-            raise SpringfootError(f"reward_weights[{name!r}] must be a finite number {allowed}, got {weight!r}")
+            raise SpringfootError(f"reward_weights[{name!r}] must be a finite number {allowed}, got {quoted(weight)}")
+
+
+def real_numbers(name: str, value: Any) -> NDArray:
+    """`value` as a new array of float64; refuse text, dates, complex numbers, records and rows of unequal length."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in _NO_NUMBERS or array.dtype.names is not None:
+            raise SpringfootError(f"{name} must be real numbers, got {_NO_NUMBERS.get(array.dtype.kind, 'records')}")
+        if array.dtype == object and any(isinstance(each, (str, bytes, complex)) for each in array.flat):
+            raise TypeError
+        return np.array(array, float, order="C")
+    except (TypeError, OverflowError):
+        found = quoted(value)
+    except SpringfootError:
+        raise
+    except ValueError:
+        found = "rows of unequal length"
+    raise SpringfootError(f"{name} must be real numbers, got {found}")

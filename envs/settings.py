@@ -19,7 +19,7 @@ from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 from .physics.foot_contact import FRICTION
-from .setting_checks import check_choice, check_names, check_range, check_span, check_start, check_weights
+from .setting_checks import check_bounds, check_choice, check_names, check_range, check_span, check_start, check_weights
 from .timing import ACTION_STEP, CONTROL_WINDOW
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -191,6 +191,7 @@ class BipedSettings:
         require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         self._check_world()
         check_weights(self.reward_weights, DEFAULT_WEIGHTS)
+        check_bounds(self)
 
     @property
     def step_seconds(self) -> float:

@@ -15,6 +15,8 @@ from springfoot.gait.errors import SpringfootError, require_count
 
 from .biped_batch import Biped
 from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
+from .physics.simulation import MOST_THREADS
+from .setting_checks import MOST_ENVIRONMENTS, check_seed
 from .settings import BipedSettings, settings_from
 from .step_result import INFO, StepResult, report_start
 
@@ -53,8 +55,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         max_episode_steps: int | None = None,
         **settings: Any,
     ) -> None:
-        for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
-            require_count(name, count)
+        require_count("num_envs", num_envs, most=MOST_ENVIRONMENTS)
+        require_count("num_threads", num_threads, most=MOST_THREADS)
         self.settings = _limit_steps(settings_from(**settings), max_episode_steps)
         self.num_envs = num_envs
         self.render_mode = check_render_mode(render_mode)
@@ -158,11 +160,12 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         """One seed for each environment."""
         if seed is None:
             return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            return [int(seed) + index for index in range(self.num_envs)]
+        if not isinstance(seed, (Sequence, np.ndarray)) or isinstance(seed, str):
+            first = check_seed(seed) or 0
+            return [first + index for index in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise SpringfootError(f"seed must be an integer or a list of {self.num_envs}, got {len(seed)} seeds")
-        return seed
+        return [check_seed(each) for each in seed]
 
     def _reset_mask(self, mask: Any) -> NDArray:
         if mask is None:

@@ -12,7 +12,8 @@ from springfoot.agents.baselines import FROZEN, has_feedback
 from springfoot.agents.command_line import exit_code, policy_label
 from springfoot.agents.files import next_free, whole_folder
 from springfoot.agents.flags import SettingsFlags, given
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.envs.physics.simulation import MOST_THREADS
+from springfoot.gait.errors import MOST_COUNT, SpringfootError, require_count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +57,8 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
 
 def run_evaluation(flags: EvaluateFlags, program: str) -> None:
     """Evaluate, write the results, then print the table and where the results are."""
-    for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
-        require_count(name, getattr(flags, name), least)
+    for name, least, most in (("episodes", 1, MOST_COUNT), ("seed", 0, MOST_COUNT), ("threads", 1, MOST_THREADS)):
+        require_count(name, getattr(flags, name), least, most)
     label = policy_label(flags.policy)
     out = flags.out or next_free(Path("runs"), f"eval-{label}")
     if out.exists():
@@ -71,6 +72,7 @@ def run_evaluation(flags: EvaluateFlags, program: str) -> None:
 
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     policy, environment = policies.prepare(flags.policy, settings, flags.seed, flags.threads)
+    recording.require_recordable(environment, flags.episodes)
 
     with whole_folder(out) as folder:
         total = flags.episodes * environment.episode_seconds

@@ -35,6 +35,8 @@ from springfoot.gait.errors import SpringfootError
 
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
+MOST_SECONDS = 100_000
+"""Longest recording, all episodes together [s]; chosen: its series have some 6 GB."""
 BATCH = 32
 """Episodes simulated side by side."""
 
@@ -115,6 +117,15 @@ def load_recording(path: str | Path) -> Recording:
         raise SpringfootError(f"{path}: {error}") from None
     except (OSError, EOFError, BadZipFile, ValueError, KeyError, TypeError, AttributeError):
         raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py") from None
+
+
+def require_recordable(settings: BipedSettings, episodes: int) -> None:
+    """Raise `SpringfootError` for episodes whose series would fill the memory."""
+    if episodes * settings.episode_seconds > MOST_SECONDS:
+        raise SpringfootError(
+            f"a recording must be of at most {MOST_SECONDS:,} s in all, got {episodes} episodes of "
+            f"{settings.episode_seconds:g} s"
+        )
 
 
 def record(
@@ -215,6 +226,7 @@ def _walk(
     """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`; `other`
     model and leg constants as in `record`."""
     model, legs = other
+    require_recordable(settings, episodes)
     step = settings.step_seconds
     length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)

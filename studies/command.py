@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from springfoot import __version__
 from springfoot.extras import EXTRA_OF
+from springfoot.terminal import at_terminal
 
 if TYPE_CHECKING:
     from .study import Study
@@ -53,6 +54,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     `arguments` are those of the process unless given. Imports no more than the asked command needs.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    return at_terminal(lambda: _run(words))
+
+
+def _run(words: list[str]) -> int:
     try:
         match words:
             case ["train", *rest]:
@@ -86,7 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
-    print(f"springfoot: error: no command {words[0]!r}; there are train, evaluate, export and study", file=sys.stderr)
+    known = "there are train, evaluate, export and study"
+    print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 
 
@@ -97,7 +103,7 @@ def study_main(arguments: Sequence[str]) -> int:
         print(study_help())
         return 0
     if name not in STUDIES:
-        print(f"springfoot study: error: no study {name!r}; there are {', '.join(STUDIES)}", file=sys.stderr)
+        print(f"springfoot study: error: no study {name!r:.60}; there are {', '.join(STUDIES)}", file=sys.stderr)
         return 2
     import tyro
 

@@ -16,7 +16,9 @@ from tqdm import tqdm
 
 from springfoot.agents.files import next_free, whole_folder
 from springfoot.agents.markdown import write_section
-from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.envs.physics.simulation import MOST_THREADS
+from springfoot.envs.setting_checks import LONGEST_EPISODE
+from springfoot.gait.errors import MOST_COUNT, SpringfootError, require_count, require_number
 
 OnProgress = Callable[[float], object]
 """Called with how much more is done: simulated seconds, or what `Study.UNIT` names."""
@@ -144,9 +146,9 @@ class WalkingStudy(Study):
 
     def check(self) -> None:
         """Refuse counts and lengths out of range."""
-        for name, least in (("episodes", 1), ("seed", 0), ("threads", 1)):
-            require_count(name, getattr(self, name), least)
-        require_number("seconds", self.seconds, 0, above=True, unit="s")
+        for name, least, most in (("episodes", 1, MOST_COUNT), ("seed", 0, MOST_COUNT), ("threads", 1, MOST_THREADS)):
+            require_count(name, getattr(self, name), least, most)
+        require_number("seconds", self.seconds, 0, LONGEST_EPISODE, above=True, unit="s")
 
     @property
     def how(self) -> dict[str, Any]:

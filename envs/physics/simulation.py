@@ -15,7 +15,7 @@ from mujoco.batch import Batch
 
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 
 from ..timing import CONTROL_WINDOW
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
@@ -27,6 +27,8 @@ MjModel: TypeAlias = Any
 """A `mujoco.MjModel`; MuJoCo has no type stubs, and what it leaves unknown would be unknown in our users' files."""
 MjData: TypeAlias = Any
 """A `mujoco.MjData`, likewise."""
+MOST_THREADS = 1024
+"""Most threads of the physics; chosen, beyond all machines."""
 
 
 class Physics(NamedTuple):
@@ -48,7 +50,7 @@ class Simulation:
     Args:
         body: the body that is simulated.
         num: N.
-        threads: of the physics; any number gives the same bits.
+        threads: of the physics, up to `MOST_THREADS`; any number gives the same bits.
         model: a custom model of that body in place of the default, for instance one whose timestep is another part of
             `CONTROL_WINDOW`.
         friction: coefficient of friction between feet and ground in the default models [-].
@@ -72,7 +74,7 @@ class Simulation:
         self._own_options = model is not None
         self._friction = friction
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
-        self._batch = Batch(self.model, num, threads)
+        self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
         state = self._batch.state
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
