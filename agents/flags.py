@@ -47,26 +47,32 @@ def _read_json(words: list[str]) -> dict[str, Any]:
     return value
 
 
-def read_own_gait(words: str) -> dict[str, Any]:
-    """The setting `human` from what `--human` is given.
+def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
+    """The setting `human` from what `--human` is given; `trust_units` as in `read_gait`.
 
     A file of `read_gait`; FILE:CONDITION for one of several in a CSV; several files of one walk with commas between.
     Raises `SpringfootError` for a file that cannot be read.
     """
     if Path(words).is_file():
-        return read_gait(words).to_json()
+        return read_gait(words, trust_units=trust_units).to_json()
     if "," in words:
-        return read_gait(*words.split(",")).to_json()
+        return read_gait(*words.split(","), trust_units=trust_units).to_json()
     file, _, condition = words.rpartition(":")
     if Path(file).is_file():
-        return read_gait(file, condition=condition).to_json()
-    return read_gait(words).to_json()
+        return read_gait(file, condition=condition, trust_units=trust_units).to_json()
+    return read_gait(words, trust_units=trust_units).to_json()
 
 
 FILE_FLAGS = {"human": read_own_gait}
 """Settings whose flag is the name of a file, and what makes the setting of it."""
 
 
+TRUST = "trust_units"
+"""Flag beside those of files: take them as they are."""
+_TRUST_FLAG = Annotated[
+    tyro.conf.FlagCreatePairsOff[bool],
+    tyro.conf.arg(help="Take the file of --human as it is, even if its units or signs look wrong."),
+]
 _JSON_FLAG = tyro.constructors.PrimitiveConstructorSpec(
     nargs=1,
     metavar="JSON|FILE",
@@ -101,7 +107,10 @@ def optional_flags(
     for item_name, kind in hints.items():
         if item_name not in leave_out:
             annotation = _optional_flag(item_name, kind, help_of[item_name], getattr(defaults, item_name))
-            themed.get(metadata[item_name].get("theme", ""), flags).append((item_name, annotation, None))
+            its_group = themed.get(metadata[item_name].get("theme", ""), flags)
+            its_group.append((item_name, annotation, None))
+            if item_name in FILE_FLAGS:
+                its_group.append((TRUST, _TRUST_FLAG, False))
     for theme, inside in themed.items():
         if inside:
             group = _flags_class(f"{name}{theme.title()}", inside, themes[theme])
@@ -132,8 +141,10 @@ def given(flags: Any) -> dict[str, Any]:
         value = getattr(flags, item.name)
         if dataclasses.is_dataclass(value):
             values |= given(value)
-        elif value is not None:
-            values[item.name] = FILE_FLAGS[item.name](value) if item.name in FILE_FLAGS else value
+        elif item.name in FILE_FLAGS and value is not None:
+            values[item.name] = FILE_FLAGS[item.name](value, getattr(flags, TRUST))
+        elif item.name != TRUST and value is not None:
+            values[item.name] = value
     return values
 
 

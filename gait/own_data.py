@@ -18,6 +18,7 @@ from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
 from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series
 from .motion_files import Series, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
+from .plausible import require_plausible
 from .strides import MeasuredWalk, cut_strides, together
 
 ACCEPTED = {
@@ -28,6 +29,8 @@ ACCEPTED = {
 }
 """Least and largest accepted value, and unit, of each parameter beside the curves; chosen."""
 _PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
+COMFORTABLE_SPEED = 1.2
+"""Speed of the people that curves of unknown speed are held against [m/s]; chosen."""
 _MOST_COEFFICIENTS, _LARGEST = 64, 1e3
 
 
@@ -97,7 +100,11 @@ class OwnGait:
 
 
 def read_gait(
-    *paths: str | Path, condition: str | None = None, side: str = "both", mass: float | None = None
+    *paths: str | Path,
+    condition: str | None = None,
+    side: str = "both",
+    mass: float | None = None,
+    trust_units: bool = False,
 ) -> OwnGait:
     """The mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
 
@@ -106,7 +113,8 @@ def read_gait(
     `_left` or `_right` behind for two legs. OpenSim: .mot, .sto. C3D: needs ezc3d. Strides of both feet are pooled, or
     those of one `side`. Forces and moments in N and N m are divided by the body weight that the forces bear over whole
     strides, or by `mass` [kg]; without either, moments are left out. Raises `SpringfootError`, naming file, line and
-    column, for what cannot be read.
+    column, for what cannot be read; and, unless you `trust_units`, for curves that no walk has in these units and with
+    these signs (`springfoot.gait.plausible`), with what was seen and a guess.
     """
     if side not in ("both", "left", "right"):
         raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
@@ -118,7 +126,7 @@ def read_gait(
             case ".csv":
                 table = read_csv(path)
                 if "percent" in table.columns and len(paths) == 1:
-                    return _from_percent(table, condition)
+                    return _from_percent(table, condition, trust_units)
                 trials.append(csv_trial(table))
             case ".mot" | ".sto":
                 trials.append(opensim_trial(path))
@@ -128,10 +136,10 @@ def read_gait(
                 raise SpringfootError(f"{path.name} must be a .csv, .mot, .sto or .c3d file")
     if not trials:
         raise SpringfootError("read_gait needs a file")
-    return _from_walk(together(trials), side, mass)
+    return _from_walk(together(trials), side, mass, trust_units)
 
 
-def _from_percent(table: Table, condition: str | None) -> OwnGait:
+def _from_percent(table: Table, condition: str | None, trust_units: bool) -> OwnGait:
     """Mean curves over percent, as the file has them."""
     table = _one_condition(table, condition)
     mean, sd = our_columns(table), our_columns(table, "_sd")
@@ -153,7 +161,7 @@ def _from_percent(table: Table, condition: str | None) -> OwnGait:
         sd={},
         **{name: parameter(column) for name, column in _PARAMETERS.items()},
     )
-    return _fitted(own, mean, {name: curve for name, curve in sd.items() if name in mean})
+    return _fitted(own, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
 
 
 def _one_condition(table: Table, condition: str | None) -> Table:
@@ -179,7 +187,7 @@ def _one_condition(table: Table, condition: str | None) -> Table:
     return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
 
 
-def _from_walk(walk: MeasuredWalk, side: str, mass: float | None) -> OwnGait:
+def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
     """The mean of the strides of a walk."""
     strides, curves = cut_strides(walk, side, mass)
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
@@ -200,10 +208,10 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None) -> OwnGait:
         mean={},
         sd={},
     )
-    return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()})
+    return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
 
 
-def _fitted(own: OwnGait, mean: Series, sd: Series) -> OwnGait:
+def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
     """`own` with series fitted to curves (101,)."""
 
     def fit(curves: Series) -> dict[str, list]:
@@ -212,8 +220,12 @@ def _fitted(own: OwnGait, mean: Series, sd: Series) -> OwnGait:
             rows[name] = stance_series(curve, own.toe_off or 1.0) if name in FORCES else fourier_series(curve)
         return rows
 
-    own = _checked(own)
     refuse_absurd(own.name, mean)
+    if not trust_units:
+        low, high, _ = ACCEPTED["speed"]
+        speed = own.speed if own.speed and low <= own.speed <= high else COMFORTABLE_SPEED
+        require_plausible(own.name, mean, human_gait(speed))
+    own = _checked(own)
     return _checked(replace(own, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
 
 

@@ -86,7 +86,7 @@ def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     assert train_command.configured(PRESETS["walk"], {}, {"human": own}).environment.human == own
     time = [k / 100 for k in range(500)]
     thigh = [f"{t},{20 * math.cos(2 * math.pi * t)}" for t in time]
-    knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t + 0.3))}" for t in time]
+    knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t - 0.22))}" for t in time]
     for name, curve in (("thigh", thigh), ("knee", knee)):
         (tmp_path / f"{name}.csv").write_text("\n".join([f"time_s,{name}_flexion_deg", *curve]))
     own = flagged("--human", f"{tmp_path / 'thigh.csv'},{tmp_path / 'knee.csv'}")["human"]

@@ -1,0 +1,129 @@
+"""Own data with a wrong unit, sign or beginning are refused with a guess; people and bodies that walk are taken."""
+
+import numpy as np
+import pytest
+import tyro
+
+from springfoot.agents.flags import given, read_own_gait
+from springfoot.evaluation.evaluate_command import EvaluateFlags
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
+from springfoot.evaluation.report import write_gait_cycle
+from springfoot.gait import GRAVITY, SpringfootError, human_gait
+from springfoot.gait.human import COLUMNS
+from springfoot.gait.own_data import read_gait
+
+PERCENT = np.arange(101)
+MASS, HEIGHT = 82.0, 1.85
+ANGLES = ("thigh", "hip", "knee", "ankle", "toe")
+MOMENTS = ("hip_moment", "knee_moment", "ankle_moment")
+POWERS = ("hip_power", "knee_power", "ankle_power")
+FORCES = ("grf_vertical", "grf_forward")
+
+
+def people(speed=1.2, seed=None):
+    """Curves as they stand in a file, at percent 0 to 100; with a `seed` those of somebody a little different."""
+    human, random = human_gait(speed), np.random.default_rng(seed)
+    curves = {name: human.mean(name, PERCENT / 100) for name in COLUMNS}
+    curves = {name: np.degrees(values) if name in ANGLES else values for name, values in curves.items()}
+    if seed is not None:
+        for name, values in curves.items():
+            offset = random.uniform(-8, 8) if name in ANGLES else 0.0
+            curves[name] = values * random.uniform(0.6, 1.4) + offset * (name != "knee")
+    return curves
+
+
+def file_of(path, curves):
+    lines = [",".join(["percent", *(COLUMNS[name] for name in curves)])]
+    lines += [",".join([str(k), *(f"{values[k]:.6g}" for values in curves.values())]) for k in PERCENT]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def times(factor, *names):
+    return lambda curves: {name: values * (factor if name in names else 1) for name, values in curves.items()}
+
+
+def late(percent):
+    return lambda curves: {name: np.roll(v[:-1], percent)[np.arange(101) % 100] for name, v in curves.items()}
+
+
+def only(*names):
+    return lambda curves: {name: curves[name] for name in names}
+
+
+def knee_from_straight(curves):
+    return curves | {"knee": 180.0 - curves["knee"]}
+
+
+WRONG = {
+    "all angles in radians": (times(np.pi / 180, *ANGLES), "radians?"),
+    "the knee in radians": (times(np.pi / 180, "knee"), "0.017 times as far as people's: radians?"),
+    "the thigh in radians": (times(np.pi / 180, "thigh"), "radians?"),
+    "forces in newtons": (times(MASS * GRAVITY, *FORCES), ": N?"),
+    "forces in percent": (times(100, *FORCES), ": percent of body weight?"),
+    "forces in N/kg": (times(GRAVITY, *FORCES), ": N/kg?"),
+    "the forward force in newtons": (times(MASS * GRAVITY, "grf_forward"), "grf_forward_bw goes from"),
+    "moments in N m": (times(MASS, *MOMENTS), ": N m, not per kg?"),
+    "moments in N mm/kg": (times(1000, *MOMENTS), ": N mm/kg?"),
+    "moments in N mm": (times(1000 * MASS, *MOMENTS), ": N mm?"),
+    "moments in percent": (times(100 / GRAVITY / HEIGHT, *MOMENTS), ": percent of body weight times height?"),
+    "the ankle's moment in N m": (times(MASS, "ankle_moment"), "ankle_moment_Nm_per_kg goes from"),
+    "powers in W": (times(MASS, *POWERS), ": W, not per kg?"),
+    "external moments": (times(-1, *MOMENTS), "external moments? internal ones are needed"),
+    "an external ankle moment": (times(-1, "ankle_moment"), "plantarflexion must be positive"),
+    "a mirrored thigh": (times(-1, "thigh"), "thigh_flexion_deg is opposite to people's (r = -"),
+    "a mirrored hip": (times(-1, "hip"), "hip_flexion_deg is opposite to people's"),
+    "a mirrored ankle": (times(-1, "ankle"), "dorsiflexion must be positive"),
+    "a mirrored knee": (times(-1, "knee"), "the knee is bent backward; flexion must be positive"),
+    "walking backward": (times(-1, "grf_forward"), "forward must be positive"),
+    "forces on the ground": (times(-1, "grf_vertical"), "up must be positive"),
+    "power absorbed": (times(-1, "ankle_power"), "generation must be positive"),
+    "half a stride late": (late(50), "% of the stride late: does it begin at the other foot's heel strike?"),
+    "a fifth of a stride late": (late(20), "% of the stride late"),
+    "angles half a stride late": (
+        lambda curves: late(50)(only("thigh", "knee", "ankle")(curves)),
+        "% of the stride late: does it begin",
+    ),
+    "a knee of 175 deg": (knee_from_straight, "the angle between thigh and shank?"),
+    "all zeros": (times(0, *COLUMNS), "is 0 throughout the stride: was it measured?"),
+    "no force": (times(0, "grf_vertical"), "grf_vertical_bw is 0 throughout the stride: was it measured?"),
+}
+
+
+@pytest.mark.parametrize("speed", [0.8, 1.2, 1.6])
+@pytest.mark.parametrize(("wrong", "guess"), WRONG.values(), ids=WRONG)
+def test_wrong_units_and_signs_are_refused_with_what_was_seen_and_a_guess(tmp_path, wrong, guess, speed):
+    path = file_of(tmp_path / "wrong.csv", wrong(people(speed)))
+    with pytest.raises(SpringfootError) as caught:
+        read_gait(path)
+    message = str(caught.value)
+    assert message.startswith("wrong.csv: ") and guess in message and message.isprintable()
+
+
+@pytest.mark.parametrize("speed", [0.5, 0.8, 1.2, 1.6, 2.2])
+@pytest.mark.parametrize("somebody", range(6))
+def test_people_of_every_speed_are_taken_whatever_their_habits(tmp_path, somebody, speed):
+    read_gait(file_of(tmp_path / "right.csv", people(speed, somebody)))
+
+
+@pytest.mark.parametrize("name", ["schedule", "constant", "quasi_stiffness", "thesis", "untrained"])
+def test_what_walks_here_can_be_walked_after(tmp_path, name):
+    gait = measure(record(*prepare(name, {"episode_seconds": 8.0}), name=name, episodes=1))
+    for side, curves in enumerate(gait.feet):
+        assert curves.count
+        path = tmp_path / f"{side}.csv"
+        write_gait_cycle(path, curves, gait.metrics)
+        read_gait(path)
+
+
+def test_who_insists_is_believed(tmp_path):
+    path = file_of(tmp_path / "odd.csv", times(-1, "ankle")(people()))
+    own = read_gait(path, trust_units=True).gait(1.2, 1.7)
+    assert own.mean("ankle", 0.3) == pytest.approx(-human_gait(1.2).mean("ankle", 0.3), abs=1e-3)
+    insisting = tyro.cli(EvaluateFlags, args=["schedule", "--human", str(path), "--trust-units"])
+    assert given(insisting.environment) == {"human": read_own_gait(str(path), trust_units=True)}
+    asking = tyro.cli(EvaluateFlags, args=["schedule", "--human", str(path)])
+    with pytest.raises(SpringfootError, match="dorsiflexion must be positive; if it is right, trust_units takes it"):
+        given(asking.environment)
