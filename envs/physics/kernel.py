@@ -10,12 +10,16 @@ own code and of all that it uses: the kernels it calls, in whatever file, and co
 what it uses.
 """
 
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
 from hashlib import sha256
 from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
+from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -24,11 +28,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def kernel(function: Function) -> Function:
     """Compile `function` with numba at its first call; dividing by zero gives infinity, as in NumPy."""
     named = _named(function)
-    compiled: Any
+    compiled: Any = njit(error_model="numpy")(named)
     try:
-        compiled = njit(cache=True, error_model="numpy")(named)
+        compiled._cache = _KernelCache(named)
     except RuntimeError:  # neither the package's folder nor the user's cache can be written
-        compiled = njit(error_model="numpy")(named)
+        _warn_of_compiling("no folder for them can be written")
     return compiled
 
 
@@ -36,6 +40,37 @@ def part(function: Function) -> Function:
     """As `kernel`, for what kernels alone call: it is kept with them and not by itself."""
     compiled: Any = njit(error_model="numpy")(_named(function))
     return compiled
+
+
+class _KernelCache(FunctionCache):
+    """numba's cache, whose damage costs compiling anew and nothing else."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What is kept, or None where there is nothing or its files are damaged; those begin anew."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # what is cut short ends in any exception of pickle
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled kernel, if its files can be written."""
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:
+            _warn_of_compiling(str(error))
+
+
+@cache
+def _warn_of_compiling(reason: str) -> None:
+    """Say, once for each reason, that the next start compiles again."""
+    warnings.warn(
+        f"compiled kernels cannot be kept, so that every start compiles them for half a minute: {reason}; "
+        "NUMBA_CACHE_DIR names another folder for them",
+        RuntimeWarning,
+        stacklevel=3,
+    )
 
 
 def _named(function: Function) -> Function:
