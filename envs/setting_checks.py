@@ -96,7 +96,7 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:
-    """Refuse unknown reward terms, and weights whose sign is not that of the term's in `defaults`, where 0 is a cost."""
+    """Refuse unknown reward terms, and weights whose sign is not that of the term's in `defaults` (0: a cost)."""
     if not isinstance(weights, dict):
         raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {quoted(weights)}")
     for name, weight in weights.items():

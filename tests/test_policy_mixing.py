@@ -52,7 +52,8 @@ def test_a_search_writes_a_policy_and_the_shares_it_is_of(policies, tmp_path, ca
     for index, policy in enumerate(policies):
         save_policy(tmp_path / f"{index}.safetensors", replace(policy, weights=policies[0].weights))
     names = [str(tmp_path / f"{index}.safetensors") for index in range(2)]
-    words = ["--episodes", "1", "--seconds", "6", "--generations", "1", "--population", "4", "--trained", "2", "--judged", "1"]
+    words = ["--episodes", "1", "--seconds", "6", "--generations", "1", "--population", "4", "--trained", "2"]
+    words += ["--judged", "1"]
     for out in ("a", "b"):
         assert study_main(["mix", *names, *words, "--threads", "1", "--out", str(tmp_path / out)]) == 0
     written = [(tmp_path / out / "mix.safetensors").read_bytes() for out in ("a", "b")]
