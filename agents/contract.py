@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springfoot.envs.control.equilibrium import foot_curves
+from springfoot.envs.control.foot_rows import controlled_joints
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.phase_table import SAMPLES
 from springfoot.envs.control.reference_walk import reference_walks, rows
@@ -41,7 +42,7 @@ class Scale(NamedTuple):
     unit: str
     """Its unit."""
     joints: list[int]
-    """Indices of the actions that count: those of a joint that the setting `stiffness_joints` leaves out do not."""
+    """Indices of the actions that count: not those of a joint that `stiffness_joints` leaves out, nor of a device."""
     middle: NDArray
     """(joints,) its value at action 0."""
     factor: NDArray
@@ -50,7 +51,7 @@ class Scale(NamedTuple):
 
 def scale_of(settings: BipedSettings) -> Scale:
     """What the actions of a policy with these settings set."""
-    joints = [i for i, name in enumerate(ACTIONS) if settings.stiffness_joints in ("both", name.partition("_")[0])]
+    joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
         return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
     middle, stiffest = (np.tile(stiffness_of(np.full(2, a), settings, Body()), 2)[joints] for a in (0.0, 1.0))

@@ -67,6 +67,11 @@ FILE_FLAGS = {"human": read_own_gait}
 """Settings whose flag is the name of a file, and what makes the setting of it."""
 
 
+def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
+    """A word as it is; a dictionary from JSON text, or from the JSON file of that name."""
+    return _read_json(words) if words[0].lstrip().startswith("{") or Path(words[0]).is_file() else words[0]
+
+
 TRUST = "trust_units"
 """Flag beside those of files: take them as they are."""
 _TRUST_FLAG = Annotated[
@@ -79,6 +84,15 @@ _JSON_FLAG = tyro.constructors.PrimitiveConstructorSpec(
     instance_from_str=_read_json,
     is_instance=lambda value: value is None or isinstance(value, dict),
     str_from_instance=lambda value: [json.dumps(value)],
+)
+
+
+_WORD_FLAG = tyro.constructors.PrimitiveConstructorSpec(
+    nargs=1,
+    metavar="WORD|JSON|FILE",
+    instance_from_str=_read_word_or_json,
+    is_instance=lambda value: value is None or isinstance(value, (str, dict)),
+    str_from_instance=lambda value: [value if isinstance(value, str) else json.dumps(value)],
 )
 
 
@@ -129,7 +143,10 @@ def _optional_flag(name: str, kind: Any, text: str, default: Any) -> Any:
     hint = f"(default: {shown})"
     if name in FILE_FLAGS:
         return Annotated[str | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar="FILE")]
-    if dict in (get_origin(kind), *map(get_origin, get_args(kind))):
+    parts = get_args(kind)
+    if dict in (get_origin(kind), *map(get_origin, parts)):
+        if str in parts:
+            return Annotated[str | dict | None, _WORD_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
         return Annotated[dict | None, _JSON_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
     return Annotated[kind | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar=_metavar(kind))]
 

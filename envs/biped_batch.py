@@ -22,6 +22,8 @@ from .control.reference_walk import reference_walks, rows
 from .control.standing import WALKING, Standing, off_phase
 from .control.subjects import Subjects
 from .exact_state import ExactState
+from .feet import feet_of
+from .physics.foot import Feet
 from .physics.foot_contact import CONTACTS
 from .physics.measurement import Measurement
 from .physics.model import ACTIONS, JOINTS, SIDES
@@ -29,7 +31,7 @@ from .physics.simulation import MjData, MjModel, Simulation
 from .setting_checks import real_numbers
 from .settings import BipedSettings
 from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
-from .step_result import StepResult, Tick, room
+from .step_result import StepResult, Tick, held_control, room
 from .task.ground import Ground
 from .task.initial_state import place, random_phase, start_table, walking_posture
 from .task.observation import SensorNoise
@@ -50,6 +52,7 @@ class Biped(ExactState):
         rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], one for each of `legs`.
         model: a custom model, as for `Simulation`.
         slope: constants for slopes in place of the committed ones.
+        feet: N pairs, the feet of each body in place of the settings'.
     """
 
     tick_dt = CONTROL_WINDOW
@@ -65,9 +68,10 @@ class Biped(ExactState):
         rest: NDArray | None = None,
         model: MjModel | None = None,
         slope: SlopeConstants | None = None,
+        feet: Sequence[Feet] | None = None,
     ):
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
-        self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope}
+        self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
         self.settings = settings
         self.num_envs = num_envs
         self.dt = settings.step_seconds
@@ -81,18 +85,19 @@ class Biped(ExactState):
         table = list(rows(self.walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
+        feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * num_envs
         incline = slope_table(slope or slope_constants())
         self._legs = LegController(table, self.subjects)
         curves = [foot_curves(settings, c, w) for c, w in table]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
         rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
-        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects)
+        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
         self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
 
-        self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction)
+        self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction, feet)
         self._task = Task(settings, table, self.subjects)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
@@ -131,6 +136,11 @@ class Biped(ExactState):
     def leg_phase(self) -> NDArray:
         """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike; a copy."""
         return self._legs.phase.copy()
+
+    @property
+    def controlled(self) -> NDArray:
+        """(N, side, 2) whether actions set the stiffness of ankle and toe; others are read as 0. A copy."""
+        return self.subjects.rows["feet"]["controlled"].astype(bool)
 
     @property
     def standing_mode(self) -> NDArray:
@@ -277,9 +287,7 @@ class Biped(ExactState):
         if self.on_tick is None:
             self._simulation.advance(ids)
             return None
-        stiffness, drive = np.moveaxis(self._simulation.control, -1, 0)
-        begin = {"phase": self._legs.phase.copy(), "active": running.copy()}
-        begin |= {"stiffness": stiffness.copy(), "equilibrium": drive / stiffness}
+        begin = {"phase": self._legs.phase.copy(), "active": running.copy()} | held_control(self._simulation.control)
         self._simulation.advance_watched(ids)
         return begin
 

@@ -38,6 +38,27 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
 
     The stiffnesses are those of 1.70 m and 63 kg; they scale with mass x height.
 
+    Actions of a joint that has a device in place of muscles (see Feet) are read as 0, also in the observation.
+
+    ## Feet
+    `left_foot` and `right_foot` are each one of these kinds, or a dictionary of `kind` and numbers. Stiffness [N m/rad]
+    and rest angle [deg] of a device are the same on everybody. Every kind may have an `orthosis`, a dictionary of the
+    numbers of `passive`: a spring beside the joints. `shank_mass_ratio`, `shank_com_ratio`, `shank_inertia_ratio`,
+    `foot_mass_ratio` and `foot_inertia_ratio` say how much of an intact one's a prosthesis has.
+
+    | Kind      | Ankle                            | Toe                      | Numbers of its own                     |
+    | --------- | -------------------------------- | ------------------------ | -------------------------------------- |
+    | intact    | the action's                     | the action's             |                                        |
+    | rigid     | locked                           | a spring of 110 N m/rad  |                                        |
+    | rigid_toe | the action's                     | locked                   |                                        |
+    | no_toe    | the action's                     | locked, without a ball   |                                        |
+    | passive   | a spring                         | a spring                 | `ankle_stiffness`, `ankle_deg`,        |
+    |           |                                  |                          | `toe_stiffness`, `toe_deg`,            |
+    |           |                                  |                          | `damping_time` [s]                     |
+    | adaptive  | the action's, fixed rest angle   | likewise                 | `ankle_deg`, `toe_deg`                 |
+    | weak      | the action's, weak plantarflexor | the action's             | `strength` [0.1..0.6]                  |
+    | drop      | the action's, slack in swing     | the action's             |                                        |
+
     ## Observation space
     `Box(Min, Max, (43,), float32)`, dimensionless: each value is divided by its unit and clipped to its bounds. l is
     the leg length (hip to floor when standing, 0.53 of height), g gravity.
@@ -126,9 +147,10 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     ## Info
     NumPy numbers, under the same keys from `reset` and `step`. Of each action's name: `stiffness/` [N m/rad], `torque/`
     [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J], the work done in
-    the step by changing stiffness and by moving the equilibrium. Of each reward term `reward/`. `phase/left`,
-    `phase/right` [0, 1), `time` [s], `speed` [m/s]. After `reset` phases and speed are those of the start, and all else
-    is 0: no spring acts before the first action. `termination` is a code; `springfoot.envs.TERMINATIONS` names it:
+    the step by changing stiffness and by moving the equilibrium; `controlled/`, 1 where the action counts and 0
+    where it is read as 0. Of each reward term `reward/`. `phase/left`, `phase/right` [0, 1), `time` [s], `speed` [m/s].
+    After `reset` all is 0 but `controlled/`, phases and speed: no spring acts before the first action. `termination` is
+    a code; `springfoot.envs.TERMINATIONS` names it:
 
     | Code | Name                   | Meaning                                                                        |
     | ---- | ---------------------- | ------------------------------------------------------------------------------ |
@@ -161,6 +183,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `carried_ratio`           | `0.0`           | mass of a load on the back over body mass                          |
     | `height_range`            | `None`          | heights drawn at each reset [m], in place of `height`              |
     | `mass_range`              | `None`          | body masses drawn at each reset [kg], in place of `mass`           |
+    | **feet**                  |                 |                                                                    |
+    | `left_foot`               | `"intact"`      | a kind of foot, or `{"kind": ...}` with its numbers; see Feet      |
+    | `right_foot`              | `"intact"`      | likewise                                                           |
     | **speed**                 |                 |                                                                    |
     | `speed`                   | `1.2`           | commanded speed [m/s]                                              |
     | `speed_range`             | `None`          | speeds drawn at each reset [m/s], in place of `speed`              |
@@ -242,7 +267,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         self._over = False
         if self.render_mode == "human":
             self.render()
-        values = report_start(self.biped.measurement, self.biped.leg_phase)
+        values = report_start(self.biped.measurement, self.biped.leg_phase, self.biped.controlled)
         return self.biped.observe()[0], _info(values[0], np.int64(0))
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:

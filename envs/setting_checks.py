@@ -1,8 +1,10 @@
 """Checks that more than one setting needs; each raises `SpringfootError`, naming the setting and what is allowed."""
 
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from difflib import get_close_matches
 from math import isfinite
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -124,3 +126,12 @@ def real_numbers(name: str, value: Any) -> NDArray:
     except ValueError:
         found = "rows of unequal length"
     raise SpringfootError(f"{name} must be real numbers, got {found}")
+
+
+def plain(value: Any) -> Any:
+    """Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return as_float(value)
+    if isinstance(value, (list, tuple)):
+        return tuple(plain(item) for item in value)
+    return deepcopy(value)

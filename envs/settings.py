@@ -5,21 +5,29 @@ of `SegmentedFootBiped` and what an evaluation sets anew follow from that.
 """
 
 import json
-from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields
 from math import ceil
-from numbers import Real
 from typing import Any, Literal, get_args
 
 from springfoot.gait.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
-from springfoot.gait.errors import SpringfootError, as_float, require_number, require_within
+from springfoot.gait.errors import SpringfootError, require_number, require_within
 from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
+from .feet import FOOT_SETTINGS, foot_setting
 from .physics.foot_contact import FRICTION
-from .setting_checks import check_bounds, check_choice, check_names, check_range, check_span, check_start, check_weights
+from .setting_checks import (
+    check_bounds,
+    check_choice,
+    check_names,
+    check_range,
+    check_span,
+    check_start,
+    check_weights,
+    plain,
+)
 from .timing import ACTION_STEP, CONTROL_WINDOW
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -30,6 +38,7 @@ StiffnessJoints = Literal["both", "ankle", "toe"]
 
 THEMES = {
     "body": "Whose body walks.",
+    "feet": "What its feet are: intact, prosthetic, weak.",
     "speed": "How fast it is commanded to walk.",
     "reference": "Whose walk it is held to.",
     "springs": "What its ankle and toe springs do, and which part of that the action decides.",
@@ -67,7 +76,9 @@ DEFAULT_WEIGHTS = {
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
 
 
-_BODY, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = ({"theme": name} for name in THEMES)
+_BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = (
+    {"theme": name} for name in THEMES
+)
 _DRAWN = {"drawn": True}  # the setting makes something differ between episodes, or change within one, by chance
 _KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
 
@@ -86,6 +97,11 @@ class BipedSettings:
     """Length of the foot over the average at that height [-]."""
     carried_ratio: float = field(default=0.0, metadata=_BODY)
     """Mass of a load on the back over body mass [-]."""
+    left_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
+    """The left foot, a kind of `springfoot.envs.feet` (intact, rigid, rigid_toe, no_toe, passive, adaptive, weak, drop)
+    or, as a dictionary (JSON), a `kind` with numbers of its own: `{"kind": "passive", "ankle_stiffness": 600}`."""
+    right_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
+    """The right foot, likewise."""
     speed: float = field(default=1.2, metadata=_SPEED)
     """Commanded walking speed [m/s]."""
     height_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
@@ -171,6 +187,8 @@ class BipedSettings:
             ("stiffness_joints", StiffnessJoints),
         ):
             check_choice(name, getattr(self, name), get_args(choices))
+        for name in FOOT_SETTINGS:
+            foot_setting(name, getattr(self, name))
         check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
         check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
         if self.schedule is not None:
@@ -264,7 +282,8 @@ def settings_from(**values: Any) -> BipedSettings:
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
     check_names(values, [setting.name for setting in fields(BipedSettings)])
-    values = {name: _plain(value) for name, value in values.items()}
+    values = {name: plain(value) for name, value in values.items()}
+    values |= {name: foot_setting(name, values[name]) for name in FOOT_SETTINGS if name in values}
     if values.get("schedule") is not None:
         values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
     if values.get("human") is not None:
@@ -287,12 +306,3 @@ def reference_gait(settings: BipedSettings) -> HumanGait:
     if settings.human is None:
         return human_gait(settings.speed, settings.height)
     return OwnGait.from_json(settings.human).gait(settings.speed, settings.height)
-
-
-def _plain(value: Any) -> Any:
-    """Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
-    if isinstance(value, Real) and not isinstance(value, bool):
-        return as_float(value)
-    if isinstance(value, (list, tuple)):
-        return tuple(_plain(item) for item in value)
-    return deepcopy(value)

@@ -21,6 +21,7 @@ REPORT = np.dtype(
         ("equilibrium", float, (len(SIDES), 2)),
         ("work_stiffness", float, (len(SIDES), 2)),
         ("work_equilibrium", float, (len(SIDES), 2)),
+        ("controlled", float, (len(SIDES), 2)),
         ("reward", float, len(TERMS)),
         ("phase", float, len(SIDES)),
         ("time", float),
@@ -31,7 +32,7 @@ REPORT = np.dtype(
 INFO = (
     *(
         f"{name}/{action}"
-        for name in ("stiffness", "torque", "equilibrium", "work/stiffness", "work/equilibrium")
+        for name in ("stiffness", "torque", "equilibrium", "work/stiffness", "work/equilibrium", "controlled")
         for action in ACTIONS
     ),
     *(f"reward/{term}" for term in TERMS),
@@ -42,8 +43,8 @@ INFO = (
 """The names of the numbers of `REPORT`, in order.
 
 Of each action: `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/`
-and `work/equilibrium/` [J] of the step. Of each reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1).
-`time` [s], `speed` [m/s].
+and `work/equilibrium/` [J] of the step; `controlled/`, 1 where the action counts and 0 where it is read as 0. Of each
+reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1). `time` [s], `speed` [m/s].
 """
 
 
@@ -61,18 +62,20 @@ def report(rows, controls, bodies, terms, options, values) -> None:
     """
     reports = values.view(REPORT)
     for i in range(len(rows)):
-        row, springs, m = reports[i, 0], controls[i].springs, bodies[i].measured
+        row, springs, feet, m = reports[i, 0], controls[i].springs, controls[i].feet, bodies[i].measured
         row.time, row.speed = options[0].seconds * rows[i].steps, m.com_velocity[0]
         for term in range(terms.shape[1]):
             row.reward[term] = terms[i, term]
         for side in range(2):
             row.phase[side] = controls[i].legs.phase[side]
             for joint in range(2):
-                row.stiffness[side, joint] = springs.stiffness[side, joint]
+                muscles = springs.acts[side, joint] * springs.stiffness[side, joint]
+                row.stiffness[side, joint] = muscles + feet.stiffness[side, joint]
                 row.torque[side, joint] = m.torque[side, ANKLE + joint]
                 row.equilibrium[side, joint] = springs.equilibrium[side, joint]
                 row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]
                 row.work_equilibrium[side, joint] = springs.work_equilibrium[side, joint]
+                row.controlled[side, joint] = feet.controlled[side, joint]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -122,6 +125,13 @@ class Tick:
     """(N,) True for the environments that ran in this window."""
 
 
+def held_control(control: NDArray) -> dict[str, NDArray]:
+    """What a `Tick` tells of `control` (N, side, joint, 2), of K and K theta_eq; theta_eq is 0 where there is no K."""
+    stiffness, drive = np.moveaxis(control, -1, 0)
+    rest = np.divide(drive, stiffness, out=np.zeros_like(drive), where=stiffness > 0.0)
+    return {"stiffness": stiffness.copy(), "equilibrium": rest}
+
+
 def room(num: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
     """Room for what a step of `num` environments returns: observation, reward, terminated, truncated, values."""
     return (
@@ -133,14 +143,16 @@ def room(num: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
     )
 
 
-def report_start(m: Measurement, leg_phase: NDArray) -> NDArray:
-    """`StepResult.values` before an episode's first step: the phases and the speed, all else 0, as nothing acts yet.
+def report_start(m: Measurement, leg_phase: NDArray, controlled: NDArray) -> NDArray:
+    """`StepResult.values` before an episode's first step: what is `controlled`, the phases and the speed, all else 0,
+    as nothing acts yet.
 
     Args:
         m: the measurement right after the reset.
         leg_phase: (N, side) stride phase of each leg [0, 1).
+        controlled: (N, side, 2) whether actions set the stiffness of ankle and toe.
     """
     values = np.zeros((len(leg_phase), len(INFO)))
     rows = values.view(REPORT)[:, 0]
-    rows["phase"], rows["speed"] = leg_phase, m.com_velocity[:, 0]
+    rows["phase"], rows["speed"], rows["controlled"] = leg_phase, m.com_velocity[:, 0], controlled
     return values

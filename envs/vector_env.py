@@ -15,6 +15,7 @@ from springfoot.gait.errors import SpringfootError, require_count
 
 from .biped_batch import Biped
 from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
+from .feet import each_foot
 from .physics.simulation import MOST_THREADS
 from .setting_checks import MOST_ENVIRONMENTS, check_seed
 from .settings import BipedSettings, settings_from
@@ -42,7 +43,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         max_episode_steps: number of steps after which an episode is truncated, if `episode_seconds` is longer;
             `spec.max_episode_steps` is the lesser of the two.
         render_mode: "rgb_array" (a frame of each environment), "human" (a window that shows the first) or None.
-        settings: as for `SegmentedFootBiped`.
+        settings: as for `SegmentedFootBiped`; `left_foot` and `right_foot` may be lists, a foot for each of the N, and
+            `settings` then has the first ones.
     """
 
     def __init__(
@@ -57,11 +59,12 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
     ) -> None:
         require_count("num_envs", num_envs, most=MOST_ENVIRONMENTS)
         require_count("num_threads", num_threads, most=MOST_THREADS)
-        self.settings = _limit_steps(settings_from(**settings), max_episode_steps)
+        own, feet = each_foot(settings, num_envs)
+        self.settings = _limit_steps(settings_from(**own), max_episode_steps)
         self.num_envs = num_envs
         self.render_mode = check_render_mode(render_mode)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        self.biped = Biped(self.settings, num_envs, num_threads)
+        self.biped = Biped(self.settings, num_envs, num_threads, feet=feet)
         self.metadata = METADATA | {"autoreset_mode": self.autoreset_mode, "render_fps": round(1 / self.biped.dt)}
         self.single_observation_space, self.single_action_space = spaces_of(self.biped)
         self.observation_space: Space[NDArray] = batch_space(self.single_observation_space, num_envs)
@@ -136,7 +139,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self._close_camera()
 
     def _start_values(self) -> NDArray:
-        return report_start(self.biped.measurement, self.biped.leg_phase)
+        return report_start(self.biped.measurement, self.biped.leg_phase, self.biped.controlled)
 
     def _restart(
         self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None

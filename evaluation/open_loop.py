@@ -13,6 +13,7 @@ from springfoot.agents.baselines import PolicyFunction, follow
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.feet import feet_of
 from springfoot.envs.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, THEME_OF, BipedSettings, body_of
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
@@ -39,15 +40,18 @@ SAME_K = 1e-9
 def decided(recording: Recording) -> tuple[NDArray, NDArray]:
     """Phase (n,) of a leg at each decision and K (n, 2) [N m/rad] of ankle and toe from then on; both legs together.
 
-    Of the steady walk, the first `WARM_UP` seconds left out.
+    Of the steady walk, the first `WARM_UP` seconds left out. A leg whose foot is a device decides nothing and is left
+    out, unless both are; so are times at which muscles are slack.
     """
     begin, end = steady_walk(recording.settings)
     step = round(recording.settings.step_seconds / TICK)
     at = np.arange(step, recording.series["phase"].shape[1], step)
     at = at[(at * TICK >= begin + WARM_UP) & (at * TICK < end)]
-    phase = recording.series["phase"][:, at].ravel().astype(float)  # at the tick's beginning, when K was decided
-    stiffness = recording.series["stiffness"][:, at].reshape(-1, len(SPRINGS)).astype(float)
-    walked = np.isfinite(phase) & np.isfinite(stiffness).all(-1)
+    feet = feet_of(recording.settings.left_foot, recording.settings.right_foot)
+    own = [side for side, foot in enumerate(feet) if not any(joint.device for joint in foot.joints)] or [0, 1]
+    phase = recording.series["phase"][:, at][..., own].ravel().astype(float)  # at the tick's beginning: K was decided
+    stiffness = recording.series["stiffness"][:, at][:, :, own].reshape(-1, len(SPRINGS)).astype(float)
+    walked = np.isfinite(phase) & np.isfinite(stiffness).all(-1) & (stiffness > 0.0).all(-1)
     return phase[walked] % 1.0, stiffness[walked]
 
 

@@ -94,7 +94,8 @@ def test_info_is_numpy_numbers_under_the_same_keys_from_reset_and_step():
     assert types == [(name, type(value)) for name, value in first.items()]
     env.reset(seed=0)
     speed = env.biped.measurement.com_velocity[0, 0]
-    assert first == dict.fromkeys(info, 0.0) | {"phase/left": 0.25, "phase/right": 0.75, "speed": speed}
+    known = {"phase/left": 0.25, "phase/right": 0.75, "speed": speed} | {f"controlled/{name}": 1.0 for name in ACTIONS}
+    assert first == dict.fromkeys(info, 0.0) | known
     assert speed == pytest.approx(1.2, abs=0.3)
 
 

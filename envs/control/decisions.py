@@ -21,13 +21,12 @@ def gait_events(human: HumanGait) -> NDArray:
 
 
 @kernel
-def _take(actions, running, decided, events, rows):
+def _take(actions, running, events, rows):
     """Decide what takes effect.
 
     Args:
         actions: (N, 4) as given.
         running: (N,) bool.
-        decided: (2,) bool, whether actions decide the stiffness of the ankle, of the toe.
         events: (E,) stride phases at which a leg decides; none for every step.
         rows: (N,) of `CONTROL_ROW`; `decision` is changed.
 
@@ -50,7 +49,7 @@ def _take(actions, running, decided, events, rows):
                 k = 2 * side + joint
                 if held:
                     own.action[k] = own.last_action[k]
-                elif not decided[joint]:
+                elif not rows[i].feet.controlled[side, joint]:
                     own.action[k] = 0.0
                 else:
                     own.action[k] = min(max(actions[i, k], -1.0), 1.0)
@@ -64,14 +63,13 @@ class DecisionTimes:
     is that of the foot itself, and a foot that bounces does not decide again. Other events lie at people's phases.
 
     Args:
-        settings: when stiffness is decided, and of which joints.
+        settings: when stiffness is decided.
         human: whose events count.
-        rows: (N,) of `CONTROL_ROW`.
+        rows: (N,) of `CONTROL_ROW`, which tell whose stiffness.
     """
 
     def __init__(self, settings: BipedSettings, human: HumanGait, rows: NDArray):
         self._events = gait_events(human) if settings.decisions == "event" else np.empty(0)
-        self._decided = np.array([settings.stiffness_joints in ("both", joint) for joint in ("ankle", "toe")])
         self._rows = rows
         self._own = rows["decision"]
         self.action = self._own["action"]
@@ -84,4 +82,4 @@ class DecisionTimes:
     def take(self, actions: NDArray, running: NDArray) -> NDArray | None:
         """The actions that take effect, (N, 4): those given, clipped to [-1, 1]; legs at no event and bodies not
         `running` (N,) keep their last ones. None, leaving all state unchanged, for a number that is not finite."""
-        return self.action if _take(actions, running, self._decided, self._events, self._rows) else None
+        return self.action if _take(actions, running, self._events, self._rows) else None

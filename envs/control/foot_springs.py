@@ -1,7 +1,11 @@
 """From actions to stiffness to control of the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
 
+The springs of muscles have the K of the actions or of the schedule; a device in their place has its own, always.
+
 What each ankle and toe has is (side, 2), the last axis being ankle and toe; flattened, it is in the order of `ACTIONS`.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,12 +13,15 @@ from numpy.typing import ArrayLike
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
+from ..feet import feet_of
+from ..physics.foot import Feet
 from ..physics.kernel import kernel, part
 from ..physics.measurement import plant_of
 from ..physics.model import ANKLE
 from ..physics.simulation import Physics
 from ..settings import BipedSettings
 from ..timing import CONTROL_WINDOW
+from .foot_rows import foot_rows
 from .phase_table import PhaseTable, read
 from .rows import PLACE
 from .subjects import Subjects
@@ -94,6 +101,8 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                     continue
                 middle = scheduled[joint] if fixed[i] or option.scheduled[joint] else option.middle[joint]
                 share = 1.0 if fixed[i] else factor[i, 2 * side + joint]
+                if not rows[i].feet.muscles[side, joint]:
+                    share = 0.0
                 before, after = own.stiffness[side, joint], middle * subject.scale.torque * share
                 deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
                 own.requests[0, side, joint] = after
@@ -102,7 +111,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                 if own.fresh or own.delay == 0:
                     own.stiffness[side, joint] = after
                 if not own.fresh and own.delay == 0:
-                    own.work_stiffness[side, joint] = 0.5 * (after - before) * deflection**2
+                    own.work_stiffness[side, joint] = own.acts[side, joint] * 0.5 * (after - before) * deflection**2
 
 
 @part
@@ -113,17 +122,34 @@ def _arrive(own, angle):
             before, after = own.stiffness[side, joint], own.requests[own.delay, side, joint]
             deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
             own.stiffness[side, joint] = after
-            own.work_stiffness[side, joint] += 0.5 * (after - before) * deflection**2
+            own.work_stiffness[side, joint] += own.acts[side, joint] * 0.5 * (after - before) * deflection**2
             for past in range(len(own.requests) - 1, 0, -1):
                 own.requests[past, side, joint] = own.requests[past - 1, side, joint]
+
+
+@part
+def _swings(row, force, side):
+    """Whether a leg swings: past mid-stride and unloaded."""
+    load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]
+    return row.legs.phase[side] > 0.5 and load < row.legs.gains.touchdown
+
+
+@part
+def _control(row, control, side, joint):
+    """Put K and K theta_eq of one joint, muscles and device together, into the control."""
+    own, foot = row.springs, row.feet
+    muscles, device = own.acts[side, joint] * own.stiffness[side, joint], foot.stiffness[side, joint]
+    control[side, ANKLE + joint, 0] = muscles + device
+    control[side, ANKLE + joint, 1] = muscles * own.equilibrium[side, joint] + device * foot.rest[side, joint]
 
 
 @part
 def move(rows, bodies, state, rest, incline, options, walking) -> None:
     """Begin a control window: K and K theta_eq of ankles and toes go into the control.
 
-    K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases. Moving the rest angle, so that
-    the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring.
+    K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases or the foot's own. Moving the
+    rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack
+    as the leg begins to swing lose what they held. A device has its own K and theta_eq, which do not change.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
@@ -137,8 +163,8 @@ def move(rows, bodies, state, rest, incline, options, walking) -> None:
     wanted, inclined, option = np.empty(2), np.empty(4), options[0]
     level = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
-        own, subject, angle = rows[i].springs, rows[i].subject, bodies[i].measured.angle
-        control = plant_of(state, i).control
+        own, foot, subject = rows[i].springs, rows[i].feet, rows[i].subject
+        angle, control = bodies[i].measured.angle, plant_of(state, i).control
         if walking[i] and own.delay > 0:
             _arrive(own, angle)
         for side in range(2):
@@ -148,40 +174,49 @@ def move(rows, bodies, state, rest, incline, options, walking) -> None:
             if option.follows and subject.slope != 0.0:
                 read(incline, level, own.rest_phase[side], inclined)
                 wanted[0] += subject.slope * inclined[ANKLE]
+            swings = _swings(rows[i], bodies[i].measured.force, side)
             for joint in range(2):
                 k, theta = own.stiffness[side, joint], angle[side, ANKLE + joint]
                 if walking[i]:
-                    before, after = own.equilibrium[side, joint] - theta, wanted[joint] - theta
-                    own.equilibrium[side, joint] = wanted[joint]
+                    acted, acts = own.acts[side, joint], 1.0 if foot.in_swing[side, joint] or not swings else 0.0
+                    own.acts[side, joint] = acts
+                    aim = foot.rest[side, joint] if foot.rests[side, joint] else wanted[joint]
+                    before, after = own.equilibrium[side, joint] - theta, aim - theta
+                    own.equilibrium[side, joint] = aim
                     if not own.fresh:
-                        own.work_equilibrium[side, joint] += 0.5 * k * (after * after - before * before)
-                control[side, ANKLE + joint, 0] = k
-                control[side, ANKLE + joint, 1] = k * own.equilibrium[side, joint]
+                        own.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
+                        own.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
+                _control(rows[i], control, side, joint)
         if walking[i]:
             own.fresh = 0
 
 
 @kernel
 def _hold(rows, bodies, state, held):
-    """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control of `state` (N, numbers).
+    """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in the control of `state` (N, numbers).
 
-    They act without delay, and the work of both changes is counted as that of `stiffen` and `move`.
+    They act without delay, and the work of both changes is counted as that of `stiffen` and `move`. A device, and a
+    rest angle that is the foot's own, stay.
     """
     for i in range(len(rows)):
         if not held[i]:
             continue
-        own, angle = rows[i].springs, bodies[i].measured.angle
+        own, foot, angle = rows[i].springs, rows[i].feet, bodies[i].measured.angle
         control = plant_of(state, i).control
         for side in range(2):
             for joint in range(2):
                 k, drive = control[side, ANKLE + joint, 0], control[side, ANKLE + joint, 1]
-                theta, before = angle[side, ANKLE + joint], own.stiffness[side, joint]
-                old, new = own.equilibrium[side, joint] - theta, drive / k - theta
-                own.stiffness[side, joint], own.equilibrium[side, joint] = k, drive / k
+                rest = foot.rest[side, joint] if foot.rests[side, joint] else drive / k
+                k = k if foot.muscles[side, joint] else 0.0
+                theta, before = angle[side, ANKLE + joint], own.acts[side, joint] * own.stiffness[side, joint]
+                old, new = own.equilibrium[side, joint] - theta, rest - theta
+                own.stiffness[side, joint], own.equilibrium[side, joint] = k, rest
+                own.acts[side, joint] = 1.0
                 own.requests[:, side, joint] = k
                 if not own.fresh:
                     own.work_stiffness[side, joint] += 0.5 * (k - before) * old * old
                     own.work_equilibrium[side, joint] += 0.5 * k * (new * new - old * old)
+                _control(rows[i], control, side, joint)
         own.fresh = 0
 
 
@@ -194,11 +229,20 @@ class FootSprings:
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
         subjects: bodies and requested speeds.
+        feet: N pairs in place of the settings' feet.
     """
 
     def __init__(
-        self, settings: BipedSettings, body: Body, equilibrium: NDArray, schedule: NDArray, subjects: Subjects
+        self,
+        settings: BipedSettings,
+        body: Body,
+        equilibrium: NDArray,
+        schedule: NDArray,
+        subjects: Subjects,
+        feet: Sequence[Feet] | None = None,
     ):
+        own = feet_of(settings.left_foot, settings.right_foot)
+        subjects.rows["feet"] = foot_rows(settings, feet or [own] * len(subjects.rows))
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)
         self._factor = np.tile(factor, 2)
@@ -208,7 +252,7 @@ class FootSprings:
         """(1,) of `SPRING_OPTIONS`."""
         self.rest, self.schedule = PhaseTable(equilibrium), PhaseTable(schedule)
         self._subjects, self._own = subjects, subjects.rows["springs"]
-        self._own["fresh"] = 1
+        self._own["fresh"], self._own["acts"] = 1, 1.0
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
         """Begin an episode of springs `ids` (K,).
@@ -216,7 +260,7 @@ class FootSprings:
         Their next change does no work and acts at once, as if it had been requested long before. Later changes act
         `delay` (K,) control windows after their request.
         """
-        self._own["fresh"][ids], self._own["delay"][ids] = 1, delay
+        self._own["fresh"][ids], self._own["delay"][ids], self._own["acts"][ids] = 1, delay, 1.0
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""

@@ -35,9 +35,22 @@ DECISION = np.dtype(
     ]
 )
 """The actions of one environment (`envs.control.decisions`)."""
+FOOT = np.dtype(
+    [
+        ("controlled", np.int64, FEET),  # 1 where actions set the stiffness; others are read as 0
+        ("muscles", np.int64, FEET),  # 1 where the body itself sets the stiffness, 0 where a device is in its place
+        ("in_swing", np.int64, FEET),  # 1 where muscles act in swing too
+        ("rests", np.int64, FEET),  # 1 where the rest angle is the foot's own, whatever is planned
+        ("rest", float, FEET),  # that angle, a device's as well [rad]
+        ("stiffness", float, FEET),  # of a device [N m/rad], 0 where there is none
+        ("locked", np.int64, FEET),  # 1 where a device lets the joint not move
+    ]
+)
+"""The ankles and toes of one environment: what sets their springs (`envs.control.foot_springs`)."""
 SPRING_STATE = np.dtype(
     [
-        ("stiffness", float, FEET),  # K [N m/rad]
+        ("stiffness", float, FEET),  # K of the muscles [N m/rad]
+        ("acts", float, FEET),  # 1 while they act, 0 while they are slack
         ("equilibrium", float, FEET),  # rest angle [rad]
         ("work_stiffness", float, FEET),  # done by the last change of stiffness [J]
         ("work_equilibrium", float, FEET),  # done by moving the rest angle since that change [J]
@@ -84,5 +97,12 @@ HELD = np.dtype(
 )
 """How one body is held while it stands (`envs.control.standing`)."""
 CONTROL_ROW = np.dtype(
-    [("subject", SUBJECT), ("decision", DECISION), ("springs", SPRING_STATE), ("legs", LEGS), ("held", HELD)]
+    [
+        ("subject", SUBJECT),
+        ("decision", DECISION),
+        ("feet", FOOT),
+        ("springs", SPRING_STATE),
+        ("legs", LEGS),
+        ("held", HELD),
+    ]
 )

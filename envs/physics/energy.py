@@ -14,13 +14,14 @@ import numpy as np
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 
+from .foot import SOUND, Feet, leg_segments
 from .kernel import kernel, part
-from .model import ARMATURE, JOINTS, KNEE, SIDES, damping_times
+from .model import ARMATURE, JOINTS, KNEE, SIDES, damping_times_of
 
 LEDGER = np.dtype(
     [
         ("actuators", float),
-        ("passive_damping", float),  # of the joints
+        ("passive_damping", float),  # of the joints, and all of orthoses
         ("contact", float),  # of ground and joint stops
         ("pushes", float),
         ("mechanical", float),  # kinetic and potential energy at the window's end
@@ -86,38 +87,38 @@ class WindowWork:
     """(N,) of `LEDGER`."""
 
 
+_LEGS = (len(SIDES), len(JOINTS))
+PART = [
+    ("mass", float),  # [kg]
+    ("inertia", float),  # about its CoM [kg m^2]
+    ("com", float, 2),  # forward and up in its own frame [m]
+]
 PARTS = np.dtype(
     [
-        ("mass", float, 2 + len(JOINTS)),  # trunk, load, and of one leg thigh, shank, foot, toe [kg]
-        ("inertia", float, 2 + len(JOINTS)),  # of these about their CoMs [kg m^2]
-        ("com", float, (2 + len(JOINTS), 2)),  # of these, forward and up in their own frames [m]
+        ("upper", PART, 2),  # trunk, load
+        ("leg", PART, _LEGS),  # thigh, shank, foot, toe
         ("end", float, (len(JOINTS), 2)),  # from a leg segment's joint to the next one [m], in its own frame
         ("armature", float, len(JOINTS)),  # [kg m^2]
-        ("beta", float, len(JOINTS)),  # [s]
+        ("beta", float, _LEGS),  # [s]
     ]
 )
 """A body as its energy needs it."""
 
 
-def parts_of(body: Body) -> NDArray:
+def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
     """(1,) of `PARTS`."""
-    forward, below = body.foot_com
     parts = np.zeros(1, PARTS)
-    legs = ("thigh", "shank", "foot", "toe")
-    parts["mass"] = body.trunk_mass, body.carried_mass, *(getattr(body, f"{name}_mass") for name in legs)
-    parts["inertia"] = body.trunk_inertia, body.carried_inertia, *(getattr(body, f"{name}_inertia") for name in legs)
-    parts["com"] = [
-        (0.0, body.trunk_com_above_hip),
-        body.carried_com,
-        (0.0, -body.thigh_com),
-        (0.0, -body.shank_com),
-        (forward, -below),
-        (body.toe_com, 0.0),
-    ]
+    parts["upper"]["mass"] = body.trunk_mass, body.carried_mass
+    parts["upper"]["inertia"] = body.trunk_inertia, body.carried_inertia
+    parts["upper"]["com"] = (0.0, body.trunk_com_above_hip), body.carried_com
+    for side, foot in enumerate(feet):
+        leg = leg_segments(body, foot)
+        for name in ("mass", "inertia", "com"):
+            parts["leg"][name][:, side] = getattr(leg, name)
     toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
     parts["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
     parts["armature"] = np.array(ARMATURE) * body.mass_scale * body.length_scale**2
-    parts["beta"] = damping_times(body)
+    parts["beta"] = damping_times_of(body, feet)
     return parts
 
 
@@ -134,7 +135,7 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
                 entry.actuators += steps.actuator[i, step, dof] * way
                 entry.passive_damping += steps.passive[i, step, dof] * way
                 entry.contact += steps.constraint[i, step, dof] * way
-            lever = own.com[0, 1] * cos(pitch)  # of the push about the hip
+            lever = own.upper[0].com[1] * cos(pitch)  # of the push about the hip
             entry.pushes += push[i] * 0.5 * timestep * (before[0] + after[0] + lever * (before[2] + after[2]))
             pitch += timestep * after[2]
             for side in range(2):
@@ -144,7 +145,9 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
                     net = steps.actuator[i, step, dof] + steps.passive[i, step, dof]
                     torque[i, side, joint] += net / count
                     work[i, side, joint, 0 if net * way > 0.0 else 1] += net * way
-                    entry.spring_damping[joint] -= control[i, side, joint, 0] * own.beta[joint] * before[dof] * way
+                    entry.spring_damping[joint] -= (
+                        control[i, side, joint, 0] * own.beta[side, joint] * before[dof] * way
+                    )
 
 
 @kernel
@@ -153,20 +156,21 @@ def _sum_changes(control, held, angle, energy):
         for side in range(2):
             for joint in range(4):
                 k, k_before = control[i, side, joint, 0], held[i, side, joint, 0]
-                if k > 0.0 and k_before > 0.0:  # neither at the start of an episode nor without a spring
-                    before = held[i, side, joint, 1] / k_before - angle[i, side, joint]
-                    after = control[i, side, joint, 1] / k - angle[i, side, joint]
+                if k + k_before > 0.0:  # neither at the start of an episode (NaN) nor without a spring
+                    old, new = held[i, side, joint, 1] / k_before, control[i, side, joint, 1] / k
+                    old, new = old if k_before > 0.0 else new, new if k > 0.0 else old  # a slack spring has no rest
+                    before, after = old - angle[i, side, joint], new - angle[i, side, joint]
                     energy[i].stiffness_changes[joint] += 0.5 * (k - k_before) * before * before
                     energy[i].equilibrium_changes[joint] += 0.5 * k * (after * after - before * before)
 
 
 @part
-def _part_energy(own, part, x, z, x_rate, z_rate, turn, spin):
+def _part_energy(part, x, z, x_rate, z_rate, turn, spin):
     """Kinetic and potential energy [J] of one part whose joint is at (x, z), turned up-forward by `turn`."""
-    forward, up = own.com[part]
+    forward, up = part.com[0], part.com[1]
     along, above = forward * cos(turn) - up * sin(turn), forward * sin(turn) + up * cos(turn)
     speed = (x_rate - above * spin) ** 2 + (z_rate + along * spin) ** 2
-    return own.mass[part] * (0.5 * speed + GRAVITY * (z + above)) + 0.5 * own.inertia[part] * spin**2
+    return part.mass * (0.5 * speed + GRAVITY * (z + above)) + 0.5 * part.inertia * spin**2
 
 
 @kernel
@@ -176,14 +180,14 @@ def _add_mechanical(parts, position, rate, energy):
         own, total = parts[i], 0.0
         q, v = position[i], rate[i]
         for piece in range(2):
-            total += _part_energy(own, piece, q[0], q[1], v[0], v[1], -q[2], -v[2])
+            total += _part_energy(own.upper[piece], q[0], q[1], v[0], v[1], -q[2], -v[2])
         for side in range(2):
             x, z, x_rate, z_rate, turn, spin = q[0], q[1], v[0], v[1], -q[2], -v[2]
             for joint in range(4):
                 sign = -1.0 if joint == KNEE else 1.0
                 dof = 3 + 4 * side + joint
                 turn, spin = turn + sign * q[dof], spin + sign * v[dof]
-                total += _part_energy(own, 2 + joint, x, z, x_rate, z_rate, turn, spin)
+                total += _part_energy(own.leg[side, joint], x, z, x_rate, z_rate, turn, spin)
                 total += 0.5 * own.armature[joint] * v[dof] ** 2
                 forward, up = own.end[joint]
                 along, above = forward * cos(turn) - up * sin(turn), forward * sin(turn) + up * cos(turn)

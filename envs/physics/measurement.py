@@ -9,21 +9,22 @@ import numpy as np
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 
+from .foot import SOUND, Feet, leg_segments, total_mass
 from .foot_contact import CONTACTS, contact_offsets
 from .kernel import kernel, part
-from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times, torque_limits
+from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times_of, torque_ranges
 
 DEGREES = len(BASE) + len(SIDES) * len(JOINTS)
 """Degrees of freedom of the body."""
 SEGMENTS = np.dtype(
     [
         ("trunk", float, 2),  # part of trunk and load in hip -> CoM [m], in the trunk's frame (forward, up)
-        ("part", float, (len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see segments_of
+        ("part", float, (len(SIDES), len(JOINTS), 2)),  # that of thigh, shank, foot and toe: see segments_of
         ("end", float, (len(JOINTS), 2)),  # from a segment's joint to the next one [m], in its own frame
         ("contact", float, (len(CONTACTS), 2)),  # contact sphere's centre from ankle (heel, ball) or toe joint [m]
         ("radius", float, len(CONTACTS)),  # of the contact spheres [m]
-        ("beta", float, len(JOINTS)),  # damping time of each joint's spring [s]
-        ("limit", float, len(JOINTS)),  # largest torque of each joint's actuator [N m]
+        ("beta", float, (len(SIDES), len(JOINTS))),  # damping time of each joint's spring [s]
+        ("torque", float, (len(SIDES), len(JOINTS), 2)),  # lowest and highest torque of each joint's actuators [N m]
     ]
 )
 """What kinematics and springs need to know of one body."""
@@ -109,35 +110,36 @@ class Measurement:
         return cls(**{name: measured[name] for name in MEASURED.names or ()})
 
 
-def segments_of(body: Body) -> NDArray:
-    """Constants of one body, (1,) of dtype `SEGMENTS`.
+def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
+    """Constants of one body with these feet, (1,) of dtype `SEGMENTS`.
 
     The CoM is the hip plus one offset for each segment, which turns with the segment. The offset is the sum of two
     products: the segment's share of the mass times its own CoM, and the share of all that hangs from its far end times
     the position of that end.
     """
-    foot, toe = body.foot_mass, body.toe_mass
-    beyond_knee = body.shank_mass + foot + toe
-    forward, below = body.foot_com
     toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
-    offsets = contact_offsets(body)
+    offsets, mass = contact_offsets(body), total_mass(body, feet)
     segments = np.zeros(1, SEGMENTS)
-    segments["trunk"] = np.array(body.upper_moment) / body.total_mass
-    segments["part"] = (
-        np.array(
-            [
-                (0.0, -(body.thigh_mass * body.thigh_com + beyond_knee * body.thigh_length)),
-                (0.0, -(body.shank_mass * body.shank_com + (foot + toe) * body.shank_length)),
-                (foot * forward + toe * toe_joint[0], -foot * below + toe * toe_joint[1]),
-                (toe * body.toe_com, 0.0),
-            ]
+    segments["trunk"] = np.array(body.upper_moment) / mass
+    for side, own in enumerate(feet):
+        leg = leg_segments(body, own)
+        thigh, shank, foot, toe = leg.mass
+        (_, thigh_com), (_, shank_com), (forward, up), (toe_com, _) = leg.com
+        segments["part"][:, side] = (
+            np.array(
+                [
+                    (0.0, -(thigh * -thigh_com + (shank + foot + toe) * body.thigh_length)),
+                    (0.0, -(shank * -shank_com + (foot + toe) * body.shank_length)),
+                    (foot * forward + toe * toe_joint[0], foot * up + toe * toe_joint[1]),
+                    (toe * toe_com, 0.0),
+                ]
+            )
+            / mass
         )
-        / body.total_mass
-    )
     segments["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
     segments["contact"] = [(forward, up) for forward, up, _ in offsets.values()]
     segments["radius"] = [radius for *_, radius in offsets.values()]
-    segments["beta"], segments["limit"] = damping_times(body), torque_limits(body)
+    segments["beta"], segments["torque"] = damping_times_of(body, feet), torque_ranges(body, feet)
     return segments
 
 
@@ -164,7 +166,7 @@ def _locate(segments, position, rate, m):
             turn += sign * position[3 + 4 * side + joint]
             spin += sign * rate[3 + 4 * side + joint]
             c, s = cos(turn), sin(turn)
-            x, z = _turned(segments.part[joint], c, s)
+            x, z = _turned(segments.part[side, joint], c, s)
             com_x, com_z = com_x + x, com_z + z
             com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
             if joint == ANKLE:
@@ -194,14 +196,14 @@ def _above(ground, m):
 
 @part
 def _read_joints(segments, plant, m):
-    beta, limit = segments.beta, segments.limit
+    beta, torque = segments.beta, segments.torque
     for side in range(2):
         for joint in range(4):
             theta, theta_rate = plant.qpos[3 + 4 * side + joint], plant.qvel[3 + 4 * side + joint]
             stiffness, drive = plant.control[side, joint, 0], plant.control[side, joint, 1]
-            spring = drive - stiffness * (theta + beta[joint] * theta_rate)
+            spring = drive - stiffness * (theta + beta[side, joint] * theta_rate)
             m.angle[side, joint], m.velocity[side, joint] = theta, theta_rate
-            m.torque[side, joint] = min(max(spring, -limit[joint]), limit[joint])
+            m.torque[side, joint] = min(max(spring, torque[side, joint, 0]), torque[side, joint, 1])
 
 
 @part

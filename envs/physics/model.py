@@ -18,7 +18,9 @@ from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.leg import JOINTS
 
 from ..timing import PHYSICS_STEP
+from .foot import INTACT, SOUND, Feet, Foot, FootJoint, leg_segments, torque_range
 from .foot_contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
+from .scene import add_scene, bone, box
 
 SIDES = ("left", "right")
 BASE = ("x", "z", "pitch")
@@ -65,6 +67,27 @@ def torque_limits(body: Body) -> np.ndarray:
     return np.array(TORQUE_LIMIT) * body.strength_scale
 
 
+def joints_of(foot: Foot) -> tuple[FootJoint, ...]:
+    """The four joints of the leg that ends in `foot`, in the order of `JOINTS`; hip and knee are sound."""
+    return INTACT.ankle, INTACT.ankle, *foot.joints
+
+
+def damping_times_of(body: Body, feet: Feet) -> NDArray:
+    """Beta [s] of the actuators of both legs, (side, joint)."""
+    sound, times = damping_times(body), []
+    for foot in feet:
+        own = [joint.device and joint.device.damping_time for joint in joints_of(foot)]
+        times.append([usual if time is None else time for usual, time in zip(sound, own, strict=True)])
+    return np.array(times, float)
+
+
+def torque_ranges(body: Body, feet: Feet) -> NDArray:
+    """Lowest and highest torque [N m] of the actuators of both legs, (side, joint, 2)."""
+    limits = torque_limits(body).tolist()
+    pairs = [(torque_range(*each) for each in zip(limits, joints_of(foot), strict=True)) for foot in feet]
+    return np.array([list(leg) for leg in pairs])
+
+
 def passive_damping(body: Body) -> np.ndarray:
     """Joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
     return np.array(PASSIVE_DAMPING) * body.strength_scale * sqrt(body.length_scale)
@@ -81,7 +104,7 @@ def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray
     return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
-def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
+def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mujoco.MjSpec:
     """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors.
 
     Either foot has a ground of its own, a plane that is moved from outside (mocap).
@@ -97,30 +120,9 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
     # Looking for islands of constraints, and for boxes around few spheres, costs 11 % of a step and finds nothing.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     spec.compiler.degree = False
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 960, 720
-    spec.add_texture(
-        name="tiles",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=(0.86, 0.88, 0.90),
-        rgb2=(0.78, 0.81, 0.84),
-        width=256,
-        height=256,
-    )
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=(0.95, 0.97, 1.0),
-        rgb2=(0.75, 0.83, 0.92),
-        width=64,
-        height=384,
-    )
-    tiles = spec.add_material(name="tiles", texrepeat=(1.0, 1.0), texuniform=True)
-    tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
+    add_scene(spec)
 
     world = spec.worldbody
-    world.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     trunk = _segment(world, "trunk", (0, 0, 0), body.trunk_mass, (0, body.trunk_com_above_hip), body.trunk_inertia)
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
     for name, kind, axis in zip(BASE, (slide, slide, hinge), ((1, 0, 0), (0, 0, 1), (0, 1, 0)), strict=True):
@@ -131,12 +133,12 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
         xyaxes=(1, 0, 0, 0, 0, 1),
         mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
     )
-    _bone(trunk, (0, 0.0), (0, body.trunk_length), 0.07 * length, 0.0)
+    bone(trunk, (0, 0.0), (0, body.trunk_length), 0.07 * length, 0.0)
     if body.carried_ratio:
         _load(trunk, body)
     for index, side in enumerate(SIDES):
-        _leg(spec, trunk, body, side, hip_y=(0.09 if index == LEFT else -0.09) * length)
-    for side in SIDES:
+        _leg(trunk, body, side, feet, hip_y=(0.09 if index == LEFT else -0.09) * length)
+    for side, foot in zip(SIDES, feet, strict=True):
         ground = world.add_body(name=ground_name(side), mocap=True)
         ground.add_geom(
             name=ground_name(side),
@@ -147,10 +149,11 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
             conaffinity=0,
         )
         for contact in CONTACTS:
-            add_touch(spec, contact, side, body, friction)
-    for side in SIDES:
-        for index, joint in enumerate(JOINTS):
-            _add_spring(spec, f"{joint}_{side}", float(damping_times(body)[index]))
+            if contact != "ball" or not foot.one_piece:
+                add_touch(spec, contact, side, body, friction)
+    for side, times in zip(SIDES, damping_times_of(body, feet), strict=True):
+        for joint, beta in zip(JOINTS, times, strict=True):
+            _add_spring(spec, f"{joint}_{side}", float(beta))
     for side in SIDES:
         for contact in CONTACTS:
             spec.add_sensor(
@@ -167,116 +170,80 @@ def build_spec(body: Body, friction: float = FRICTION) -> mujoco.MjSpec:
     return spec
 
 
-def build_model(body: Body, friction: float = FRICTION) -> mujoco.MjModel:
-    """The compiled model of `body`."""
-    return build_spec(body, friction).compile()
+def build_model(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mujoco.MjModel:
+    """The compiled model of `body` with these feet."""
+    return build_spec(body, friction, feet).compile()
 
 
 def _load(trunk, body: Body) -> None:
     """Add a box on the back, fixed to the trunk."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
-    load.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=np.array([0.075, 0.15, 0.25]) * body.length_scale,
-        contype=0,
-        conaffinity=0,
-        rgba=(0.45, 0.50, 0.35, 1.0),
-    )
+    box(load, np.array([0.075, 0.15, 0.25]) * body.length_scale)
 
 
-def _leg(spec: mujoco.MjSpec, trunk, body: Body, side: str, hip_y: float) -> None:
+def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
     """Add one leg below the trunk; its lateral offset is for the eye alone (the body is planar)."""
     rgb = 0.15 if side == "left" else 0.0
     thin = 0.035 * body.length_scale
-    thigh = _segment(
-        trunk,
-        f"thigh_{side}",
-        (0, hip_y, 0),
-        body.thigh_mass,
-        (0, -body.thigh_com),
-        body.thigh_inertia,
-        "hip",
-        body,
-    )
-    _bone(thigh, (0, 0), (0, -body.thigh_length), 1.4 * thin, rgb)
-    shank = _segment(
-        thigh,
-        f"shank_{side}",
-        (0, 0, -body.thigh_length),
-        body.shank_mass,
-        (0, -body.shank_com),
-        body.shank_inertia,
-        "knee",
-        body,
-    )
-    _bone(shank, (0, 0), (0, -body.shank_length), thin, rgb)
-    forward, below = body.foot_com
-    foot = _segment(
-        shank,
-        f"foot_{side}",
-        (0, 0, -body.shank_length),
-        body.foot_mass,
-        (forward, -below),
-        body.foot_inertia,
-        "ankle",
-        body,
-    )
     drop = body.ankle_height - body.toe_joint_height
-    toe = _segment(
-        foot,
-        f"toe_{side}",
+    places = (
+        (0, hip_y, 0),
+        (0, 0, -body.thigh_length),
+        (0, 0, -body.shank_length),
         (body.ankle_to_toe_joint, 0, -drop),
-        body.toe_mass,
-        (body.toe_com, 0),
-        body.toe_inertia,
-        "toe",
-        body,
     )
+    own, segments, parent = leg_segments(body, feet[SIDES.index(side)]), [], trunk
+    for index, (name, place) in enumerate(zip(("thigh", "shank", "foot", "toe"), places, strict=True)):
+        parent = _segment(parent, f"{name}_{side}", place, own.mass[index], own.com[index], own.inertia[index])
+        _hinge(parent, side, index, body, feet)
+        segments.append(parent)
+    thigh, shank, foot, toe = segments
+    bone(thigh, (0, 0), (0, -body.thigh_length), 1.4 * thin, rgb)
+    bone(shank, (0, 0), (0, -body.shank_length), thin, rgb)
     offsets = contact_offsets(body)
     add_sphere(foot, geom_name("heel", side), offsets["heel"])
     add_sphere(toe, geom_name("ball", side), offsets["ball"])
     add_sphere(toe, geom_name("toe", side), offsets["toe"])
-    _bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
-    _bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
-    _bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
+    bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
+    bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
+    bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
 
 
-def _segment(parent, name, pos, mass, com, inertia, joint: str = "", body: Body | None = None):
-    """Add a rigid segment with an explicit inertia; its hinge, if any, is named after the joint and its side."""
+def _segment(parent, name, pos, mass, com, inertia):
+    """Add a rigid segment with an explicit inertia."""
     segment = parent.add_body(name=name, pos=pos)
     segment.explicitinertial = True
     segment.mass = mass
     segment.ipos = (com[0], 0.0, com[1])
     segment.inertia = (inertia, inertia, inertia)  # only the sagittal one acts
-    if body is not None:
-        index = JOINTS.index(joint)
-        length, scale = body.length_scale, body.mass_scale
-        limit = float(torque_limits(body)[index])
-        segment.add_joint(
-            name=f"{joint}_{name.rsplit('_', 1)[1]}",
-            type=mujoco.mjtJoint.mjJNT_HINGE,
-            axis=(0, _SIGN_AXIS[joint], 0),
-            armature=ARMATURE[index] * scale * length**2,
-            damping=float(passive_damping(body)[index]),
-            limited=True,
-            range=tuple(np.deg2rad(JOINT_RANGE_DEG[index])),
-            actfrclimited=True,
-            actfrcrange=(-limit, limit),
-        )
     return segment
 
 
-def _bone(segment, start, end, radius: float, shade: float) -> None:
-    """Add a capsule to look at; it has no mass and no contact."""
-    segment.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-        fromto=(start[0], 0, start[1], end[0], 0, end[1]),
-        size=(radius, 0, 0),
-        contype=0,
-        conaffinity=0,
-        rgba=(0.25 + shade, 0.45 + shade, 0.70 + shade, 1.0),
+def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
+    """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with the orthosis that is worn there."""
+    which = SIDES.index(side)
+    low, high = torque_ranges(body, feet)[which, index].tolist()
+    joint, damping = JOINTS[index], float(passive_damping(body)[index])
+    hinge = segment.add_joint(
+        name=f"{joint}_{side}",
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=(0, _SIGN_AXIS[joint], 0),
+        armature=ARMATURE[index] * body.mass_scale * body.length_scale**2,
+        damping=damping,
+        limited=True,
+        range=tuple(np.deg2rad(JOINT_RANGE_DEG[index])),
+        actfrclimited=np.isfinite(high),
+        actfrcrange=(low, high) if np.isfinite(high) else (0.0, 0.0),
     )
+    if orthosis := joints_of(feet[which])[index].orthosis:
+        time = orthosis.damping_time
+        beta = float(damping_times(body)[index]) if time is None else time
+        hinge.springref = orthosis.rest
+        hinge.stiffness[0], hinge.damping[0] = (
+            orthosis.stiffness,
+            damping + beta * orthosis.stiffness,
+        )  # no higher powers
 
 
 def _add_spring(spec: mujoco.MjSpec, joint: str, beta: float) -> None:

@@ -19,6 +19,7 @@ from springfoot.gait.errors import SpringfootError, require_count
 
 from ..timing import CONTROL_WINDOW
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
+from .foot import SOUND, Feet
 from .foot_contact import CONTACTS, FRICTION
 from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
@@ -54,6 +55,7 @@ class Simulation:
         model: a custom model of that body in place of the default, for instance one whose timestep is another part of
             `CONTROL_WINDOW`.
         friction: coefficient of friction between feet and ground in the default models [-].
+        feet: N pairs, the feet of each simulation; sound ones if None. They stay when `fit` changes the body.
     """
 
     def __init__(
@@ -63,18 +65,25 @@ class Simulation:
         threads: int = 1,
         model: MjModel | None = None,
         friction: float = FRICTION,
+        feet: Sequence[Feet] | None = None,
     ):
         self.body = body
         self.num = num
-        self.model = model or build_model(body, friction)
-        self.models = [self.model] * num
+        self.feet = [SOUND] * num if feet is None else list(feet)
+        """The left and the right foot of each simulation."""
+        built = {pair: model or build_model(body, friction, pair) for pair in dict.fromkeys(self.feet)}
+        self.model = built[self.feet[0]]
+        self.models = [built[pair] for pair in self.feet]
         """The compiled model of each simulation."""
         if (self.model.nq, self.model.nv, self.model.na, self.model.nu) != (DEGREES, DEGREES, 0, 2 * (DEGREES - 3)):
             raise SpringfootError("a custom model must have the joints and the actuators of the default one")
         self._own_options = model is not None
         self._friction = friction
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
+        self._built = built
         self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
+        if len(built) > 1:
+            self._batch.set_models(self.models)
         state = self._batch.state
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
@@ -82,7 +91,8 @@ class Simulation:
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
         self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
         bodies = np.zeros(num, BODY_ROW)
-        bodies["segments"], self._parts = segments_of(body), np.repeat(parts_of(body), num)
+        bodies["segments"] = np.concatenate([segments_of(body, pair) for pair in self.feet])
+        self._parts = np.concatenate([parts_of(body, pair) for pair in self.feet])
         self._ground = bodies["ground"]
         sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
         self.arrays = Physics(bodies, state, sensors, self._batch.warning[:, :, 1])
@@ -107,8 +117,10 @@ class Simulation:
                 "or drop height_range and mass_range"
             )
         for index, body in zip(ids, bodies, strict=True):
-            self.models[index] = self.model if body == self.body else build_model(body, self._friction)
-            self.arrays.bodies["segments"][index], self._parts[index] = segments_of(body)[0], parts_of(body)[0]
+            feet = self.feet[index]
+            self.models[index] = self._built[feet] if body == self.body else build_model(body, self._friction, feet)
+            self.arrays.bodies["segments"][index] = segments_of(body, feet)[0]
+            self._parts[index] = parts_of(body, feet)[0]
         self._batch.set_models(self.models)
 
     def reset(self, ids: NDArray, base: NDArray, base_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:

@@ -11,7 +11,7 @@ from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable, leg_phases
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
-from ..physics.model import HIP
+from ..physics.model import ANKLE, HIP
 from ..physics.simulation import Simulation
 
 START_PHASES = (0.08, 0.38)
@@ -52,11 +52,15 @@ def place(
 ) -> None:
     """Put simulations `ids` (K,) into a `posture` as `walking_posture` returns it.
 
-    `noise` (K, 2, side, joint) is the relative error of its angles and rates.
+    `noise` (K, 2, side, joint) is the relative error of its angles and rates. Locked joints start locked.
     """
     (angle, velocity, pitch, speed), scale = posture, subjects.scale[ids]
     angle, velocity = angle * (1.0 + noise[:, 0]), velocity * (1.0 + noise[:, 1])
     angle[..., HIP] += pitch[:, None]
+    feet = subjects.rows["feet"][ids]
+    locked = feet["locked"] > 0
+    angle[..., ANKLE:] = np.where(locked, feet["rest"], angle[..., ANKLE:])
+    velocity[..., ANKLE:] = np.where(locked, 0.0, velocity[..., ANKLE:])
     base, rate = np.zeros((2, len(ids), 3))
     base[:, 2], rate[:, 0] = pitch, speed
     simulation.reset(ids, base, rate, angle, velocity)

@@ -1,0 +1,124 @@
+"""What one foot is, as physics: muscles or a device at ankle and toe, an orthosis beside them, segments of other mass.
+
+Angles are those of the joints (dorsiflexion, toe-up positive). A device, and an orthosis, is the same on everybody: its
+numbers do not scale with the body.
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+from springfoot.gait.body import Body
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring:
+    """A spring of fixed stiffness and rest angle: torque = stiffness (rest - angle - damping_time x angular rate)."""
+
+    stiffness: float = 0.0
+    """[N m/rad]; 0 for none."""
+    rest: float = 0.0
+    """Angle at which it gives no torque [rad]."""
+    damping_time: float | None = None
+    """[s]; None for that of the joint's muscles (`envs.physics.model.damping_times`)."""
+
+
+LOCK = Spring(stiffness=50_000.0, damping_time=0.01)
+"""What locks a joint at 0: 100 N m, an ankle's largest moment in walking, move it by 0.1 deg. Chosen: with a damping
+time of five physics steps or more, moments are as with any stiffer or softer lock (5 000 to 100 000 N m/rad)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootJoint:
+    """An ankle or a toe joint."""
+
+    device: Spring | None = None
+    """What is there in place of muscles; None where muscles set the stiffness, as the policy says."""
+    rest: float | None = None
+    """Rest angle of the muscles' spring [rad], if there is no device; None for the one planned over the stride."""
+    strength: float = 1.0
+    """Largest torque of the muscles downwards (plantarflexion) over that of the sound joint [-]."""
+    acts_in_swing: bool = True
+    """Whether the muscles act while the leg swings."""
+    orthosis: Spring | None = None
+    """A spring beside the joint, which acts always."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Foot:
+    """One foot, and the shank above it."""
+
+    kind: str = "intact"
+    """Its name among the kinds of `springfoot.envs.feet`."""
+    ankle: FootJoint = FootJoint()
+    toe: FootJoint = FootJoint()
+    one_piece: bool = False
+    """Whether it touches the ground with heel and toe tip alone: a plate has no ball to roll over."""
+    shank_mass_ratio: float = 1.0
+    """Mass of the shank over the intact one's [-]."""
+    shank_com_ratio: float = 1.0
+    """Distance of its CoM from the knee over the intact one's [-]."""
+    shank_inertia_ratio: float = 1.0
+    """Its inertia about its CoM over the intact one's [-]."""
+    foot_mass_ratio: float = 1.0
+    """Mass of foot and toe over the intact ones' [-]."""
+    foot_inertia_ratio: float = 1.0
+    """Their inertia about their CoMs over the intact ones' [-]."""
+
+    @property
+    def joints(self) -> tuple[FootJoint, FootJoint]:
+        """Ankle and toe."""
+        return self.ankle, self.toe
+
+
+INTACT = Foot()
+"""The foot of a sound leg."""
+Feet = tuple[Foot, Foot]
+"""The left and the right foot."""
+SOUND: Feet = (INTACT, INTACT)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegSegments:
+    """Masses [kg], distances [m] and inertias [kg m^2] of one leg, in the order thigh, shank, foot, toe."""
+
+    mass: tuple[float, float, float, float]
+    com: tuple[tuple[float, float], ...]
+    """Forward and up from the segment's joint, in its own frame."""
+    inertia: tuple[float, float, float, float]
+    """About the segment's CoM."""
+
+
+def leg_segments(body: Body, foot: Foot) -> LegSegments:
+    """The segments of the leg of `body` that ends in `foot`."""
+    forward, below = body.foot_com
+    return LegSegments(
+        mass=(
+            body.thigh_mass,
+            foot.shank_mass_ratio * body.shank_mass,
+            foot.foot_mass_ratio * body.foot_mass,
+            foot.foot_mass_ratio * body.toe_mass,
+        ),
+        com=(
+            (0.0, -body.thigh_com),
+            (0.0, -foot.shank_com_ratio * body.shank_com),
+            (forward, -below),
+            (body.toe_com, 0.0),
+        ),
+        inertia=(
+            body.thigh_inertia,
+            foot.shank_inertia_ratio * body.shank_inertia,
+            foot.foot_inertia_ratio * body.foot_inertia,
+            foot.foot_inertia_ratio * body.toe_inertia,
+        ),
+    )
+
+
+def total_mass(body: Body, feet: Feet) -> float:
+    """Mass of body and load with these feet [kg]."""
+    legs = [(leg_segments(body, foot).mass, leg_segments(body, INTACT).mass) for foot in feet if foot != INTACT]
+    return body.total_mass + sum(sum(own) - sum(intact) for own, intact in legs)
+
+
+def torque_range(limit: float, joint: FootJoint) -> tuple[float, float]:
+    """Lowest and highest torque [N m] of what sets a joint's stiffness; `limit` is that of a sound joint's muscles."""
+    return (-inf, inf) if joint.device else (-joint.strength * limit, limit)

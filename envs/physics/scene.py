@@ -1,0 +1,52 @@
+"""What is to be seen of the model and has no mass and no contact: sky, light, bones, a load."""
+
+import mujoco
+
+
+def add_scene(spec: mujoco.MjSpec) -> None:
+    """Add sky, light and the material of the ground, `tiles`."""
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 960, 720
+    spec.add_texture(
+        name="tiles",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=(0.86, 0.88, 0.90),
+        rgb2=(0.78, 0.81, 0.84),
+        width=256,
+        height=256,
+    )
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=(0.95, 0.97, 1.0),
+        rgb2=(0.75, 0.83, 0.92),
+        width=64,
+        height=384,
+    )
+    tiles = spec.add_material(name="tiles", texrepeat=(1.0, 1.0), texuniform=True)
+    tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
+    spec.worldbody.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+
+
+def bone(segment, start, end, radius: float, shade: float) -> None:
+    """Add a capsule to a segment."""
+    segment.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=(start[0], 0, start[1], end[0], 0, end[1]),
+        size=(radius, 0, 0),
+        contype=0,
+        conaffinity=0,
+        rgba=(0.25 + shade, 0.45 + shade, 0.70 + shade, 1.0),
+    )
+
+
+def box(segment, size) -> None:
+    """Add a box of half-lengths `size` (3,) [m] to a segment."""
+    segment.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=size,
+        contype=0,
+        conaffinity=0,
+        rgba=(0.45, 0.50, 0.35, 1.0),
+    )
