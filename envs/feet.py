@@ -106,6 +106,11 @@ def _numbers(
     }
 
 
+def kind_of(setting: str | Mapping[str, Any]) -> str:
+    """The kind of a foot of the settings."""
+    return setting if isinstance(setting, str) else setting["kind"]
+
+
 def foot_of(setting: str | Mapping[str, Any]) -> Foot:
     """The foot of a setting in its plain form."""
     given: dict[str, Any] = {"kind": setting} if isinstance(setting, str) else dict(setting)

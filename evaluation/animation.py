@@ -13,6 +13,7 @@ from springfoot.gait import GRAVITY, Body
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 
+from .per_leg import differ, kinds_of
 from .recording import TICK, Recording
 from .stride_tally import WARM_UP
 
@@ -74,6 +75,11 @@ class _Canvas:
         settings = recording.settings
         self._title = recording.policy
         self._subtitle = f"{settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s"
+        if differ(settings):
+            self._subtitle += " · feet: " + ", ".join(
+                f"{side} ({shade}) {kind}"
+                for (side, kind), shade in zip(kinds_of(settings).items(), ("dark", "light"), strict=True)
+            )
         self._fonts = {size: ImageFont.load_default(OVERSAMPLING * size) for size in (11, 15)}
         self._stiffness_range = np.log(np.stack(stiffness_ranges(settings, body), axis=-1))
 
@@ -160,7 +166,7 @@ class _Canvas:
 
     def _stiffness_colour(self, side: int, joint: int) -> tuple[int, int, int]:
         low, high = self._stiffness_range[joint]
-        share = np.clip((np.log(self._at("stiffness")[side, joint]) - low) / (high - low), 0, 1)
+        share = np.clip((np.log(max(self._at("stiffness")[side, joint], 1.0)) - low) / (high - low), 0, 1)
         red, green, blue = (SOFT + share * (STIFF - SOFT)).astype(int)
         return int(red), int(green), int(blue)
 

@@ -18,17 +18,11 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
 
 from .open_loop import feedback
+from .per_leg import ANGLE_COLUMNS, asymmetry, differ, kinds_of, leg_numbers
 from .recording import TICK, Recording
 from .stride_curves import StrideCurves
 from .stride_tally import StrideTally, tally_strides
 
-JOINT_CURVES = {
-    "thigh": "thigh_flexion_deg",
-    "knee": "knee_flexion_deg",
-    "ankle": "ankle_dorsiflexion_deg",
-    "toe": "mtp_dorsiflexion_deg",
-}
-"""Joint as people's curves and metrics.json name it -> column."""
 MOMENT_CURVES = {
     "hip": "hip_moment_Nm_per_kg",
     "knee": "knee_moment_Nm_per_kg",
@@ -79,7 +73,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     com_z = tally.com.mean("z")
 
     def joint(name: str) -> dict[str, Any]:
-        curve, people = both.mean(JOINT_CURVES[name]), np.degrees(human.mean(name, phase))
+        curve, people = both.mean(ANGLE_COLUMNS[name]), np.degrees(human.mean(name, phase))
         return {
             "rmse_deg": score.rmse(curve, people),
             "r": score.correlation(curve, people),
@@ -106,6 +100,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), 60.0 if toe_off is None else toe_off)
 
     work = _joint_work(tally)
+    legs = leg_numbers(tally) if differ(settings) else None
     return {
         "policy": recording.policy,
         "environment": settings_to_json(settings),
@@ -114,6 +109,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
             "speed_m_s": human.speed,
             "borrowed": list(human.borrowed),
         },
+        "feet": kinds_of(settings),
         "seed": recording.seed,
         "episodes": len(recording.ticks),
         "falls": sum(reasons.values()),
@@ -127,7 +123,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "cadence_steps_min": 60 / float(np.mean(tally.step_time)) if tally.step_time else None,
         "double_support_s": _mean(tally.double_support),
         "toe_off_percent": toe_off,
-        "joints": {name: joint(name) for name in JOINT_CURVES},
+        "joints": {name: joint(name) for name in ANGLE_COLUMNS},
         "com": {
             "x_rmse_m": score.rmse(tally.com.mean("x"), plan_x),
             "z_rmse_m": score.rmse(com_z, plan_z),
@@ -154,6 +150,8 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "cost_of_transport": score.cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
         "stiffness_Nm_rad": {name: stiffness(name) for name in ("ankle", "toe")},
         "feedback": feedback(recording),
+        "per_leg": legs,
+        "asymmetry": None if legs is None else asymmetry(legs),
         "contact_travel_m": _mean(tally.travel),
         "toe_clearance_m": float(np.median(tally.clearance)) if tally.clearance else None,
     }

@@ -73,6 +73,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         f"{environment['speed']:g} m/s, equilibrium {environment['equilibrium']}{pushes}",
         soft_wrap=True,
     )
+    if metrics["per_leg"] is not None:
+        console.print("feet: " + ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items()))
     who = "people" if environment["human"] is None else "own"
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     for name in ("", "", "model", who, "r", "in ±SD"):
@@ -84,6 +86,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
             table.add_row(*row)
         table.add_section()
     console.print(table)
+    if metrics["per_leg"] is not None:
+        console.print(_leg_table(metrics))
     for reason, count in metrics["fall_reasons"].items():
         console.print(f"{count} × {reason}")
     if environment["human"] is not None:
@@ -95,6 +99,28 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         "feedback: share of its variance that the phase does not explain / its SD at equal phase",
         soft_wrap=True,
     )
+
+
+def _leg_table(metrics: dict[str, Any]) -> Table:
+    """The legs beside each other, where their feet differ."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    for name in ("each leg", "", *(f"{side}: {kind}" for side, kind in metrics["feet"].items())):
+        table.add_column(name, justify="left" if name == "each leg" else "right", no_wrap=True)
+    legs = metrics["per_leg"].values()
+    for label, unit, key, pattern in (
+        ("step length", "m", "step_length_m", ".3f"),
+        ("stance", "%", "stance_percent", ".1f"),
+        ("vertical force, peak 1", "BW", "vertical_peak1_bw", ".2f"),
+        ("vertical force, peak 2", "BW", "vertical_peak2_bw", ".2f"),
+        ("forward force", "BW", "forward_peak_bw", ".2f"),
+    ):
+        table.add_row(label, unit, *(text_of(leg[key], pattern) for leg in legs))
+    for joint in ("knee", "ankle", "toe"):
+        table.add_row(f"{joint} range", "deg", *(text_of(leg["joint_range_deg"][joint], ".1f") for leg in legs))
+    for joint in ("hip", "knee", "ankle", "toe"):
+        work = (leg["joint_work_J_kg"][joint]["positive"] for leg in legs)
+        table.add_row(f"{joint} work, positive", "J/kg", *(text_of(value, ".2f") for value in work))
+    return table
 
 
 TableRow = tuple[str, str, str, str, str, str]

@@ -84,6 +84,10 @@ class StrideTally:
     """Of each step [s]."""
     double_support: list[float] = field(default_factory=list)
     """Of each step [s]."""
+    step_sides: list[int] = field(default_factory=list)
+    """Foot that makes each step: 0 the left one swings and lands at the step's end, 1 the right one."""
+    stride_sides: list[int] = field(default_factory=list)
+    """Leg of each stride, 0 left, 1 right."""
     toe_off: list[float] = field(default_factory=list)
     """Of each stride [%]."""
     vertical_max: list[float] = field(default_factory=list)
@@ -148,6 +152,7 @@ def _add_episode(
         tally.feet[side].add(curves)
         tally.both.add(curves)
         tally.strides_of_falls += fell * len(strides)
+        tally.stride_sides += [side] * len(strides)
         tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
         tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, end) / body.mass)
         tally.energy += list(_energies(series["energy"], heel_strike, end) / body.mass)
@@ -180,6 +185,7 @@ def _add_steps(
         ankle = series["ankle"][..., 0]
         tally.step_length += list(ankle[at[1], 1 - side] - ankle[at[0], side])
         tally.step_time += list(end - begin)
+        tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
         support = next_after(contacts[1 - side].toe_offs, begin) - begin
         tally.double_support += list(np.where(support < end - begin, support, 0.0))

@@ -20,7 +20,7 @@ from springfoot.gait.leg import JOINTS
 from ..timing import PHYSICS_STEP
 from .foot import INTACT, SOUND, Feet, Foot, FootJoint, leg_segments, torque_range
 from .foot_contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
-from .scene import add_scene, bone, box
+from .scene import DEVICE, FLESH, add_scene, bone, box
 
 SIDES = ("left", "right")
 BASE = ("x", "z", "pitch")
@@ -193,7 +193,9 @@ def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
         (0, 0, -body.shank_length),
         (body.ankle_to_toe_joint, 0, -drop),
     )
-    own, segments, parent = leg_segments(body, feet[SIDES.index(side)]), [], trunk
+    worn = feet[SIDES.index(side)]
+    own, segments, parent = leg_segments(body, worn), [], trunk
+    colour = FLESH if worn.kind == "intact" else DEVICE
     for index, (name, place) in enumerate(zip(("thigh", "shank", "foot", "toe"), places, strict=True)):
         parent = _segment(parent, f"{name}_{side}", place, own.mass[index], own.com[index], own.inertia[index])
         _hinge(parent, side, index, body, feet)
@@ -205,9 +207,9 @@ def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
     add_sphere(foot, geom_name("heel", side), offsets["heel"])
     add_sphere(toe, geom_name("ball", side), offsets["ball"])
     add_sphere(toe, geom_name("toe", side), offsets["toe"])
-    bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
-    bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb)
-    bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb)
+    bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb, colour)
+    bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb, colour)
+    bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb, colour)
 
 
 def _segment(parent, name, pos, mass, com, inertia):

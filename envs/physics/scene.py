@@ -2,6 +2,9 @@
 
 import mujoco
 
+FLESH, DEVICE = (0.25, 0.45, 0.70), (0.42, 0.40, 0.30)
+"""Colours of bones, and of those of a foot that is not intact."""
+
 
 def add_scene(spec: mujoco.MjSpec) -> None:
     """Add sky, light and the material of the ground, `tiles`."""
@@ -29,15 +32,15 @@ def add_scene(spec: mujoco.MjSpec) -> None:
     spec.worldbody.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
 
 
-def bone(segment, start, end, radius: float, shade: float) -> None:
-    """Add a capsule to a segment."""
+def bone(segment, start, end, radius: float, shade: float, colour: tuple[float, float, float] = FLESH) -> None:
+    """Add a capsule to a segment, lighter by `shade`."""
     segment.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
         fromto=(start[0], 0, start[1], end[0], 0, end[1]),
         size=(radius, 0, 0),
         contype=0,
         conaffinity=0,
-        rgba=(0.25 + shade, 0.45 + shade, 0.70 + shade, 1.0),
+        rgba=(*(part + shade for part in colour), 1.0),
     )
 
 

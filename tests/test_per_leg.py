@@ -1,0 +1,87 @@
+"""Legs whose feet differ: each leg's numbers, how far they are apart, and which is which in table and pictures."""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from springfoot.envs.settings import settings_from
+from springfoot.evaluation import measure, prepare, record
+from springfoot.evaluation.animation import save_animation
+from springfoot.evaluation.gait_figure import save_gait_figure
+from springfoot.evaluation.per_leg import asymmetry, leg_numbers
+from springfoot.evaluation.report import print_table
+
+
+def walked(**feet):
+    policy, settings = prepare("pretrained", {"episode_seconds": 6.0, **feet})
+    return record(policy, settings, name="pretrained", episodes=2, threads=1)
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return walked(right_foot="passive"), walked(left_foot="passive"), walked()
+
+
+def test_left_and_right_change_places_with_the_feet(recordings):
+    right, left = (measure(recording).metrics for recording in recordings[:2])
+    assert right["feet"] == {"left": "intact", "right": "passive"} and left["falls"] == right["falls"] == 0
+    ranges = [metrics["per_leg"][side]["joint_range_deg"] for metrics, side in ((right, "right"), (left, "left"))]
+    sound = [metrics["per_leg"][side]["joint_range_deg"] for metrics, side in ((right, "left"), (left, "right"))]
+    for joint in ("thigh", "knee", "ankle", "toe"):  # not closer: the policy has learnt its legs one by one
+        assert ranges[0][joint] == pytest.approx(ranges[1][joint], abs=5.0)
+        assert sound[0][joint] == pytest.approx(sound[1][joint], abs=5.0)
+    assert ranges[0]["ankle"] < 0.5 * sound[0]["ankle"]
+    for name, value in right["asymmetry"].items():
+        assert value == pytest.approx(-left["asymmetry"][name], abs=0.2) and abs(value) < 0.5
+    for metrics, side in ((right, "right"), (left, "left")):
+        assert metrics["per_leg"][side]["stiffness_Nm_rad"]["ankle"]["swing"] == pytest.approx(600.0)
+
+
+def test_the_legs_together_are_the_whole(recordings):
+    gait = measure(recordings[0])
+    left, right = gait.metrics["per_leg"].values()
+    count = gait.metrics["strides"]["count"]
+    assert left["strides"] + right["strides"] == count
+    for joint in ("hip", "knee", "ankle", "toe"):
+        whole = gait.metrics["joint_work_J_kg"][joint]["positive"]
+        parts = sum(leg["strides"] * leg["joint_work_J_kg"][joint]["positive"] for leg in (left, right))
+        assert parts / count == pytest.approx(whole)
+    assert gait.metrics["grf"]["vertical_max_bw"] > max(leg["vertical_max_mean_bw"] for leg in (left, right))
+    assert 0.5 * (left["step_length_m"] + right["step_length_m"]) == pytest.approx(
+        gait.metrics["step_length_m"], rel=0.02
+    )
+
+
+def test_with_the_same_feet_there_are_no_legs_apart_and_they_are_alike(recordings):
+    gait = measure(recordings[2])
+    assert gait.metrics["per_leg"] is None and gait.metrics["asymmetry"] is None
+    assert all(abs(value) < 0.1 for value in asymmetry(leg_numbers(gait.tally)).values() if value is not None)
+
+
+def test_a_walk_without_strides_has_no_numbers():
+    policy, settings = prepare("pretrained", {"episode_seconds": 1.0, "right_foot": "rigid"})
+    gait = measure(record(policy, settings, name="pretrained", episodes=1, threads=1))
+    left, right = gait.metrics["per_leg"].values()
+    assert left == right and left["strides"] == 0 and left["joint_work_J_kg"]["ankle"]["positive"] is None
+    assert set(gait.metrics["asymmetry"].values()) == {None}
+
+
+def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
+    recording = recordings[0]
+    gait = measure(recording)
+    console = Console(record=True, width=120, force_terminal=False)
+    print_table(gait.metrics, console)
+    text = console.export_text()
+    assert "feet: left intact, right passive" in text and "right: passive" in text and "ankle range" in text
+    save_gait_figure(tmp_path / "gait.png", recording, gait)
+    save_animation(tmp_path / "walk.gif", recording)
+    assert (tmp_path / "gait.png").stat().st_size > 50_000 and (tmp_path / "walk.gif").stat().st_size > 10_000
+
+
+def test_feedback_is_of_the_leg_that_decides(recordings):
+    share = measure(recordings[0]).metrics["feedback"]["ankle"]["share"]
+    alike = measure(recordings[2]).metrics["feedback"]["ankle"]["share"]
+    assert np.isfinite(share) and share < alike + 0.2
+    weak = measure(walked(right_foot="drop")).metrics["feedback"]["ankle"]
+    assert weak["share"] is None or np.isfinite(weak["share"])
+    assert settings_from(right_foot="drop").right_foot == "drop"
