@@ -12,8 +12,10 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import tyro
 
+from springfoot.envs.feet import FOOT_SETTINGS
 from springfoot.envs.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.gait.errors import quoted
+from springfoot.gait.foot_file import read_foot
 from springfoot.gait.own_data import read_gait
 
 
@@ -63,13 +65,18 @@ def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
     return read_gait(words, trust_units=trust_units).to_json()
 
 
+def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
+    """A word as it is, a name of a file too; a dictionary from JSON text."""
+    return _read_json(words) if words[0].lstrip().startswith("{") else words[0]
+
+
+def _foot(given: str | dict[str, Any]) -> str | dict[str, Any]:
+    """A foot as it is, or that of the file of that name."""
+    return read_foot(given) if isinstance(given, str) and Path(given).is_file() else given
+
+
 FILE_FLAGS = {"human": read_own_gait}
 """Settings whose flag is the name of a file, and what makes the setting of it."""
-
-
-def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
-    """A word as it is; a dictionary from JSON text, or from the JSON file of that name."""
-    return _read_json(words) if words[0].lstrip().startswith("{") or Path(words[0]).is_file() else words[0]
 
 
 TRUST = "trust_units"
@@ -141,11 +148,11 @@ def _optional_flag(name: str, kind: Any, text: str, default: Any) -> Any:
     """The annotation of a flag for a setting of this type, with its help and the default that is shown."""
     shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
     hint = f"(default: {shown})"
-    if name in FILE_FLAGS:
+    if name == "human":
         return Annotated[str | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar="FILE")]
     parts = get_args(kind)
     if dict in (get_origin(kind), *map(get_origin, parts)):
-        if str in parts:
+        if str in parts and get_origin(kind) is not dict:
             return Annotated[str | dict | None, _WORD_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
         return Annotated[dict | None, _JSON_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
     return Annotated[kind | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar=_metavar(kind))]
@@ -161,7 +168,7 @@ def given(flags: Any) -> dict[str, Any]:
         elif item.name in FILE_FLAGS and value is not None:
             values[item.name] = FILE_FLAGS[item.name](value, getattr(flags, TRUST))
         elif item.name != TRUST and value is not None:
-            values[item.name] = value
+            values[item.name] = _foot(value) if item.name in FOOT_SETTINGS else value
     return values
 
 

@@ -113,7 +113,7 @@ class Biped(ExactState):
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._rows = self.subjects.rows, self._task.rows, forces
         curves = self._springs.rest, self._springs.schedule, self._legs.table, incline
-        self._tables = *(each.table for each in curves), self._task.table
+        self._tables = *(each.table for each in curves), self._springs.feet, self._task.table
         self._physics = tuple(self._simulation.arrays)
         self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
         self._simulation.measure()

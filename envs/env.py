@@ -54,8 +54,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | no_toe    | the action's                     | locked, without a ball   |                                        |
     | passive   | a spring                         | a spring                 | `ankle_stiffness`, `ankle_deg`,        |
     |           |                                  |                          | `toe_stiffness`, `toe_deg`,            |
-    |           |                                  |                          | `damping_time` [s]                     |
-    | adaptive  | the action's, fixed rest angle   | likewise                 | `ankle_deg`, `toe_deg`                 |
+    |           |                                  |                          | `damping_time` [s], or torque-angle    |
+    |           |                                  |                          | lines `ankle_table`, `toe_table`       |
+    | adaptive  | the action's, fixed rest angle   | likewise                 | `ankle_deg`, `toe_deg`, or `schedule`  |
     | weak      | the action's, weak plantarflexor | the action's             | `strength` [0.1..0.6]                  |
     | drop      | the action's, slack in swing     | the action's             |                                        |
 

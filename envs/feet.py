@@ -3,11 +3,13 @@
 A foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind, in plain JSON values.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from math import radians
 from typing import Any, NamedTuple
 
 from springfoot.gait.errors import SpringfootError, require_within
+from springfoot.gait.stiffness import StiffnessSchedule
 
 from .physics.foot import LOCK, Feet, Foot, FootJoint, Spring
 
@@ -27,6 +29,14 @@ class Number(NamedTuple):
     unit: str
 
 
+TABLE_ANGLE, TABLE_TORQUE = Number(None, -60.0, 90.0, "deg"), Number(None, -1000.0, 1000.0, "N m")
+"""Angle and torque of a point of a torque-angle line."""
+TABLE_SLOPE = Number(None, 1.0, 3000.0, "N m/rad")
+"""By how much the torque of such a line falls with the angle."""
+MOST_POINTS = 1000
+"""Points of such a line at most; chosen."""
+TABLES = ("ankle_table", "toe_table")
+"""Torque-angle lines of a passive foot, lists of [deg, N m], in place of stiffness and rest angle of that joint."""
 SPRING_NUMBERS = {
     "ankle_stiffness": Number(600.0, 0.0, 3000.0, "N m/rad"),
     "ankle_deg": Number(2.0, -30.0, 30.0, "deg"),
@@ -64,7 +74,8 @@ KINDS: dict[str, dict[str, Number]] = {
 
 `rigid`: ankle locked, toe a spring of 110 N m/rad. `rigid_toe`: toe locked. `no_toe`: the same length in one piece,
 which touches the ground with heel and tip alone. `passive`: a spring of fixed stiffness and rest angle at ankle and
-toe. `adaptive`: the policy sets their stiffness, the rest angle is fixed. `weak`: the plantarflexor moment is limited
+toe, or a torque-angle line (`ankle_table`, `toe_table`). `adaptive`: the policy sets their stiffness, the rest angle is
+fixed; or both are as a `schedule` says, a `StiffnessSchedule` in JSON form. `weak`: the plantarflexor moment is limited
 to a share of `envs.physics.model.TORQUE_LIMIT`. `drop`: the ankle's muscles are slack while the leg swings.
 """
 
@@ -81,8 +92,17 @@ def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
     if not isinstance(value, Mapping):
         return kind
     plain: dict[str, Any] = {"kind": kind}
-    given = {key: number for key, number in value.items() if key not in ("kind", "orthosis")}
-    plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, more=("orthosis",))
+    own = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
+    given = {key: number for key, number in value.items() if key not in ("kind", "orthosis", *own)}
+    more = *own, "orthosis"
+    plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, more)
+    for key in own:
+        if value.get(key) is not None:
+            joint = key.partition("_")[0]
+            instead = [other for other in plain if key == "schedule" or other.startswith(joint)]
+            if both := [other for other in instead if other in KINDS[kind]]:
+                raise SpringfootError(f"{name}: give {key} or {both[0]}, not both")
+            plain[key] = _schedule(name, value[key]) if key == "schedule" else _table(f"{name}: {key}", value[key])
     if (orthosis := value.get("orthosis")) is not None:
         if not isinstance(orthosis, Mapping):
             raise SpringfootError(
@@ -90,6 +110,41 @@ def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
             )
         plain["orthosis"] = _numbers(f"{name}: orthosis", "an orthosis", orthosis, ORTHOSIS_NUMBERS)
     return kind if len(plain) == 1 else plain
+
+
+def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
+    try:
+        return StiffnessSchedule.from_json(value).to_json()
+    except SpringfootError as error:
+        raise SpringfootError(f"{name}: schedule: {error}") from None
+
+
+def _table(name: str, value: Any) -> list[list[float]]:
+    """A torque-angle line: at least two points [deg, N m], of ascending angle and falling torque."""
+    points = [list(point) if isinstance(point, (list, tuple)) else [] for point in _listed(value)]
+    if not 2 <= len(points) <= MOST_POINTS or any(len(point) != 2 for point in points):
+        raise SpringfootError(f"{name} must be a list of 2 to {MOST_POINTS} pairs [deg, N m], got {value!r:.60}")
+    plain = [
+        [
+            require_within(f"{name}: {what}", number, (its.low, its.high), its.unit)
+            for what, number, its in zip(("angle", "torque"), point, (TABLE_ANGLE, TABLE_TORQUE), strict=True)
+        ]
+        for point in points
+    ]
+    for (first, high), (last, low) in pairwise(plain):
+        if last <= first:
+            raise SpringfootError(f"{name}: angles must ascend, got {last:g} deg after {first:g} deg")
+        fall = (high - low) / radians(last - first)
+        if not TABLE_SLOPE.low <= fall <= TABLE_SLOPE.high:
+            raise SpringfootError(
+                f"{name}: the torque must fall by {TABLE_SLOPE.low:g} to {TABLE_SLOPE.high:g} {TABLE_SLOPE.unit}, "
+                f"got {fall:.4g} between {first:g} and {last:g} deg"
+            )
+    return plain
+
+
+def _listed(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, (list, tuple)) else ()
 
 
 def _numbers(
@@ -126,6 +181,8 @@ def foot_of(setting: str | Mapping[str, Any]) -> Foot:
             toe = FootJoint(device=LOCK, orthosis=beside[1])
         case "passive":
             ankle, toe = (FootJoint(device=own, orthosis=by) for own, by in zip(_springs(value), beside, strict=True))
+        case "adaptive" if "schedule" in given:
+            ankle, toe = (FootJoint(device=Spring(), orthosis=by) for by in beside)
         case "adaptive":
             ankle = FootJoint(rest=radians(value["ankle_deg"]), orthosis=beside[0])
             toe = FootJoint(rest=radians(value["toe_deg"]), orthosis=beside[1])
@@ -134,7 +191,8 @@ def foot_of(setting: str | Mapping[str, Any]) -> Foot:
         case "drop":
             ankle = FootJoint(acts_in_swing=False, orthosis=beside[0])
     segments = {name: number for name, number in given.items() if name in SEGMENT_RATIOS}
-    return Foot(kind=kind, ankle=ankle, toe=toe, one_piece=kind == "no_toe", **segments)
+    schedule = StiffnessSchedule.from_json(given["schedule"]) if "schedule" in given else None
+    return Foot(kind=kind, ankle=ankle, toe=toe, schedule=schedule, one_piece=kind == "no_toe", **segments)
 
 
 def feet_of(left: str | Mapping[str, Any], right: str | Mapping[str, Any]) -> Feet:
@@ -168,7 +226,11 @@ def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
     """Springs at ankle and toe from the values of `SPRING_NUMBERS`."""
 
     def spring(joint: str) -> Spring:
-        rest = radians(value[f"{joint}_deg"])
-        return Spring(stiffness=value[f"{joint}_stiffness"], rest=rest, damping_time=value["damping_time"])
+        rest, table = radians(value[f"{joint}_deg"]), value.get(f"{joint}_table", ())
+        points = tuple((radians(angle), torque) for angle, torque in table)
+        time = value["damping_time"]
+        if points:
+            return Spring(table=points, damping_time=time)
+        return Spring(stiffness=value[f"{joint}_stiffness"], rest=rest, damping_time=time)
 
     return spring("ankle"), spring("toe")

@@ -99,7 +99,8 @@ class BipedSettings:
     """Mass of a load on the back over body mass [-]."""
     left_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
     """The left foot, a kind of `springfoot.envs.feet` (intact, rigid, rigid_toe, no_toe, passive, adaptive, weak, drop)
-    or, as a dictionary (JSON), a `kind` with numbers of its own: `{"kind": "passive", "ankle_stiffness": 600}`."""
+    a dictionary of a `kind` and its numbers, `{"kind": "passive", "ankle_stiffness": 600}`, or, on the command line, a
+    file (`springfoot.gait.foot_file`)."""
     right_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
     """The right foot, likewise."""
     speed: float = field(default=1.2, metadata=_SPEED)

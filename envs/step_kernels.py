@@ -24,8 +24,8 @@ def begin_window(rows, physics, tables, springs, walking) -> None:
     """Begin a control window; arguments as of `begin_step`."""
     controls, _, _ = rows
     bodies, state, _, _ = physics
-    rest, _, legs, incline, _ = tables
-    move(controls, bodies, state, rest, incline, springs, walking)
+    rest, _, legs, incline, feet, _ = tables
+    move(controls, bodies, state, rest, incline, feet, springs, walking)
     drive(controls, bodies, state, legs, incline)
 
 
@@ -54,7 +54,7 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
         physics: `Physics` of the simulation, as a plain tuple.
         tables: curves over the stride, each of a `PhaseTable`: rest angles (R, SAMPLES, 2, 2) [rad] and fixed stiffness
             (R, SAMPLES, 2, 2) [N m/rad] of ankle and toe; `leg_curves` (R, SAMPLES, 2, 6); `slope_table`
-            (1, SAMPLES, 2, 4); `REFERENCE` (R, SAMPLES, 2, C).
+            (1, SAMPLES, 2, 4); `FootLines` as a plain tuple; `REFERENCE` (R, SAMPLES, 2, C).
         springs: (1,) of `SPRING_OPTIONS`.
         factor: (N, 4) what the actions make of the stiffness [-].
         walking: (N,) bool, environments whose springs and phase move.
@@ -85,7 +85,7 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     Returns whether an episode is terminated.
     """
     controls, tasks, forces = rows
-    bodies, reference = physics[0], tables[4]
+    bodies, reference = physics[0], tables[5]
     observation, reward, terminated, truncated, values = outcome
     end_window(rows, physics, len(forces) - 1, walking)
     terms, any_terminated = np.empty((len(running), len(task[0].weights))), False

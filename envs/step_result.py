@@ -70,7 +70,7 @@ def report(rows, controls, bodies, terms, options, values) -> None:
             row.phase[side] = controls[i].legs.phase[side]
             for joint in range(2):
                 muscles = springs.acts[side, joint] * springs.stiffness[side, joint]
-                row.stiffness[side, joint] = muscles + feet.stiffness[side, joint]
+                row.stiffness[side, joint] = muscles + springs.device[side, joint]
                 row.torque[side, joint] = m.torque[side, ANKLE + joint]
                 row.equilibrium[side, joint] = springs.equilibrium[side, joint]
                 row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]

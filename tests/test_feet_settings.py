@@ -20,8 +20,11 @@ from springfoot.gait.errors import SpringfootError
 
 PASSIVE = {"kind": "passive", "ankle_stiffness": 400}
 KIND_LIST = ", ".join(map(repr, KINDS))
-OF_A_FOOT = "shank_mass_ratio, shank_com_ratio, shank_inertia_ratio, foot_mass_ratio, foot_inertia_ratio, orthosis"
 OF_A_SPRING = "ankle_stiffness, ankle_deg, toe_stiffness, toe_deg, damping_time"
+RATIOS = "shank_mass_ratio, shank_com_ratio, shank_inertia_ratio, foot_mass_ratio, foot_inertia_ratio"
+OF_A_FOOT = f"{RATIOS}, orthosis"
+OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis"
+OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis"
 
 WRONG_KINDS: list[tuple[Any, str]] = [
     ("rigd", f"right_foot must be one of {KIND_LIST}, got 'rigd'"),
@@ -42,7 +45,7 @@ WRONG_KINDS: list[tuple[Any, str]] = [
 WRONG_KEYS: list[tuple[Any, str]] = [
     (
         PASSIVE | {"K": 600},
-        f"right_foot: a foot of kind 'passive' has no 'K'; valid: {OF_A_SPRING}, {OF_A_FOOT}",
+        f"right_foot: a foot of kind 'passive' has no 'K'; valid: {OF_PASSIVE}",
     ),
     (
         {"kind": "rigid", "toe_stiffness": 90},
@@ -52,7 +55,7 @@ WRONG_KEYS: list[tuple[Any, str]] = [
     ({"kind": "weak", "share": 0.3}, f"right_foot: a foot of kind 'weak' has no 'share'; valid: strength, {OF_A_FOOT}"),
     (
         {"kind": "adaptive", "ankle_stiffness": 600},
-        f"right_foot: a foot of kind 'adaptive' has no 'ankle_stiffness'; valid: ankle_deg, toe_deg, {OF_A_FOOT}",
+        f"right_foot: a foot of kind 'adaptive' has no 'ankle_stiffness'; valid: {OF_ADAPTIVE}",
     ),
     ({"kind": "drop", 7: 1.0}, f"right_foot: a foot of kind 'drop' has no 7; valid: {OF_A_FOOT}"),
     ({"kind": "no_toe", "mass": 1.0}, f"right_foot: a foot of kind 'no_toe' has no 'mass'; valid: {OF_A_FOOT}"),

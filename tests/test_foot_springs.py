@@ -71,7 +71,16 @@ class Springs:
     def move_equilibrium(self, leg_phase: NDArray) -> None:
         self.rows["legs"]["phase"] = leg_phase
         incline = slope_table(slope_constants()).table
-        move(self.rows, self.bodies, self.state, self.feet.rest.table, incline, self.feet.options, self.everyone)
+        move(
+            self.rows,
+            self.bodies,
+            self.state,
+            self.feet.rest.table,
+            incline,
+            self.feet.feet,
+            self.feet.options,
+            self.everyone,
+        )
 
 
 def test_a_residual_action_multiplies_the_schedule():

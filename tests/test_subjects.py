@@ -246,7 +246,7 @@ def test_nothing_jumps_as_the_speed_changes():
     for speed in np.linspace(0.8, 1.6, 801):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         legs.follow()
-        move(subjects.rows, bodies, state, springs.rest.table, incline, springs.options, np.ones(1, bool))
+        move(subjects.rows, bodies, state, springs.rest.table, incline, springs.feet, springs.options, np.ones(1, bool))
         drive(subjects.rows, bodies, state, legs.table.table, incline)
         equilibrium = 100 * subjects.rows["springs"]["equilibrium"]
         plan = 100 * task.tracking(bodies)

@@ -1,23 +1,81 @@
-"""What the control keeps of the feet: muscles or a device at each ankle and toe, in rows that kernels read."""
+"""What the control keeps of the feet: muscles or a device at each ankle and toe, in rows and tables for kernels."""
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from springfoot.gait.arrays import NDArray
+from springfoot.gait.stiffness import StiffnessSchedule
 
 from ..feet import feet_of
 from ..physics.foot import LOCK, Feet
+from ..physics.kernel import part
 from ..settings import BipedSettings
-from .rows import FOOT
+from .phase_table import GRID, SAMPLES, PhaseTable, read
+from .rows import FOOT, PLACE
+
+
+class FootLines(NamedTuple):
+    """What devices do that no constant stiffness says, for all feet of a batch; none for feet of other kinds."""
+
+    lines: NDArray
+    """(L, points, 3) torque-angle lines: angle [rad], torque [N m], and how it falls from there on [N m/rad]. Points
+    that a line has not lie at infinity."""
+    curves: NDArray
+    """(S, SAMPLES, 2, 4) K [N m/rad] and theta_eq [rad] over the stride, ankle and toe of each, of a `PhaseTable`."""
+
+
+@part
+def device(row, feet, theta, side, joint) -> Any:
+    """K and K theta_eq of what is in place of muscles: by its line at the angle `theta`, its schedule, or its numbers.
+
+    A line goes on straight beyond its ends. `row` is of `CONTROL_ROW`, `feet` are `FootLines` as a plain tuple.
+    """
+    (lines, curves), foot = feet, row.feet
+    if foot.line[side, joint] >= 0:
+        line, at = lines[foot.line[side, joint]], 0
+        while at < len(line) - 2 and theta >= line[at + 1, 0]:
+            at += 1
+        return line[at, 2], line[at, 1] + line[at, 2] * line[at, 0]
+    if foot.curve[side] >= 0:
+        place, values = np.zeros(1, PLACE)[0], np.empty(4)
+        place.row = foot.curve[side]
+        read(curves, place, row.legs.phase[side], values)
+        return values[joint], values[joint] * values[2 + joint]
+    return foot.stiffness[side, joint], foot.stiffness[side, joint] * foot.rest[side, joint]
+
+
+def foot_lines(feet: Sequence[Feet]) -> FootLines:
+    """The tables of N pairs of feet."""
+    tables, schedules = _tables(feet), _schedules(feet)
+    lines = np.full((max(len(tables), 1), max([2, *map(len, tables)]), 3), np.inf)
+    for line, table in zip(lines, tables, strict=False):
+        angle, torque = np.array(table).T
+        slope = -np.diff(torque) / np.diff(angle)
+        line[: len(table)] = np.stack([angle, torque, np.append(slope, slope[-1])], -1)
+    curves = [np.concatenate(schedule.at(GRID), -1) for schedule in schedules] or [np.zeros((SAMPLES, 4))]
+    return FootLines(lines, PhaseTable(np.stack(curves)).table)
+
+
+def _tables(feet: Sequence[Feet]) -> list[tuple[tuple[float, float], ...]]:
+    joints = [joint for pair in feet for foot in pair for joint in foot.joints]
+    return list(dict.fromkeys(joint.device.table for joint in joints if joint.device and joint.device.table))
+
+
+def _schedules(feet: Sequence[Feet]) -> list[StiffnessSchedule]:
+    return list(dict.fromkeys(foot.schedule for pair in feet for foot in pair if foot.schedule))
 
 
 def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
     """(N,) of `FOOT` for N pairs of feet."""
-    rows = np.zeros(len(feet), FOOT)
+    rows, tables, schedules = np.zeros(len(feet), FOOT), _tables(feet), _schedules(feet)
+    rows["line"], rows["curve"] = -1, -1
     decided = [settings.stiffness_joints in ("both", name) for name in ("ankle", "toe")]
     for row, pair in zip(rows, feet, strict=True):
         for side, foot in enumerate(pair):
+            if foot.schedule:
+                row["curve"][side] = schedules.index(foot.schedule)
             for index, joint in enumerate(foot.joints):
                 row["muscles"][side, index] = joint.device is None
                 row["controlled"][side, index] = decided[index] and joint.device is None
@@ -25,6 +83,8 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
                 rest = joint.device.rest if joint.device else joint.rest
                 row["rests"][side, index], row["rest"][side, index] = rest is not None, rest or 0.0
                 row["stiffness"][side, index] = joint.device.stiffness if joint.device else 0.0
+                if joint.device and joint.device.table:
+                    row["line"][side, index] = tables.index(joint.device.table)
                 row["locked"][side, index] = joint.device == LOCK
     return rows
 

@@ -21,7 +21,7 @@ from ..physics.model import ANKLE
 from ..physics.simulation import Physics
 from ..settings import BipedSettings
 from ..timing import CONTROL_WINDOW
-from .foot_rows import foot_rows
+from .foot_rows import device, foot_lines, foot_rows
 from .phase_table import PhaseTable, read
 from .rows import PLACE
 from .subjects import Subjects
@@ -135,21 +135,24 @@ def _swings(row, force, side):
 
 
 @part
-def _control(row, control, side, joint):
-    """Put K and K theta_eq of one joint, muscles and device together, into the control."""
-    own, foot = row.springs, row.feet
-    muscles, device = own.acts[side, joint] * own.stiffness[side, joint], foot.stiffness[side, joint]
-    control[side, ANKLE + joint, 0] = muscles + device
-    control[side, ANKLE + joint, 1] = muscles * own.equilibrium[side, joint] + device * foot.rest[side, joint]
+def _control(row, control, feet, theta, side, joint):
+    """Put K and K theta_eq of one joint at the angle `theta`, muscles and device together, into the control."""
+    own, muscles = row.springs, row.springs.acts[side, joint] * row.springs.stiffness[side, joint]
+    stiffness, drive = device(row, feet, theta, side, joint)
+    own.device[side, joint] = stiffness
+    if stiffness > 0.0:
+        own.equilibrium[side, joint] = drive / stiffness  # no muscles act beside it
+    control[side, ANKLE + joint, 0] = muscles + stiffness
+    control[side, ANKLE + joint, 1] = muscles * own.equilibrium[side, joint] + drive
 
 
 @part
-def move(rows, bodies, state, rest, incline, options, walking) -> None:
+def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
     """Begin a control window: K and K theta_eq of ankles and toes go into the control.
 
     K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases or the foot's own. Moving the
     rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack
-    as the leg begins to swing lose what they held. A device has its own K and theta_eq, which do not change.
+    as the leg begins to swing lose what they held. A device has its own K and theta_eq.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
@@ -157,6 +160,7 @@ def move(rows, bodies, state, rest, incline, options, walking) -> None:
         state: (N, numbers) MuJoCo's, whose `control` is filled.
         rest: (R, SAMPLES, 2, 2) rest angles of ankle and toe [rad], of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.leg_controller.slope_table`).
+        feet: `envs.control.foot_rows.FootLines`, as a plain tuple.
         options: (1,) of `SPRING_OPTIONS`.
         walking: (N,) bool; the springs of the others do not change.
     """
@@ -174,25 +178,26 @@ def move(rows, bodies, state, rest, incline, options, walking) -> None:
             if option.follows and subject.slope != 0.0:
                 read(incline, level, own.rest_phase[side], inclined)
                 wanted[0] += subject.slope * inclined[ANKLE]
-            swings = _swings(rows[i], bodies[i].measured.force, side)
             for joint in range(2):
                 k, theta = own.stiffness[side, joint], angle[side, ANKLE + joint]
                 if walking[i]:
-                    acted, acts = own.acts[side, joint], 1.0 if foot.in_swing[side, joint] or not swings else 0.0
-                    own.acts[side, joint] = acts
+                    acted = acts = own.acts[side, joint]
+                    if not foot.in_swing[side, joint]:
+                        acts = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
+                        own.acts[side, joint] = acts
                     aim = foot.rest[side, joint] if foot.rests[side, joint] else wanted[joint]
                     before, after = own.equilibrium[side, joint] - theta, aim - theta
                     own.equilibrium[side, joint] = aim
                     if not own.fresh:
                         own.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
                         own.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
-                _control(rows[i], control, side, joint)
+                _control(rows[i], control, feet, theta, side, joint)
         if walking[i]:
             own.fresh = 0
 
 
 @kernel
-def _hold(rows, bodies, state, held):
+def _hold(rows, bodies, state, feet, held):
     """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in the control of `state` (N, numbers).
 
     They act without delay, and the work of both changes is counted as that of `stiffen` and `move`. A device, and a
@@ -216,7 +221,7 @@ def _hold(rows, bodies, state, held):
                 if not own.fresh:
                     own.work_stiffness[side, joint] += 0.5 * (k - before) * old * old
                     own.work_equilibrium[side, joint] += 0.5 * k * (new * new - old * old)
-                _control(rows[i], control, side, joint)
+                _control(rows[i], control, feet, theta, side, joint)
         own.fresh = 0
 
 
@@ -241,8 +246,8 @@ class FootSprings:
         subjects: Subjects,
         feet: Sequence[Feet] | None = None,
     ):
-        own = feet_of(settings.left_foot, settings.right_foot)
-        subjects.rows["feet"] = foot_rows(settings, feet or [own] * len(subjects.rows))
+        feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * len(subjects.rows)
+        subjects.rows["feet"], self.feet = foot_rows(settings, feet), tuple(foot_lines(feet))
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)
         self._factor = np.tile(factor, 2)
@@ -275,4 +280,4 @@ class FootSprings:
 
     def hold(self, physics: Physics, held: NDArray) -> None:
         """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control."""
-        _hold(self._subjects.rows, physics.bodies, physics.state, held)
+        _hold(self._subjects.rows, physics.bodies, physics.state, self.feet, held)

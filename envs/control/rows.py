@@ -43,6 +43,8 @@ FOOT = np.dtype(
         ("rests", np.int64, FEET),  # 1 where the rest angle is the foot's own, whatever is planned
         ("rest", float, FEET),  # that angle, a device's as well [rad]
         ("stiffness", float, FEET),  # of a device [N m/rad], 0 where there is none
+        ("line", np.int64, FEET),  # number of the device's torque-angle line in `FootLines`, -1 for none
+        ("curve", np.int64, len(SIDES)),  # number of the devices' schedule there, -1 for none
         ("locked", np.int64, FEET),  # 1 where a device lets the joint not move
     ]
 )
@@ -51,6 +53,7 @@ SPRING_STATE = np.dtype(
     [
         ("stiffness", float, FEET),  # K of the muscles [N m/rad]
         ("acts", float, FEET),  # 1 while they act, 0 while they are slack
+        ("device", float, FEET),  # K of a device in their place [N m/rad]
         ("equilibrium", float, FEET),  # rest angle [rad]
         ("work_stiffness", float, FEET),  # done by the last change of stiffness [J]
         ("work_equilibrium", float, FEET),  # done by moving the rest angle since that change [J]

@@ -16,7 +16,7 @@ from springfoot.gait.body import GRAVITY, Body
 
 from .foot import SOUND, Feet, leg_segments
 from .kernel import kernel, part
-from .model import ARMATURE, JOINTS, KNEE, SIDES, damping_times_of
+from .model import ARMATURE, JOINTS, KNEE, SIDES, damping_times_of, joints_of
 
 LEDGER = np.dtype(
     [
@@ -100,6 +100,7 @@ PARTS = np.dtype(
         ("end", float, (len(JOINTS), 2)),  # from a leg segment's joint to the next one [m], in its own frame
         ("armature", float, len(JOINTS)),  # [kg m^2]
         ("beta", float, _LEGS),  # [s]
+        ("table", np.int64, _LEGS),  # 1 for a device with a torque-angle line: of its own, so that nothing changes it
     ]
 )
 """A body as its energy needs it."""
@@ -119,6 +120,7 @@ def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
     parts["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
     parts["armature"] = np.array(ARMATURE) * body.mass_scale * body.length_scale**2
     parts["beta"] = damping_times_of(body, feet)
+    parts["table"] = [[bool(joint.device and joint.device.table) for joint in joints_of(foot)] for foot in feet]
     return parts
 
 
@@ -151,12 +153,14 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
 
 
 @kernel
-def _sum_changes(control, held, angle, energy):
+def _sum_changes(parts, control, held, angle, energy):
     for i in range(len(energy)):
         for side in range(2):
             for joint in range(4):
                 k, k_before = control[i, side, joint, 0], held[i, side, joint, 0]
-                if k + k_before > 0.0:  # neither at the start of an episode (NaN) nor without a spring
+                if (
+                    k + k_before > 0.0 and not parts[i].table[side, joint]
+                ):  # neither at the start of an episode (NaN) nor without a spring
                     old, new = held[i, side, joint, 1] / k_before, control[i, side, joint, 1] / k
                     old, new = old if k_before > 0.0 else new, new if k > 0.0 else old  # a slack spring has no rest
                     before, after = old - angle[i, side, joint], new - angle[i, side, joint]
@@ -221,6 +225,6 @@ def window_work(
     torque, work = np.zeros((num, len(SIDES), len(JOINTS))), np.zeros((num, len(SIDES), len(JOINTS), 2))
     energy = np.zeros(num, LEDGER)
     _sum_work(parts, steps, control, push, timestep, torque, work, energy)
-    _sum_changes(control, held, angle, energy)
+    _sum_changes(parts, control, held, angle, energy)
     _add_mechanical(parts, *state, energy)
     return WindowWork(torque=torque, work=work, energy=energy)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import inf
 
 from springfoot.gait.body import Body
+from springfoot.gait.stiffness import StiffnessSchedule
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +21,8 @@ class Spring:
     """Angle at which it gives no torque [rad]."""
     damping_time: float | None = None
     """[s]; None for that of the joint's muscles (`envs.physics.model.damping_times`)."""
+    table: tuple[tuple[float, float], ...] = ()
+    """Angles [rad], ascending, and torques [N m], falling, in place of stiffness and rest angle; lines between them."""
 
 
 LOCK = Spring(stiffness=50_000.0, damping_time=0.01)
@@ -51,6 +54,8 @@ class Foot:
     """Its name among the kinds of `springfoot.envs.feet`."""
     ankle: FootJoint = FootJoint()
     toe: FootJoint = FootJoint()
+    schedule: StiffnessSchedule | None = None
+    """Stiffness and rest angle over the stride of the devices at ankle and toe, in place of their own."""
     one_piece: bool = False
     """Whether it touches the ground with heel and toe tip alone: a plate has no ball to roll over."""
     shank_mass_ratio: float = 1.0
