@@ -53,6 +53,7 @@ class Biped(ExactState):
         model: a custom model, as for `Simulation`.
         slope: constants for slopes in place of the committed ones.
         feet: N pairs, the feet of each body in place of the settings'.
+        right_legs: V sets for the right legs, where they have their own; phase, trunk and speed are held by `legs`.
     """
 
     tick_dt = CONTROL_WINDOW
@@ -69,9 +70,11 @@ class Biped(ExactState):
         model: MjModel | None = None,
         slope: SlopeConstants | None = None,
         feet: Sequence[Feet] | None = None,
+        right_legs: Sequence[LegConstants] | None = None,
     ):
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
         self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
+        self._arguments["right_legs"] = right_legs
         self.settings = settings
         self.num_envs = num_envs
         self.dt = settings.step_seconds
@@ -83,20 +86,20 @@ class Biped(ExactState):
         own = next(walk for walk in self.walks if walk.speed == settings.speed)
         self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
         table = list(rows(self.walks))
+        right = list(rows(reference_walks(settings, right_legs))) if right_legs else []
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
         feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * num_envs
         incline = slope_table(slope or slope_constants())
-        self._legs = LegController(table, self.subjects)
-        curves = [foot_curves(settings, c, w) for c, w in table]
+        self._legs = LegController(table, self.subjects, right)
+        curves = [foot_curves(settings, c, w) for c, w in (*table, *right)]
         planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
-        rest = planned if rest is None else np.repeat(rest, len(speeds), axis=0)
+        rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
         self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
-
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction, feet)
         self._task = Task(settings, table, self.subjects)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
@@ -104,7 +107,6 @@ class Biped(ExactState):
         self._pushes = Pushes(settings, self.subjects, self._task.rows)
         self.observation_names = self._task.names
         self.observation_low, self.observation_high = self._task.low, self._task.high
-
         self._random: list[np.random.Generator | None] = [None] * num_envs
         self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
         self._no_reason = np.zeros(num_envs, int)

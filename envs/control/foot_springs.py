@@ -93,7 +93,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
     for i in range(len(rows)):
         own, subject, angle = rows[i].springs, rows[i].subject, bodies[i].measured.angle
         for side in range(2):
-            read(schedule, subject.place, rows[i].legs.phase[side], scheduled)
+            read(schedule[side * rows[i].legs.right :], subject.place, rows[i].legs.phase[side], scheduled)
             own.rest_phase[side] = rows[i].legs.phase[side]
             for joint in range(2):
                 own.work_stiffness[side, joint] = own.work_equilibrium[side, joint] = 0.0
@@ -174,7 +174,7 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
         for side in range(2):
             if not option.held:
                 own.rest_phase[side] = rows[i].legs.phase[side]
-            read(rest, subject.place, own.rest_phase[side], wanted)
+            read(rest[side * rows[i].legs.right :], subject.place, own.rest_phase[side], wanted)
             if option.follows and subject.slope != 0.0:
                 read(incline, level, own.rest_phase[side], inclined)
                 wanted[0] += subject.slope * inclined[ANKLE]
@@ -269,7 +269,11 @@ class FootSprings:
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
-        return self.schedule.at(leg_phase, self._subjects.place) * self._subjects.scale["torque"][:, None, None]
+        right = self._subjects.place.copy()
+        right["row"] += self._subjects.rows["legs"]["right"]
+        places = zip(np.moveaxis(leg_phase, -1, 0), (self._subjects.place, right), strict=True)
+        curves = [self.schedule.at(np.ascontiguousarray(phase), place) for phase, place in places]
+        return np.stack(curves, 1) * self._subjects.scale["torque"][:, None, None]
 
     def factor(self, action: NDArray) -> NDArray:
         """What actions (N, 4) make of the stiffness: factors (N, 4) on that at action 0, or on the schedule.

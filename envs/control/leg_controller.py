@@ -99,7 +99,7 @@ def drive(rows, bodies, state, table, incline) -> None:
         subject, legs, m, control = rows[i].subject, rows[i].legs, bodies[i].measured, plant_of(state, i).control
         gain, torque = legs.gains, subject.scale.torque
         for side in range(2):
-            read(table, subject.place, legs.phase[side], curves[side])
+            read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
         too_fast = _too_fast(m, rows[i])
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
@@ -155,12 +155,19 @@ class LegController:
     Args:
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
+        right: the same for a right leg of its own; phase, trunk and speed are held by the constants of `rows`.
     """
 
-    def __init__(self, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects):
+    def __init__(
+        self,
+        rows: Sequence[tuple[LegConstants, ReferenceWalk]],
+        subjects: Subjects,
+        right: Sequence[tuple[LegConstants, ReferenceWalk]] = (),
+    ):
         self._subjects = subjects
         self._constants = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
-        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
+        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in (*rows, *right)]))
+        subjects.rows["legs"]["right"] = len(rows) if right else 0
         self.phase = subjects.rows["legs"]["phase"]
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
         self.phase[:] = leg_phases(np.zeros(len(self.phase)))
