@@ -37,7 +37,6 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | 3   | toe_right   | 5               | 200             | N m/rad  |
 
     The stiffnesses are those of 1.70 m and 63 kg; they scale with mass x height.
-
     Actions of a joint that has a device in place of muscles (see Feet) are read as 0, also in the observation.
 
     ## Feet

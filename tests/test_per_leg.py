@@ -13,8 +13,8 @@ from springfoot.evaluation.report import print_table
 
 
 def walked(**feet):
-    policy, settings = prepare("pretrained", {"episode_seconds": 6.0, **feet})
-    return record(policy, settings, name="pretrained", episodes=2, threads=1)
+    policy, settings = prepare("schedule", {"episode_seconds": 6.0, **feet})
+    return record(policy, settings, name="schedule", episodes=2, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def test_left_and_right_change_places_with_the_feet(recordings):
     assert right["feet"] == {"left": "intact", "right": "passive"} and left["falls"] == right["falls"] == 0
     ranges = [metrics["per_leg"][side]["joint_range_deg"] for metrics, side in ((right, "right"), (left, "left"))]
     sound = [metrics["per_leg"][side]["joint_range_deg"] for metrics, side in ((right, "left"), (left, "right"))]
-    for joint in ("thigh", "knee", "ankle", "toe"):  # not closer: the policy has learnt its legs one by one
+    for joint in ("thigh", "knee", "ankle", "toe"):  # of other starts, so not the same strides
         assert ranges[0][joint] == pytest.approx(ranges[1][joint], abs=5.0)
         assert sound[0][joint] == pytest.approx(sound[1][joint], abs=5.0)
     assert ranges[0]["ankle"] < 0.5 * sound[0]["ankle"]
@@ -47,9 +47,9 @@ def test_the_legs_together_are_the_whole(recordings):
         parts = sum(leg["strides"] * leg["joint_work_J_kg"][joint]["positive"] for leg in (left, right))
         assert parts / count == pytest.approx(whole)
     assert gait.metrics["grf"]["vertical_max_bw"] > max(leg["vertical_max_mean_bw"] for leg in (left, right))
-    assert 0.5 * (left["step_length_m"] + right["step_length_m"]) == pytest.approx(
-        gait.metrics["step_length_m"], rel=0.02
-    )
+    steps = np.bincount(gait.tally.step_sides)
+    mean = (steps * [left["step_length_m"], right["step_length_m"]]).sum() / steps.sum()
+    assert mean == pytest.approx(gait.metrics["step_length_m"])
 
 
 def test_with_the_same_feet_there_are_no_legs_apart_and_they_are_alike(recordings):
@@ -59,8 +59,8 @@ def test_with_the_same_feet_there_are_no_legs_apart_and_they_are_alike(recording
 
 
 def test_a_walk_without_strides_has_no_numbers():
-    policy, settings = prepare("pretrained", {"episode_seconds": 1.0, "right_foot": "rigid"})
-    gait = measure(record(policy, settings, name="pretrained", episodes=1, threads=1))
+    policy, settings = prepare("schedule", {"episode_seconds": 1.0, "right_foot": "rigid"})
+    gait = measure(record(policy, settings, name="schedule", episodes=1, threads=1))
     left, right = gait.metrics["per_leg"].values()
     assert left == right and left["strides"] == 0 and left["joint_work_J_kg"]["ankle"]["positive"] is None
     assert set(gait.metrics["asymmetry"].values()) == {None}
