@@ -13,6 +13,8 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, as_float, quoted, require_count, require_number
 from springfoot.gait.stiffness import STIFFNESS_RANGE
 
+from .timing import CONTROL_WINDOW
+
 STIFFNESS_BOUNDS = (1e-3, STIFFNESS_RANGE[1])
 """Softest and stiffest spring of an action [N m/rad]; chosen: beyond, products of stiffnesses leave the numbers."""
 MOST_WEIGHT = 1e6
@@ -95,6 +97,13 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
             f"{name} must be (low, high) with low < high in [{allowed[0]:g}, {allowed[1]:g}] {unit}, "
             f"got {quoted(value)}"
         )
+
+
+def check_windows(name: str, *delays: float) -> None:
+    """Refuse delays [s] that are not whole control windows."""
+    if any(abs(delay / CONTROL_WINDOW - round(delay / CONTROL_WINDOW)) > 1e-9 for delay in delays):
+        value = delays if len(delays) > 1 else delays[0]
+        raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {value!r}")
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:

@@ -26,9 +26,10 @@ from .setting_checks import (
     check_span,
     check_start,
     check_weights,
+    check_windows,
     plain,
 )
-from .timing import ACTION_STEP, CONTROL_WINDOW
+from .timing import ACTION_STEP
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 Feedforward = Literal["people", "plan"]
@@ -48,7 +49,6 @@ THEMES = {
     "reward": "What it is rewarded for.",
 }
 """The themes of the settings, and what each one says."""
-
 
 FRICTION_RANGE = (0.4, 1.2)
 """Allowed coefficients of friction, from a wet floor to rough rubber [-]; chosen."""
@@ -75,10 +75,7 @@ DEFAULT_WEIGHTS = {
 }
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
 
-
-_BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = (
-    {"theme": name} for name in THEMES
-)
+_BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = ({"theme": t} for t in THEMES)
 _DRAWN = {"drawn": True}  # the setting makes something differ between episodes, or change within one, by chance
 _KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
 
@@ -253,14 +250,8 @@ class BipedSettings:
         require_number("sensor_noise", self.sensor_noise, 0.0, MOST_SENSOR_NOISE, "(observation units)")
         require_number("stiffness_delay_s", self.stiffness_delay_s, 0.0, LONGEST_DELAY, "s")
         check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
-        for name, delays in (
-            ("stiffness_delay_s", (self.stiffness_delay_s,)),
-            ("stiffness_delay_range_s", self.stiffness_delay_range_s or ()),
-        ):
-            if any(abs(delay / CONTROL_WINDOW - round(delay / CONTROL_WINDOW)) > 1e-9 for delay in delays):
-                raise SpringfootError(
-                    f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {getattr(self, name)!r}"
-                )
+        check_windows("stiffness_delay_s", self.stiffness_delay_s)
+        check_windows("stiffness_delay_range_s", *(self.stiffness_delay_range_s or ()))
 
 
 THEME_OF: dict[str, str] = {item.name: item.metadata["theme"] for item in fields(BipedSettings)}
