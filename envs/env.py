@@ -22,7 +22,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     ## Description
     Trunk, thighs, shanks, feet and toes of a person of given height and mass. Hips and knees follow a phase controller
     with human-like curves; ankles and toes are springs, torque = K (equilibrium - angle - beta x angular rate). The
-    policy sets K and nothing else, 50 times a second (`decisions`). The equilibrium follows people's ankle (`equilibrium`).
+    policy sets K alone, 50 times a second (`decisions`). The equilibrium follows people's ankle (`equilibrium`).
 
     ## Action space
     `Box(-1, 1, (4,), float32)`, from -1 to 1 on a log scale over the stiffness range (`action_mode="absolute"`) or as

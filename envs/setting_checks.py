@@ -99,11 +99,11 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
         )
 
 
-def check_windows(name: str, *delays: float) -> None:
-    """Refuse delays [s] that are not whole control windows."""
-    if any(abs(delay / CONTROL_WINDOW - round(delay / CONTROL_WINDOW)) > 1e-9 for delay in delays):
-        value = delays if len(delays) > 1 else delays[0]
-        raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {value!r}")
+def check_windows(name: str, delay: float | tuple[float, ...] | None) -> None:
+    """Refuse a delay, or ends of a range of delays [s], that is not whole control windows."""
+    ends = delay if isinstance(delay, tuple) else () if delay is None else (delay,)
+    if any(abs(end / CONTROL_WINDOW - round(end / CONTROL_WINDOW)) > 1e-9 for end in ends):
+        raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {delay!r}")
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:

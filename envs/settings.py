@@ -251,7 +251,7 @@ class BipedSettings:
         require_number("stiffness_delay_s", self.stiffness_delay_s, 0.0, LONGEST_DELAY, "s")
         check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
         check_windows("stiffness_delay_s", self.stiffness_delay_s)
-        check_windows("stiffness_delay_range_s", *(self.stiffness_delay_range_s or ()))
+        check_windows("stiffness_delay_range_s", self.stiffness_delay_range_s)
 
 
 THEME_OF: dict[str, str] = {item.name: item.metadata["theme"] for item in fields(BipedSettings)}
