@@ -39,7 +39,7 @@ MARGIN_PERCENT = 0.5
 mean of a few walks differs from that of a hundred."""
 FALL_COST = 2.0
 """Price of a fall undisturbed, beside the misses and the lost return [%]; chosen."""
-PUSH, TRAINED_SECONDS = 200.0, 8.0
+HARD_PUSH, TRAINED_SECONDS = 200.0, 8.0
 """How hard candidates are pushed in the world they were trained in [N], harder than in training, and how long they walk
 there [s]."""
 SEARCHED_FROM, JUDGED_FROM = 1_000_000, 2_000_000
@@ -160,7 +160,7 @@ class Mix(Study):
         ]
         text = (
             f"{table(head, cells)}\n\nMisses of {self.judged} walks of {self.seconds:g} s; return and falls of "
-            f"{5 * self.judged} of {TRAINED_SECONDS:g} s in the world of the training, pushed by ±{PUSH:g} N."
+            f"{5 * self.judged} of {TRAINED_SECONDS:g} s in the world of the training, pushed by ±{HARD_PUSH:g} N."
         )
         files = {"mix.csv": csv_text(head, lines), "mix.safetensors": lambda path: save_policy(path, mean)}
         return Answer(text=text, files=files)
@@ -170,7 +170,7 @@ class Mix(Study):
         alone = replace(policy.settings, **(CONDITIONS | {"episode_seconds": self.seconds}))
         seed, threads = self.seed + first, self.threads
         walk = record(policy, alone, name="mix", episodes=episodes, seed=seed, threads=threads)
-        there = replace(policy.settings, episode_seconds=TRAINED_SECONDS, push_newton=PUSH)
+        there = replace(policy.settings, episode_seconds=TRAINED_SECONDS, push_newton=HARD_PUSH)
         returns, _, fell = evaluate_returns(Biped(there, trained, threads), policy, seed)
         return measure(walk).metrics, returns, fell
 
