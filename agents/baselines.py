@@ -7,6 +7,7 @@ stiffness in N m/rad into an action by the inverse of the environment's log scal
 
 from collections.abc import Callable
 from math import inf, nan, sqrt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,7 @@ def leg_phase(observation: NDArray) -> NDArray:
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
     """Hold one `stiffness` (ankle, toe) [N m/rad], given for 1.70 m and 63 kg and scaled with the body."""
     body = body_of(settings)
-    _require_absolute(settings)
+    require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
     action = np.tile(action_of(scaled, settings, body).astype(np.float32), 2)
     return lambda observation: np.tile(action, (len(observation), 1))
@@ -94,7 +95,7 @@ def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: B
 
     It reads phase and Froude speed from the observation; between two of `speeds` [m/s, of `body`] it is linear.
     """
-    _require_absolute(settings)
+    require_absolute(settings)
     table, froude = PhaseTable(stiffness), np.array([body.froude_speed(speed) for speed in speeds])
 
     def policy(observation: NDArray) -> NDArray:
@@ -107,7 +108,8 @@ def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: B
     return policy
 
 
-def _require_absolute(settings: BipedSettings) -> None:
+def require_absolute(settings: BipedSettings) -> None:
+    """Raise `SpringfootError` for settings in which an action is no stiffness of its own."""
     if settings.action_mode != "absolute":
         raise SpringfootError("a stiffness schedule or constant needs action_mode 'absolute', got 'residual'")
 
@@ -118,6 +120,8 @@ schedule times a factor."""
 FROZEN = "frozen"
 """`frozen:POLICY` is the mean stiffness of a trained policy over the stride, played open loop
 (`springfoot.evaluation.open_loop`)."""
+SCHEDULE_SUFFIXES = (".csv", ".json")
+"""How the names of schedule files end."""
 SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
 """Swing springs of the thesis's lines: completed, and as printed."""
 
@@ -143,8 +147,14 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
 
 
 def has_feedback(name: str) -> bool:
-    """Whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop copy."""
-    return name.partition(":")[0] not in (*BASELINES, FROZEN)
+    """Whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop copy, nor a
+    schedule in a file."""
+    return name.partition(":")[0] not in (*BASELINES, FROZEN) and not is_schedule_file(name)
+
+
+def is_schedule_file(name: str) -> bool:
+    """Whether a policy of that name is a schedule in a file (`springfoot.agents.schedule_files`)."""
+    return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
 
 
 def and_copy(name: str) -> tuple[str, ...]:

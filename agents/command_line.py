@@ -6,7 +6,7 @@ from pathlib import Path
 
 from springfoot.gait.errors import SpringfootError, printable
 
-from .baselines import FROZEN
+from .baselines import FROZEN, SCHEDULE_SUFFIXES
 
 
 def exit_code(name: str, work: Callable[[], int | None]) -> int:
@@ -34,6 +34,6 @@ def policy_label(name: str) -> str:
     if kind == FROZEN and other:
         return f"{FROZEN}-{policy_label(other)}"
     path = Path(name)
-    if path.suffix not in (".safetensors", ".onnx"):
+    if path.suffix not in (".safetensors", ".onnx", *SCHEDULE_SUFFIXES):
         return path.resolve().name.replace(":", "-").replace(",", "-")
     return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem

@@ -49,10 +49,9 @@ def save_animation(path: Path, recording: Recording) -> None:
 
 def _clip(recording: Recording, body: Body) -> tuple[int, int, int]:
     """Episode, first and last tick of what is shown."""
-    standing = np.flatnonzero(recording.fall_reason == "")
-    episode = int(standing[0]) if len(standing) else int(np.argmax(recording.ticks))
+    episode = recording.example
     ticks = int(recording.ticks[episode])
-    if len(standing):
+    if not recording.fall_reason[episode]:
         vertical = recording.series["force"][episode, :ticks, LEFT, :, 1].sum(axis=1)
         contacts = find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY)
         strikes = np.round(contacts.heel_strikes / TICK).astype(int)

@@ -27,7 +27,8 @@ class EvaluateFlags:
     """A .safetensors or .onnx file, a run folder (its best policy), module:function (your own code, of observations
     (N, D) or (D,); it is imported and run), or one of: pretrained, untrained, random,
     constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule;
-    schedule:FACTOR for a multiple), quasi_stiffness, thesis, thesis_printed. frozen:POLICY is a trained policy's mean
+    schedule:FACTOR for a multiple), quasi_stiffness, thesis, thesis_printed. A .csv or .json file is a stiffness
+    schedule or a table of finite states, as an evaluation writes them. frozen:POLICY is a trained policy's mean
     stiffness over the stride, played open loop at the same equilibrium."""
     episodes: int = 20
     """How many episodes."""
@@ -91,4 +92,7 @@ def run_evaluation(flags: EvaluateFlags, program: str) -> None:
     report.print_table(gait.metrics)
     if has_feedback(flags.policy):
         print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{flags.policy}, with the same flags")
-    print(f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif)")
+    print(
+        f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif;\n"
+        "stiffness_schedule.csv, finite_states.json, walk.mot, walk.sto, model.xml)"
+    )

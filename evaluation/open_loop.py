@@ -4,6 +4,7 @@ A policy decides K of ankle and toe from all that it observes. Its mean K over t
 open loop at the same equilibrium; what K does besides, at equal phase, is feedback.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -37,11 +38,14 @@ SAME_K = 1e-9
 """Variance of log K below which K is constant and has no share of anything."""
 
 
-def decided(recording: Recording) -> tuple[NDArray, NDArray]:
-    """Phase (n,) of a leg at each decision and K (n, 2) [N m/rad] of ankle and toe from then on; both legs together.
+def decided(
+    recording: Recording, sides: Sequence[int] | None = None, series: str = "stiffness"
+) -> tuple[NDArray, NDArray]:
+    """Phase (n,) of a leg at each decision and K (n, 2) [N m/rad] of ankle and toe from then on.
 
-    Of the steady walk, the first `WARM_UP` seconds left out. A leg whose foot is a device decides nothing and is left
-    out, unless both are; so are times at which muscles are slack.
+    Of the steady walk, the first `WARM_UP` seconds left out; of all `sides` together. Where none are named, a leg whose
+    foot is a device decides nothing and is left out, unless both are. Times at which muscles are slack are left out.
+    `series` names another pair in place of K.
     """
     begin, end = steady_walk(recording.settings)
     step = round(recording.settings.step_seconds / TICK)
@@ -49,10 +53,13 @@ def decided(recording: Recording) -> tuple[NDArray, NDArray]:
     at = at[(at * TICK >= begin + WARM_UP) & (at * TICK < end)]
     feet = feet_of(recording.settings.left_foot, recording.settings.right_foot)
     own = [side for side, foot in enumerate(feet) if not any(joint.device for joint in foot.joints)] or [0, 1]
-    phase = recording.series["phase"][:, at][..., own].ravel().astype(float)  # at the tick's beginning: K was decided
-    stiffness = recording.series["stiffness"][:, at][:, :, own].reshape(-1, len(SPRINGS)).astype(float)
-    walked = np.isfinite(phase) & np.isfinite(stiffness).all(-1) & (stiffness > 0.0).all(-1)
-    return phase[walked] % 1.0, stiffness[walked]
+    where = np.ix_(range(len(recording.ticks)), at, own if sides is None else sides)
+    phase = recording.series["phase"][where].ravel().astype(float)  # at the tick's beginning, when K was decided
+    values, stiffness = (
+        recording.series[name][where].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
+    )
+    walked = np.isfinite(phase) & np.isfinite(values).all(-1) & (stiffness > 0.0).all(-1)
+    return phase[walked] % 1.0, values[walked]
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:

@@ -8,9 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from springfoot.agents.baselines import BASELINES, FROZEN, PolicyFunction, baseline, has_feedback, own_settings
+from springfoot.agents.baselines import (
+    BASELINES,
+    FROZEN,
+    PolicyFunction,
+    baseline,
+    has_feedback,
+    is_schedule_file,
+    own_settings,
+)
 from springfoot.agents.foreign_policy import is_function
 from springfoot.agents.policy import load_policy
+from springfoot.agents.schedule_files import schedule_file
 from springfoot.envs.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
 
@@ -40,6 +49,10 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -
         conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
         settings = settings_from(**(own_settings(name, conditions) | wanted))
         return baseline(name, settings, seed), settings
+    if is_schedule_file(name):
+        own, make = schedule_file(name, settings_from(**{key: wanted[key] for key in CONDITIONS}))
+        settings = settings_from(**(own | wanted))
+        return make(settings), settings
     if name != "pretrained" and not Path(name).exists() and not is_function(name):
         known = ", ".join(["pretrained", *BASELINES])
         raise SpringfootError(

@@ -87,6 +87,17 @@ class Recording:
     series: dict[str, NDArray]
     """Name -> (E, T, ...) float32, as listed in `SERIES`."""
 
+    @property
+    def example(self) -> int:
+        """The episode that pictures and exports show: the first without a fall, else the longest."""
+        standing = np.flatnonzero(self.fall_reason == "")
+        return int(standing[0]) if len(standing) else int(np.argmax(self.ticks))
+
+    def shown(self) -> dict[str, NDArray]:
+        """Name -> (T, ...) float64 series of the `example`, without the samples after its end."""
+        episode = self.example
+        return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
+
     def save(self, path: Path) -> None:
         """Write `strides.npz`: the series and, as JSON text, what they are of. No object arrays."""
         header = {

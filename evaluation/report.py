@@ -4,6 +4,8 @@ metrics.json                    every number
 gait_cycle.csv, _left, _right   mean curves over percent of stride, and their spread
 strides.npz                     the 100 Hz series all of it is computed from
 gait.png, walk.gif              pictures
+stiffness_schedule.csv, finite_states.json   K and theta_eq as tables, which are policies again
+walk.mot, walk.sto, model.xml   the walk for OpenSim, the body for MuJoCo
 """
 
 import json
@@ -23,9 +25,11 @@ from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
 
 from .animation import save_animation
+from .exports import write_model, write_opensim
 from .gait_figure import save_gait_figure
 from .metrics import Gait
 from .recording import Recording
+from .schedule_tables import write_schedules
 from .stride_curves import StrideCurves
 
 
@@ -39,6 +43,9 @@ def write_report(folder: Path, recording: Recording, gait: Gait) -> None:
     recording.save(folder / "strides.npz")
     save_gait_figure(folder / "gait.png", recording, gait)
     save_animation(folder / "walk.gif", recording)
+    write_schedules(folder, recording)
+    write_opensim(folder, recording)
+    write_model(folder / "model.xml", recording)
 
 
 def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) -> None:

@@ -178,7 +178,7 @@ def _add_steps(
             [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
         )
         tally.com.add(on_percent(relative, begin, end, TICK, first=TICK))
-        cop = _centre_of_pressure(series) - _mid_tick(series["ankle"][:, side, 0])
+        cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         # Step length: where the other foot lands at the step's end, less where this one landed at its start.
         at = np.floor(np.stack([begin, end]) / TICK).astype(int)
@@ -212,14 +212,14 @@ def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     return _sums(flow, begin, end)
 
 
-def _mid_tick(state: NDArray) -> NDArray:
+def mid_tick(state: NDArray) -> NDArray:
     """What is known at the ends of ticks (T, ...) at their middles."""
     return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
 
 
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
     """(T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
-    load, place = series["force"][..., 1], _mid_tick(series["contact"][..., 0])
+    load, place = series["force"][..., 1], mid_tick(series["contact"][..., 0])
     total = load.sum(axis=(1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
         return (load * place).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)

@@ -34,6 +34,11 @@ FILES = {
     "strides.npz",
     "gait.png",
     "walk.gif",
+    "stiffness_schedule.csv",
+    "finite_states.json",
+    "walk.mot",
+    "walk.sto",
+    "model.xml",
 }
 
 
@@ -271,6 +276,10 @@ def test_every_column_and_array_is_documented_and_nothing_else(folder):
     )
     with np.load(folder / "strides.npz") as file:
         assert sorted(documented("### `strides.npz`")) == sorted(file)
+    assert sorted(documented("### `stiffness_schedule.csv`")) == sorted(rows_of(folder / "stiffness_schedule.csv")[0])
+    states = json.loads((folder / "finite_states.json").read_text(encoding="utf-8"))
+    inside = {f"states[].{key}" for state in states["states"] for key in keys_of(state)}
+    assert sorted(documented("### `finite_states.json`")) == sorted({*states, *inside} - {"states"})
 
 
 def test_every_column_of_a_pair_is_documented_and_nothing_else():

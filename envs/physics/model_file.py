@@ -1,0 +1,73 @@
+"""A model as MJCF text whose every number has all its digits, so that what is loaded steps the same bits."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+
+from .simulation import MjModel
+
+ARRAY_OF: Mapping[str, Mapping[str, str]] = {
+    "body": {"pos": "body_pos", "quat": "body_quat"},
+    "inertial": {"pos": "body_ipos", "mass": "body_mass", "diaginertia": "body_inertia"},
+    "joint": {"armature": "dof_armature", "damping": "dof_damping", "axis": "jnt_axis"},
+    "geom": {"size": "geom_size", "pos": "geom_pos", "quat": "geom_quat"},
+    "pair": {
+        "friction": "pair_friction",
+        "solref": "pair_solref",
+        "solreffriction": "pair_solreffriction",
+        "solimp": "pair_solimp",
+    },
+    "general": {"gainprm": "actuator_gainprm"},
+    "key": {"qpos": "key_qpos"},
+}
+"""Element -> attribute -> array of the compiled model that holds its value."""
+LIMITS = {"range": "jnt_range", "actuatorfrcrange": "jnt_actfrcrange"}
+"""As `ARRAY_OF`, of joints that have limits; a limit that is written also acts."""
+
+
+def model_text(spec: mujoco.MjSpec) -> str:
+    """The MJCF text of a specification, in which MuJoCo itself would keep six digits of each number."""
+    model = spec.compile()
+    root = ElementTree.fromstring(spec.to_xml())
+    world = _found(root, "worldbody")
+    bodies = list(world.iter("body"))  # in the order of the compiled model, whose first body is the world
+    for index, body in enumerate(bodies, start=1):
+        _write(body, model, index)
+        inertial = body.find("inertial")
+        if inertial is not None:
+            _write(inertial, model, index)
+    for joint in world.iter("joint"):
+        index = model.joint(joint.get("name", "")).id
+        _write(joint, model, index, LIMITS if model.jnt_limited[index] else {})
+    for index, geom in enumerate(_in_order(world)):
+        _write(geom, model, index)
+    for index, pair in enumerate(_found(root, "contact").iter("pair")):
+        _write(pair, model, index)
+    for actuator in _found(root, "actuator"):
+        _write(actuator, model, model.actuator(actuator.get("name", "")).id)
+    for index, key in enumerate(root.iter("key")):
+        _write(key, model, index)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _in_order(body: ElementTree.Element) -> list[ElementTree.Element]:
+    """Geoms as the compiled model numbers them: a body's own before those of its children."""
+    return body.findall("geom") + [geom for child in body.findall("body") for geom in _in_order(child)]
+
+
+def _found(root: ElementTree.Element, tag: str) -> ElementTree.Element:
+    return next(root.iter(tag))
+
+
+def _write(element: ElementTree.Element, model: MjModel, index: int, more: Mapping[str, str] = {}) -> None:
+    """Give an element the attributes of `ARRAY_OF` and `more` in full, as element `index` of its kind has them."""
+    for attribute, array in {**ARRAY_OF[element.tag], **more}.items():
+        value: Any = getattr(model, array)[index]
+        element.set(attribute, " ".join(repr(float(number)) for number in _sequence(value)))
+
+
+def _sequence(value: Any) -> Sequence[float]:
+    return [value] if getattr(value, "ndim", 0) == 0 else list(value)
