@@ -8,13 +8,10 @@ or not at all.
 import dataclasses
 import json
 import os
-import platform
 import signal
-import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -35,6 +32,7 @@ from .policy import BEST, LAST, RUN, read_policy, read_tensors, save_policy
 from .ppo import Learner
 from .progress import Progress
 from .sb3_vec_env import SegmentedFootBipedVecEnv
+from .source import source
 
 STATE = "state.safetensors"
 EVALUATION_SEED = 2**30
@@ -135,7 +133,7 @@ class _Run(BaseCallback):
         ppo, status = self.learner.ppo, "failed"
         self._progress = Progress(self._config.timesteps, self._first)
         self._record |= {"config": config_to_json(self._config), "status": "running"}
-        self._record["sessions"].append({"from_timesteps": self._first, **_source()})
+        self._record["sessions"].append({"from_timesteps": self._first, **source(PACKAGES)})
         ppo.set_logger(configure(str(self._out), ["tensorboard"]))
         ppo.num_timesteps = self._first
         try:
@@ -241,21 +239,3 @@ class _Run(BaseCallback):
 def processors() -> int:
     """Processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _source() -> dict[str, Any]:
-    """Versions of what runs, and the git commit it comes from (None outside a clone of the project)."""
-
-    def git(*words: str) -> str | None:
-        command = ["git", "-C", str(Path(__file__).parent), *words]
-        try:
-            return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-        except (OSError, subprocess.CalledProcessError):
-            return None
-
-    ours = git("ls-files", "--error-unmatch", Path(__file__).name) is not None
-    return {
-        "commit": git("rev-parse", "HEAD") if ours else None,
-        "modified": bool(git("status", "--porcelain", "--untracked-files=no")) if ours else None,
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in PACKAGES},
-    }

@@ -38,7 +38,7 @@ SOFT, STIFF = np.array([255, 236, 179]), np.array([122, 18, 60])
 def save_animation(path: Path, recording: Recording) -> None:
     """Write the animation: two strides from a left heel strike, or the last seconds of a walk that only fell."""
     body = body_of(recording.settings)
-    episode, first, last = _clip(recording, body)
+    episode, first, last = clip_of(recording, body)
     series = {name: values[episode, first:last].astype(float) for name, values in recording.series.items()}
     canvas = _Canvas(body, series, recording)
     frames = [canvas.frame(tick) for tick in range(0, last - first, TICKS_PER_FRAME)]
@@ -47,7 +47,7 @@ def save_animation(path: Path, recording: Recording) -> None:
     indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=delay, loop=0, optimize=True)
 
 
-def _clip(recording: Recording, body: Body) -> tuple[int, int, int]:
+def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
     """Episode, first and last tick of what is shown."""
     episode = recording.example
     ticks = int(recording.ticks[episode])

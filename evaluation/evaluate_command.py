@@ -1,5 +1,7 @@
 """The command that evaluates a policy: `evaluate.py`, `springfoot evaluate`."""
 
+import shlex
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,15 +17,20 @@ from springfoot.agents.flags import SettingsFlags, given
 from springfoot.envs.physics.simulation import MOST_THREADS
 from springfoot.gait.errors import MOST_COUNT, SpringfootError, require_count
 
+LONGEST_NAME = 60
+"""Letters of the policies' names in the name of a folder; chosen."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluateFlags:
-    """How human is the walk? Runs a policy, prints its gait beside people's, writes numbers and pictures.
+    """How human is the walk? Runs a policy, prints its gait beside people's, writes numbers, pictures and a report.
+
+    Of several policies each gets a folder of its own, and one report shows them side by side.
 
     A fall is a result: the exit code is 0 with falls, 2 for bad input.
     """
 
-    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
+    policies: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="POLICY ...")]
     """A .safetensors or .onnx file, a run folder (its best policy), module:function (your own code, of observations
     (N, D) or (D,); it is imported and run), or one of: pretrained, untrained, random,
     constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning, or --schedule;
@@ -42,6 +49,8 @@ class EvaluateFlags:
     """New folder for the results."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
+    report: bool = True
+    """Write report.html, which opens in any browser, offline."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
     """What to walk in. Each group says which of its settings a trained policy brings; all others have the defaults
     shown unless a flag says otherwise, whatever the policy was trained on."""
@@ -52,16 +61,19 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
 
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
-    flags = tyro.cli(EvaluateFlags, args=arguments, prog=program)
-    return exit_code(program, lambda: run_evaluation(flags, program))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    flags = tyro.cli(EvaluateFlags, args=words, prog=program)
+    return exit_code(program, lambda: run_evaluation(flags, program, shlex.join([*program.split(), *words])))
 
 
-def run_evaluation(flags: EvaluateFlags, program: str) -> None:
-    """Evaluate, write the results, then print the table and where the results are."""
+def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> None:
+    """Evaluate, write the results, then print the tables and where the results are; `command` is told in the report."""
     for name, least, most in (("episodes", 1, MOST_COUNT), ("seed", 0, MOST_COUNT), ("threads", 1, MOST_THREADS)):
         require_count(name, getattr(flags, name), least, most)
-    label = policy_label(flags.policy)
-    out = flags.out or next_free(Path("runs"), f"eval-{label}")
+    if not flags.policies:
+        raise SpringfootError("give a policy, say pretrained; --help lists them")
+    labels = _labels(flags.policies)
+    out = flags.out or next_free(Path("runs"), f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
     if out.exists():
         raise SpringfootError(f"{out} exists already; give --out a new folder")
     from . import (
@@ -69,30 +81,53 @@ def run_evaluation(flags: EvaluateFlags, program: str) -> None:
         policies,
         recording,
         report,
+        report_page,
     )  # not above: Matplotlib takes a while, and bad flags need not wait for it
 
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
-    policy, environment = policies.prepare(flags.policy, settings, flags.seed, flags.threads)
-    recording.require_recordable(environment, flags.episodes)
+    prepared = [policies.prepare(name, settings, flags.seed, flags.threads) for name in flags.policies]
+    for _, environment in prepared:
+        recording.require_recordable(environment, flags.episodes)
 
     with whole_folder(out) as folder:
-        total = flags.episodes * environment.episode_seconds
-        with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
-            episodes = recording.record(
-                policy,
-                environment,
-                name=label,
-                episodes=flags.episodes,
-                seed=flags.seed,
-                threads=flags.threads,
-                progress=bar.update,
-            )
-        gait = metrics.measure(episodes)
-        report.write_report(folder, episodes, gait)
-    report.print_table(gait.metrics)
-    if has_feedback(flags.policy):
-        print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{flags.policy}, with the same flags")
+        walks = []
+        for label, (policy, environment) in zip(labels, prepared, strict=True):
+            total = flags.episodes * environment.episode_seconds
+            with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
+                episodes = recording.record(
+                    policy,
+                    environment,
+                    name=label,
+                    episodes=flags.episodes,
+                    seed=flags.seed,
+                    threads=flags.threads,
+                    progress=bar.update,
+                )
+            gait = metrics.measure(episodes)
+            own = folder if len(labels) == 1 else folder / label
+            own.mkdir(exist_ok=True)
+            report.write_report(own, episodes, gait)
+            walks.append((episodes, gait))
+        if flags.report:
+            report_page.write_page(folder / "report.html", walks, command)
+    for _, gait in walks:
+        report.print_table(gait.metrics)
+    for name in flags.policies:
+        if has_feedback(name):
+            print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{name}, with the same flags")
+    page = "report.html; " if flags.report else ""
     print(
-        f"\nResults: {out} (metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif;\n"
+        f"\nResults: {out} ({page}metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif;\n"
         "stiffness_schedule.csv, finite_states.json, walk.mot, walk.sto, model.xml)"
     )
+
+
+def _labels(names: Sequence[str]) -> list[str]:
+    """What results call the policies, no two the same."""
+    labels: list[str] = []
+    for label in map(policy_label, names):
+        number, free = 2, label
+        while free in labels:
+            number, free = number + 1, f"{label}-{number}"
+        labels.append(free)
+    return labels

@@ -130,6 +130,11 @@ def _leg_table(metrics: dict[str, Any]) -> Table:
     return table
 
 
+def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
+    """The rows of the table."""
+    return [row for section in _sections(metrics) for row in section]
+
+
 TableRow = tuple[str, str, str, str, str, str]
 """What, unit, model, people, r, share inside people's mean ± SD."""
 

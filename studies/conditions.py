@@ -110,7 +110,8 @@ class Conditions(WalkingStudy):
         counts = {"episodes": self.episodes, "seconds": self.seconds, "seed": self.seed, "threads": self.threads}
         ours = [str(word) for name, count in counts.items() for word in (f"--{name}", count)]
         flags = tyro.cli(EvaluateFlags, args=[*ours, *words])
+        (name,) = flags.policies
         conditions = {"episode_seconds": flags.seconds} | given(flags.environment)
-        policy, settings = prepare(flags.policy, conditions, flags.seed, flags.threads)
+        policy, settings = prepare(name, conditions, flags.seed, flags.threads)
         how: dict[str, Any] = {"episodes": flags.episodes, "seed": flags.seed, "threads": flags.threads}
-        return measure(record(policy, settings, name=flags.policy, progress=progress, **how)).metrics
+        return measure(record(policy, settings, name=name, progress=progress, **how)).metrics

@@ -190,7 +190,7 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
     assert code == 0
     assert str(Path("runs", "eval-random-2")) in out
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"eval-random-1", "eval-random-2"}
-    assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} == FILES
+    assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} == {*FILES, "report.html"}
 
 
 def test_a_gait_that_was_measured_here_can_be_walked_after(command, folder, tmp_path):

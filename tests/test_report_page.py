@@ -1,0 +1,210 @@
+"""report.html: what it says, what it draws, and what it does in a real browser."""
+
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springfoot.envs.settings import reference_gait
+from springfoot.evaluation.evaluate_command import evaluate_main
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import record
+from springfoot.evaluation.report_page import spoken_verdict, write_page
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def walked(name, label=None, **given):
+    policy, settings = prepare(name, {"episode_seconds": 8.0} | given)
+    recording = record(policy, settings, name=label or name, episodes=2)
+    return recording, measure(recording)
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return walked("schedule")
+
+
+@pytest.fixture(scope="module")
+def page(walk, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_page(path, [walk, walked("constant")], "evaluate.py schedule constant")
+    return path
+
+
+class Reader(HTMLParser):
+    """What of a page is loaded from elsewhere, its visible text and its data."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.loads: list[str | None] = []
+        self.said: list[str] = []
+        self.data: dict[str, Any] = {}
+        self._within: list[tuple[str, dict]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.loads += [value for name, value in given.items() if name in ("src", "href", "srcset", "action")]
+        if tag not in ("meta", "link", "input", "br"):
+            self._within.append((tag, given))
+
+    def handle_endtag(self, tag):
+        while self._within and self._within.pop()[0] != tag:
+            pass
+
+    def handle_data(self, data):
+        tag, given = self._within[-1] if self._within else ("", {})
+        if given.get("id") == "data":
+            self.data = json.loads(data)
+        elif tag not in ("style", "script"):
+            self.said.append(data)
+
+
+def test_a_page_is_one_small_file_that_loads_nothing(page):
+    text = page.read_text(encoding="utf-8")
+    assert Reader(text).loads == ["data:,"]
+    assert "default-src 'none'" in text and not re.search(r"url\(|@import|fetch\(|XMLHttp", text)
+    assert page.stat().st_size < 1_000_000
+
+
+def test_its_numbers_are_those_of_metrics_and_of_the_table(page, walk):
+    data = Reader(page.read_text(encoding="utf-8")).data
+    assert data["policies"][0]["metrics"] == json.loads(json.dumps(walk[1].metrics))
+    rows = {row[0]: row for row in data["tables"][0]}
+    assert rows["knee angle, RMSE"][2] == f"{walk[1].metrics['joints']['knee']['rmse_deg']:.1f}"
+    assert rows["falls"][2] == "0 of 2"
+    assert "evaluate.py schedule constant" in data["made"] and "mujoco" in data["made"]
+
+
+def test_its_curves_are_the_walks_and_peoples(page, walk):
+    recording, gait = walk
+    panels = {panel["title"]: panel for panel in Reader(page.read_text(encoding="utf-8")).data["policies"][0]["panels"]}
+    knee, human = panels["Knee angle"], reference_gait(recording.settings)
+    assert knee["mean"] == pytest.approx(gait.both.mean("knee_flexion_deg"), rel=1e-3, abs=1e-3)
+    assert knee["sd"] == pytest.approx(gait.both.sd("knee_flexion_deg"), rel=1e-3)
+    phase = np.linspace(0, 1, 101)
+    assert knee["people"] == pytest.approx(np.degrees(human.mean("knee", phase)), rel=1e-3, abs=1e-3)
+    assert knee["people_sd"] == pytest.approx(np.degrees(human.sd("knee", phase)), rel=1e-3)
+    assert panels["CoM height"]["plan"] == pytest.approx(recording.plan_com[:, 1], rel=1e-3)
+    assert "people" not in panels["Toe moment"]  # of which nobody knows
+    assert all(panel["unit"] for panel in panels.values())
+    held = {panel["title"]: panel for panel in Reader(page.read_text(encoding="utf-8")).data["policies"][1]["panels"]}
+    assert held["Left toe, stiffness K"]["mean"] == pytest.approx([40.0] * 101, rel=1e-3)
+
+
+def test_its_figure_is_two_strides_from_a_left_heel_strike(page, walk):
+    figure = Reader(page.read_text(encoding="utf-8")).data["policies"][0]["figure"]
+    stride = 120 / walk[1].metrics["cadence_steps_min"]
+    assert len(figure["base"]) * figure["seconds_a_frame"] == pytest.approx(2 * stride, rel=0.03)
+    percent = np.array([frame[0] for frame in figure["percent"]], float)
+    assert percent[0] == pytest.approx(0.0, abs=1.5) and (np.diff(percent) < 0).sum() == 1
+    force = np.array(figure["force"], float)  # (side, frame, (place, forward, up)), body weights
+    assert force[..., 2].sum(axis=0).mean() == pytest.approx(1.0, abs=0.02)
+    loaded = np.abs(force[0, :, 2] - 1.0) < 0.3
+    assert np.abs(force[0, loaded, 0] - np.array(figure["base"])[loaded, 0]).max() < 0.6  # below the body
+    assert np.abs(np.array(figure["zmp"]) - np.array(figure["com"])[:, 0]).max() < 0.5
+
+
+def test_the_verdict_is_told_in_words(walk):
+    said = spoken_verdict(walk[1].metrics)
+    assert list(said) == ["Falls", "Speed", "Joints", "Forces", "Energy"]
+    assert said["Falls"].startswith("Never fell in 2 episodes") and "asked for 1.20" in said["Speed"]
+    assert re.search(r"Misses \d of 14 criteria|Meets all 14 criteria", said["Joints"])
+    faster = walked("schedule", speed=1.4)[1].metrics
+    assert "No verdict: the criteria are for 1.2 m/s" in spoken_verdict(faster)["Joints"]
+
+
+def test_a_walk_that_only_falls_has_a_page_too(tmp_path):
+    recording, gait = walked("thesis_printed")
+    write_page(tmp_path / "report.html", [(recording, gait)])
+    reader = Reader((tmp_path / "report.html").read_text(encoding="utf-8"))
+    said = " ".join(reader.said)
+    assert "Fell in 2 of 2 episodes" in said and "nothing of the gait could be measured" in said
+    own = reader.data["policies"][0]
+    assert own["panels"][0]["mean"] == [None] * 101 and len(own["figure"]["base"]) > 50
+
+
+def test_a_name_is_text_and_nothing_else(tmp_path):
+    write_page(tmp_path / "report.html", [walked("schedule", label='</script><img src=x onerror="alert(1)">')])
+    reader = Reader((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert reader.loads == ["data:,"]
+    assert reader.data["policies"][0]["name"].startswith("</script><img") and "</script><img" in " ".join(reader.said)
+
+
+def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["schedule", "constant", "schedule", "--episodes", "1", "--seconds", "5"]
+    assert evaluate_main(words) == 0
+    out = tmp_path / "runs" / "eval-schedule-constant-schedule-2-1"
+    assert {path.name for path in out.iterdir()} == {"schedule", "constant", "schedule-2", "report.html"}
+    reader = Reader((out / "report.html").read_text(encoding="utf-8"))
+    for policy in reader.data["policies"]:
+        metrics = json.loads((out / policy["name"] / "metrics.json").read_text(encoding="utf-8"))
+        assert policy["metrics"] == metrics
+    assert reader.data["made"].startswith(f"command: evaluate.py {' '.join(words)}")
+    assert capsys.readouterr().out.count("falls") == 3
+
+
+def test_the_page_can_be_left_out_and_a_policy_cannot(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert evaluate_main(["random", "--episodes", "1", "--seconds", "1", "--no-report", "--out", "bare"]) == 0
+    assert "metrics.json" in {path.name for path in (tmp_path / "bare").iterdir()}
+    assert not (tmp_path / "bare" / "report.html").exists() and "report.html" not in capsys.readouterr().out
+    assert evaluate_main([]) == 2
+    assert capsys.readouterr().err == "evaluate.py: error: give a policy, say pretrained; --help lists them\n"
+    assert evaluate_main(["schedule", "nonsense"]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["bare"]
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A browser; how to get one is the reason of the skip."""
+    how = "needs a browser: pip install playwright, and Debian's chromium (apt install chromium)"
+    driver = pytest.importorskip("playwright.sync_api", reason=how)
+    binary = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if binary is None:
+        pytest.skip(how)
+    with driver.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=binary, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scrubber(chromium, page, width):
+    tab = chromium.new_page(viewport={"width": width, "height": 900})
+    told, asked = [], []
+    tab.on("console", lambda message: told.append(message.text))
+    tab.on("pageerror", lambda error: told.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(page.as_uri())
+    assert tab.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    cursors, walkers = tab.locator(".cursor"), tab.locator("svg[data-frame]")
+    assert walkers.count() == 2 and cursors.count() > 20
+
+    def at():
+        return [each.get_attribute("data-frame") for each in walkers.all()], cursors.first.get_attribute("data-percent")
+
+    (begin, _), first = at()
+    tab.keyboard.press("ArrowRight")
+    (after, _), second = at()
+    assert (begin, after) == ("0", "1") and float(second) > float(first)
+    tab.locator("#scrub").evaluate("each => { each.value = 250; each.dispatchEvent(new Event('input')) }")
+    frames, percent = at()
+    assert float(percent) == pytest.approx(50.0, abs=1.5) and int(frames[0]) > 40
+    dot = tab.locator("svg[aria-label^='Knee angle'] .dot").first
+    line = tab.locator("svg[aria-label^='Knee angle'] .cursor").first
+    assert float(dot.get_attribute("cx")) == pytest.approx(float(line.get_attribute("x1")), abs=2.0)
+    tab.keyboard.press(" ")
+    assert tab.locator("#play").inner_text() == "Pause"
+    while at()[0] == frames:  # it plays, so that this ends
+        tab.wait_for_timeout(50)
+    tab.keyboard.press("End")
+    tab.close()
+    assert told == [] and asked == [page.as_uri()]
