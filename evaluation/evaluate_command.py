@@ -1,5 +1,6 @@
 """The command that evaluates a policy: `evaluate.py`, `springfoot evaluate`."""
 
+import json
 import shlex
 import sys
 from collections.abc import Sequence
@@ -51,6 +52,8 @@ class EvaluateFlags:
     """Threads of the physics; the results are the same with any number."""
     report: bool = True
     """Write report.html, which opens in any browser, offline."""
+    json: bool = False
+    """Print, in place of the tables, one JSON object: `folder`, and as `metrics` what stands in each metrics.json."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
     """What to walk in. Each group says which of its settings a trained policy brings; all others have the defaults
     shown unless a flag says otherwise, whatever the policy was trained on."""
@@ -103,13 +106,17 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                     threads=flags.threads,
                     progress=bar.update,
                 )
-            gait = metrics.measure(episodes)
-            own = folder if len(labels) == 1 else folder / label
-            own.mkdir(exist_ok=True)
-            report.write_report(own, episodes, gait)
+                bar.set_description(f"{label}, writing")
+                gait = metrics.measure(episodes)
+                own = folder if len(labels) == 1 else folder / label
+                own.mkdir(exist_ok=True)
+                report.write_report(own, episodes, gait)
             walks.append((episodes, gait))
         if flags.report:
             report_page.write_page(folder / "report.html", walks, command)
+    if flags.json:
+        print(json.dumps({"folder": str(out), "metrics": [gait.metrics for _, gait in walks]}, ensure_ascii=False))
+        return
     for _, gait in walks:
         report.print_table(gait.metrics)
     for name in flags.policies:

@@ -84,13 +84,18 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         console.print("feet: " + ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items()))
     who = "people" if environment["human"] is None else "own"
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    for name in ("", "", "model", who, "r", "in ±SD"):
+    narrow = console.width < NARROW
+    for name in ("", "model", who, "r", "in ±SD") if narrow else ("", "", "model", who, "r", "in ±SD"):
         table.add_column(
-            name, justify="right" if name else "left", style="bold" if name == "model" else "", no_wrap=True
+            name,
+            justify="right" if name else "left",
+            style="bold" if name == "model" else "",
+            no_wrap=bool(name) or not narrow,
         )
     for section in _sections(metrics):
-        for row in section:
-            table.add_row(*row)
+        for label, unit, *values in section:
+            named = [f"{label}, {unit}" if unit else label] if narrow else [label, unit]
+            table.add_row(*named, *values)
         table.add_section()
     console.print(table)
     if metrics["per_leg"] is not None:
@@ -135,6 +140,8 @@ def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
     return [row for section in _sections(metrics) for row in section]
 
 
+NARROW = 76
+"""Columns of a terminal below which the unit goes into the label, which may take two lines; numbers never do."""
 TableRow = tuple[str, str, str, str, str, str]
 """What, unit, model, people, r, share inside people's mean ± SD."""
 

@@ -121,6 +121,15 @@ def test_the_table_is_plain_text_within_80_columns(recording):
         assert words in text
 
 
+def test_a_narrow_terminal_cuts_no_number_of_the_table(recording):
+    metrics = measure(recording).metrics
+    wide, narrow = (printed(metrics, width=width) for width in (100, 60))
+    tables = [text.split("toe feedback")[0].split("─")[-1] for text in (wide, narrow)]
+    cells = [sorted(re.findall(r"[-+]?\d[\d./]*", table)) for table in tables]
+    assert len(cells[0]) > 60 and cells[0] == cells[1]
+    assert max(map(len, tables[1].splitlines())) <= 60 and "…" not in narrow
+
+
 def test_people_beside_the_model_are_those_of_the_reference():
     people = people_metrics(human_gait(1.2, 1.70))
     assert people["step_length_m"] == pytest.approx(0.655, abs=0.005)

@@ -162,6 +162,14 @@ def test_the_page_can_be_left_out_and_a_policy_cannot(tmp_path, monkeypatch, cap
     assert [path.name for path in tmp_path.iterdir()] == ["bare"]
 
 
+def test_machines_get_one_json_object(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert evaluate_main(["random", "constant", "--episodes", "1", "--seconds", "1", "--json", "--out", "two"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    stand = [(tmp_path / "two" / name / "metrics.json").read_text(encoding="utf-8") for name in ("random", "constant")]
+    assert told == {"folder": "two", "metrics": [json.loads(text) for text in stand]}
+
+
 @pytest.fixture(scope="module")
 def chromium():
     """A browser; how to get one is the reason of the skip."""
