@@ -71,7 +71,8 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
     falls, episodes = metrics["falls"], metrics["episodes"]
     reasons = ", ".join(f"{count} × {reason}" for reason, count in metrics["fall_reasons"].items())
-    fell = f"Fell in {falls} of {episodes} episodes: {reasons}." if falls else f"Never fell in {episodes} episodes."
+    counted = f"{episodes} episode{'s' * (episodes != 1)}"
+    fell = f"Fell in {falls} of {counted}: {reasons}." if falls else f"Never fell in {counted}."
     joints, grf, work = metrics["joints"], metrics["grf"], metrics["joint_work_J_kg"]["ankle"]
     said = {"Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s."}
     if metrics["strides"]["count"] == 0:
