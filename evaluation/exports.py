@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from springfoot.envs.feet import feet_of
 from springfoot.envs.physics.foot_contact import ground_name
 from springfoot.envs.physics.model import JOINTS, SIDES, build_spec
 from springfoot.envs.physics.model_file import model_text
@@ -74,7 +75,7 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
 def write_model(path: Path, recording: Recording) -> None:
     """Write the body as MJCF: its key `walk` is the first posture recorded, its ground has the walk's slope."""
     settings = recording.settings
-    spec = build_spec(body_of(settings), settings.friction)
+    spec = build_spec(body_of(settings), settings.friction, feet_of(settings.left_foot, settings.right_foot))
     series, half = recording.shown(), radians(settings.slope_deg) / 2
     for side in SIDES:
         spec.body(ground_name(side)).quat = (cos(half), 0.0, -sin(half), 0.0)

@@ -19,7 +19,8 @@ from springfoot.gait.stiffness import SPRINGS, thesis_schedule
 
 from .animation import clip_of
 from .exports import opensim_forces
-from .metrics import JOINT_CURVES, MOMENT_CURVES, Gait
+from .metrics import MOMENT_CURVES, Gait
+from .per_leg import ANGLE_COLUMNS, kinds_of
 from .recording import TICK, Recording
 from .schedule_tables import schedule_curves
 from .stride_curves import StrideCurves
@@ -82,7 +83,7 @@ def _angles(curves: StrideCurves, human: HumanGait) -> list[dict[str, Any]]:
             _of(curves, column),
             **_people(human, joint, degrees=True),
         )
-        for joint, column in JOINT_CURVES.items()
+        for joint, column in ANGLE_COLUMNS.items()
     ]
 
 
@@ -182,7 +183,7 @@ def _figure(recording: Recording) -> dict[str, Any]:
         "strides": bool(np.isfinite(percent[0]).any()),
         "slope": slope,
         "height": body.height,
-        "feet": [str(getattr(settings, f"{side}_foot", "segmented")) for side in SIDES],
+        "feet": list(kinds_of(settings).values()),
         "lengths": {
             "trunk": body.trunk_length,
             "thigh": body.thigh_length,

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from springfoot.envs.feet import feet_of
 from springfoot.envs.physics.model import JOINTS, SIDES, build_model, build_spec
 from springfoot.envs.physics.model_file import model_text
 from springfoot.envs.physics.simulation import Simulation
@@ -106,9 +107,11 @@ BODIES = [
 ]
 
 
+@pytest.mark.parametrize("feet", [("intact", "intact"), ("no_toe", "rigid")])
 @pytest.mark.parametrize("body", BODIES)
-def test_a_model_file_has_every_number_that_moves_the_body_to_the_last_bit(body):
-    ours, loaded = build_model(body, 0.87), mujoco.MjModel.from_xml_string(model_text(build_spec(body, 0.87)))
+def test_a_model_file_has_every_number_that_moves_the_body_to_the_last_bit(body, feet):
+    how = body, 0.87, feet_of(*feet)
+    ours, loaded = build_model(*how), mujoco.MjModel.from_xml_string(model_text(build_spec(*how)))
     seen = [name for name in dir(ours) if isinstance(getattr(ours, name, None), np.ndarray)]
     off = [name for name in seen if not np.array_equal(getattr(ours, name), getattr(loaded, name))]
     assert len(seen) > 300 and all(name.startswith(("cam_", "light_")) for name in off), off
