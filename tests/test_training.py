@@ -87,7 +87,7 @@ def test_configuration_survives_json(config):
     [
         ({"timesteps": 0}, "timesteps must be a whole number >= 1, got 0"),
         ({"num_envs": 2.5}, "num_envs must be a whole number"),
-        ({"learning_rate": float("nan")}, "learning_rate must be a finite number > 0, got nan"),
+        ({"learning_rate": float("nan")}, "learning_rate must be a finite number > 0 and <= 1000, got nan"),
         ({"gamma": 1.5}, "gamma must be a finite number > 0 and <= 1"),
         ({"num_envs": 2048}, "update_steps must be a whole number >= 2048, got 1024"),
         ({"hidden": ()}, "hidden must be"),
