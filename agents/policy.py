@@ -1,31 +1,32 @@
 """A policy as one .safetensors file: weights, observation statistics, settings, a fingerprint; no code.
 
-The file's header has one entry, `springfoot`, whose JSON says what the tensors mean; nothing in it tells
-where or when it was made. `Policy` needs NumPy only, so a policy runs where no learner is installed.
+The file's header has one entry, `springfoot`, whose JSON says what the tensors mean and holds a digest
+(`tensor_file`); nothing in it tells where or when it was made. `Policy` needs NumPy only, so a policy runs where no
+learner is installed.
 """
 
-import json
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
+from math import inf
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save as to_safetensors
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
 
-from .files import write_atomically
 from .fingerprint import fingerprint, require_same
 from .foreign_policy import ForeignPolicy, function_policy, is_function, observation_rows, onnx_policy
 from .numpy_player import ACTIVATIONS
+from .tensor_file import read_tensors, write_tensors
 
 FORMAT_VERSION = 1
 """Version of the file layout; a reader refuses any other."""
+ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
+"""What the header of a policy says."""
 
 
 VARIANCE_FLOOR = 1e-8
@@ -119,9 +120,7 @@ def save_policy(path: str | Path, policy: Policy) -> None:
     }
     for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
         tensors |= {f"layer.{layer}.weight": weight, f"layer.{layer}.bias": bias}
-    packed = {name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}
-    header = {"springfoot": json.dumps(policy.header, sort_keys=True, allow_nan=False)}
-    write_atomically(Path(path), to_safetensors(packed, header))
+    write_tensors(Path(path), "springfoot", policy.header, tensors)
 
 
 def find_policy(name: str | Path) -> Path:
@@ -165,7 +164,7 @@ def read_policy(name: str | Path) -> Policy:
     this version has.
     """
     path = find_policy(name)
-    header, tensors = read_tensors(path, "springfoot", "policy")
+    header, tensors = read_tensors(path, "springfoot", "policy", ENTRIES)
     if header.get("format_version") != FORMAT_VERSION:
         raise SpringfootError(
             f"{name} has policy format {header.get('format_version')!r}, this version reads {FORMAT_VERSION}"
@@ -181,7 +180,7 @@ def read_policy(name: str | Path) -> Policy:
         what = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {what}") from None
     known = activation in ACTIVATIONS and output in get_args(Output)
-    if not known or floor is None or not floor >= 0 or not (clip is None or clip > 0):
+    if not known or floor is None or not 0 <= floor < inf or not (clip is None or 0 < clip < inf):
         raise SpringfootError(f"{name}: its header asks for a network this version does not have: {network}")
     if len(sizes) < 2 or (sizes[0], sizes[-1]) != (len(biped.observation_names), len(biped.action_names)):
         raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to action")
@@ -201,27 +200,6 @@ def read_policy(name: str | Path) -> Policy:
         activation=activation,
         output=output,
     )
-
-
-def read_tensors(path: Path, key: str, what: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """The JSON under `key` of a .safetensors header, and the tensors, all finite; else `SpringfootError`."""
-    try:
-        with safe_open(path, framework="numpy") as file:
-            text = (file.metadata() or {}).get(key)
-            if text is None:
-                raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {what}")
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        header = json.loads(text)
-    except (SafetensorError, OSError, TypeError, AttributeError) as error:
-        raise SpringfootError(f"{path} is not a .safetensors file: {error}") from None
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise SpringfootError(f"{path}: the springfoot entry of its header is not JSON: {error}") from None
-    if not isinstance(header, dict):
-        raise SpringfootError(f"{path}: the springfoot entry of its header is not a JSON object")
-    for tensor_name, tensor in tensors.items():
-        if tensor.dtype not in (np.float32, np.float64) or not np.isfinite(tensor).all():
-            raise SpringfootError(f"{path}: {tensor_name} must be finite float32 or float64 numbers")
-    return header, tensors
 
 
 def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list[int]) -> None:

@@ -17,24 +17,25 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from safetensors.numpy import save as to_safetensors
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import settings_to_json
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_number
 
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
 from .fingerprint import fingerprint
-from .policy import BEST, LAST, RUN, read_policy, read_tensors, save_policy
+from .policy import BEST, LAST, RUN, read_policy, save_policy
 from .ppo import Learner
 from .progress import Progress
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 from .source import source
+from .tensor_file import read_tensors, write_tensors
 
-STATE = "state.safetensors"
+STATE, STATE_KEY = "state.safetensors", "springfoot-training"
+"""Name of a run folder's training state, and of its header's entry."""
 EVALUATION_SEED = 2**30
 """Seed of the first episode of every periodic evaluation, the next ones following."""
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
@@ -71,11 +72,17 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     try:
         record = json.loads((out / RUN).read_text(encoding="utf-8"))
         config = config_from_json(record["config"])
-        if not isinstance(record["sessions"], list) or not isinstance(record["evaluations"], list):
-            raise ValueError("sessions and evaluations must be lists")
+        for name in ("sessions", "evaluations"):
+            if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
+                raise ValueError(f"{name} must be a list of objects")
+        if not isinstance(record["config"], dict):
+            raise ValueError("config must be an object")
+        require_number("seconds", record.get("seconds", 0.0), 0.0, unit="s")
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
-    header, arrays = read_tensors(out / STATE, "springfoot-training", "training state")
+    header, arrays = read_tensors(out / STATE, STATE_KEY, "training state", {"timesteps"})
+    if any(name.endswith(".var") and (values < 0).any() for name, values in arrays.items()):
+        raise SpringfootError(f"{out / STATE} is damaged: a variance is negative")
     done = header.get("timesteps")
     if type(done) is not int or done < 0:
         raise SpringfootError(f"{out / STATE} does not say how many timesteps it has done")
@@ -231,8 +238,7 @@ class _Run(BaseCallback):
         self._record |= {"timesteps": self._trained, "seconds": round(self._seconds(), 1), "best": best}
         if policies:
             save_policy(self._out / LAST, self.learner.policy(self._fingerprint))
-            header = {"springfoot-training": json.dumps({"timesteps": self._trained})}
-            write_atomically(self._out / STATE, to_safetensors(self.learner.state(), header))
+            write_tensors(self._out / STATE, STATE_KEY, {"timesteps": self._trained}, self.learner.state())
         write_atomically(self._out / RUN, (json.dumps(self._record, indent=2) + "\n").encode())
 
 
