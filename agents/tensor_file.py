@@ -28,7 +28,7 @@ MOST_BYTES = 2**30
 def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping[str, np.ndarray]) -> None:
     """Write tensors and, under `key`, a JSON header, whole or not at all; equal contents give equal bytes."""
     json.dumps(header, allow_nan=False)  # raises for what is no JSON
-    packed = {name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}
+    packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
     text = _text(header | {DIGEST: _digest(header, packed)})  # one entry: safetensors has no order of several
     write_atomically(path, to_safetensors(packed, {key: text}))
 
@@ -76,5 +76,5 @@ def _digest(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str
     found = sha256(_text(header).encode())
     for name in sorted(tensors):
         found.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())
-        found.update(np.ascontiguousarray(tensors[name]).tobytes())
+        found.update(tensors[name].tobytes())
     return found.hexdigest()

@@ -1,9 +1,8 @@
 """The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
 
-One step lasts 20 ms, or what the setting `decisions` says. The action sets the stiffness, which is held for all
-control windows of 10 ms in the step; in each window the springs' equilibrium, the hips and the knees follow the phase.
-Row i of every array depends on environment i alone, by the same operations for any N, so a batch of N gives the same
-bits as N batches of one.
+One step lasts 20 ms, or what the setting `decisions` says. The action sets the stiffness, which is held for all control
+windows of 10 ms in it; in each window the springs' equilibrium, the hips and the knees follow the phase. Row i of every
+array depends on environment i alone, by the same operations for any N: a batch of N gives the bits of N batches of one.
 """
 
 from collections.abc import Callable, Mapping, Sequence

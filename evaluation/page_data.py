@@ -33,10 +33,10 @@ FORCE_PANELS = {
 }
 
 
-def plain(values: NDArray) -> Any:
+def shown_numbers(values: NDArray) -> Any:
     """An array as lists of numbers of `DRAWN_DIGITS` digits, None for NaN."""
     if values.ndim > 1:
-        return [plain(row) for row in values]
+        return [shown_numbers(row) for row in values]
     return [float(f"{value:.{DRAWN_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
@@ -47,7 +47,7 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
         "name": recording.policy,
         "metrics": gait.metrics,
         "people": f"people at {human.speed:.2f} m/s" if recording.settings.human is None else human.condition,
-        "toe_off": plain(
+        "toe_off": shown_numbers(
             np.array([np.nan if (t := gait.metrics["toe_off_percent"]) is None else t, 100 * human.toe_off])
         ),
         "panels": [
@@ -62,7 +62,13 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
 
 
 def _panel(group: str, title: str, unit: str, own: tuple[NDArray, NDArray], **more: Any) -> dict[str, Any]:
-    return {"group": group, "title": title, "unit": unit, "mean": plain(own[0]), "sd": plain(own[1])} | more
+    return {
+        "group": group,
+        "title": title,
+        "unit": unit,
+        "mean": shown_numbers(own[0]),
+        "sd": shown_numbers(own[1]),
+    } | more
 
 
 def _of(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
@@ -72,7 +78,10 @@ def _of(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
 def _people(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any]:
     unit = np.degrees(1.0) if degrees else 1.0
     phase = PERCENT / 100
-    return {"people": plain(unit * human.mean(name, phase)), "people_sd": plain(unit * human.sd(name, phase))}
+    return {
+        "people": shown_numbers(unit * human.mean(name, phase)),
+        "people_sd": shown_numbers(unit * human.sd(name, phase)),
+    }
 
 
 def _angles(curves: StrideCurves, human: HumanGait) -> list[dict[str, Any]]:
@@ -106,14 +115,14 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
     com, (x, z) = gait.com, recording.plan_com.T
     cop = gait.tally.cop
     return [
-        _panel(group, "CoM ahead of the ankle", "forward, m", _of(com, "x"), plan=plain(x), axis=axis),
-        _panel(group, "CoM height", "above the ground, m", _of(com, "z"), plan=plain(z), axis=axis),
+        _panel(group, "CoM ahead of the ankle", "forward, m", _of(com, "x"), plan=shown_numbers(x), axis=axis),
+        _panel(group, "CoM height", "above the ground, m", _of(com, "z"), plan=shown_numbers(z), axis=axis),
         _panel(
             group,
             "CoP and planned ZMP",
             "ahead of the ankle, m",
             _of(cop, "x"),
-            plan=plain(recording.plan_zmp),
+            plan=shown_numbers(recording.plan_zmp),
             axis=axis,
         ),
     ]
@@ -149,20 +158,20 @@ def _loops(recording: Recording, curves: StrideCurves, human: HumanGait) -> list
     for segment, end in zip(lines, ends, strict=True):
         angle = human.mean("ankle", np.array([segment.start, end]))
         moment = segment.stiffness * (angle - segment.equilibrium) / (body.total_mass * body.length_scale)
-        thesis.append(plain(np.stack([np.degrees(angle), moment], -1)))
+        thesis.append(shown_numbers(np.stack([np.degrees(angle), moment], -1)))
     return [
         {
             "title": "Ankle: moment over angle",
-            "x": plain(curves.mean("ankle_dorsiflexion_deg")),
-            "y": plain(curves.mean("ankle_moment_Nm_per_kg")),
-            "people_x": plain(np.degrees(human.mean("ankle", phase))),
-            "people_y": plain(human.mean("ankle_moment", phase)),
+            "x": shown_numbers(curves.mean("ankle_dorsiflexion_deg")),
+            "y": shown_numbers(curves.mean("ankle_moment_Nm_per_kg")),
+            "people_x": shown_numbers(np.degrees(human.mean("ankle", phase))),
+            "people_y": shown_numbers(human.mean("ankle_moment", phase)),
             "thesis": thesis,
         },
         {
             "title": "Toe: moment over angle",
-            "x": plain(curves.mean("mtp_dorsiflexion_deg")),
-            "y": plain(curves.mean("mtp_moment_Nm_per_kg")),
+            "x": shown_numbers(curves.mean("mtp_dorsiflexion_deg")),
+            "y": shown_numbers(curves.mean("mtp_moment_Nm_per_kg")),
         },
     ]
 
@@ -194,19 +203,21 @@ def _figure(recording: Recording) -> dict[str, Any]:
             "toe": list(offsets["toe"]),
         },
         "ranges": [[float(value) for value in ends] for ends in zip(*stiffness_ranges(settings, body), strict=True)],
-        "base": plain(series["base"]),
-        "angle": plain(series["angle"].reshape(len(series["angle"]), -1)),
-        "com": plain(series["com"]),
-        "plan": plain(series["com_reference"]),
-        "zmp": plain(_planned_zmp(recording, whole)[first:last]),
+        "base": shown_numbers(series["base"]),
+        "angle": shown_numbers(series["angle"].reshape(len(series["angle"]), -1)),
+        "com": shown_numbers(series["com"]),
+        "plan": shown_numbers(series["com_reference"]),
+        "zmp": shown_numbers(_planned_zmp(recording, whole)[first:last]),
         "force": [
-            plain(np.stack([forces[f"ground_force_{side[0]}_{part}"] / unit for part, unit in acting.items()], -1))
+            shown_numbers(
+                np.stack([forces[f"ground_force_{side[0]}_{part}"] / unit for part, unit in acting.items()], -1)
+            )
             for side in SIDES
         ],
-        "stiffness": plain(series["stiffness"].reshape(len(series["stiffness"]), -1)),
-        "equilibrium": plain(np.degrees(series["equilibrium"]).reshape(len(series["equilibrium"]), -1)),
-        "percent": plain(np.stack(percent, -1)),
-        "phase": plain(series["phase"]),
+        "stiffness": shown_numbers(series["stiffness"].reshape(len(series["stiffness"]), -1)),
+        "equilibrium": shown_numbers(np.degrees(series["equilibrium"]).reshape(len(series["equilibrium"]), -1)),
+        "percent": shown_numbers(np.stack(percent, -1)),
+        "phase": shown_numbers(series["phase"]),
     }
 
 

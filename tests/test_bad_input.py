@@ -104,7 +104,7 @@ SETTINGS = [
     ({"reward_weights": {"alive": "1"}}, "reward_weights['alive'] must be a finite number >= 0 (a reward), got '1'"),
     ({"reward_weights": {"alive": 1j}}, "reward_weights['alive'] must be a finite number >= 0 (a reward), got 1j"),
     ({"reward_weights": "a\nb\x1b[31m"}, "reward_weights must map names of reward terms to numbers, got 'a\\nb\\x1b[31m'"),
-    ({"reward_weights": {"a\x1b[31m": 1.0}}, "reward_weights has no term 'a\\x1b[31m'; valid: alive, speed, com_x, com_z, zmp, pose, grf, stiffness_rate, stiffness"),
+    ({"reward_weights": {"a\x1b[31m": 1.0}}, "reward_weights has no term 'a\\x1b[31m'; valid: alive, speed, com_x, com_z, zmp, pose, grf, stiffness_rate, stiffness, effort"),
     ({"episode_seconds": 1e308}, 'episode_seconds must be a finite number >= 0 and <= 1e+09 s, got 1e+308'),
     ({"push_newton": 1e308}, 'push_newton must be a finite number >= 0 and <= 1e+05 N, got 1e+308'),
     ({"push_interval": 1e-300}, 'push_seconds must be a finite number > 0 and <= 1e-300 s (push_interval), got 0.1'),
@@ -227,7 +227,7 @@ COMMANDS = [
     (["study", "bodies", "schedule", "--pairs", str(10**20)], 'springfoot study bodies: error: pairs must be a whole number >= 1 and <= 1000000000000, got 100000000000000000000'),
     (["study", "compare", "schedule", "--threads", "99999999999"], 'springfoot study compare: error: threads must be a whole number >= 1 and <= 1024, got 99999999999'),
     (["study", "compare", "schedule", "--seconds", "1e308"], 'springfoot study compare: error: seconds must be a finite number > 0 and <= 1e+09 s, got 1e+308'),
-    (["study", "a\x1b[31m"], "springfoot study: error: no study 'a\\x1b[31m'; there are compare, best-constant, best-factor, seeds, bodies, criteria, front, conditions, ablations, stiffness-cost, agreement, any-stiffness, identify, influence, learning-curves, leg-tuning, leg-sets, slope-tuning, thesis"),
+    (["study", "a\x1b[31m"], "springfoot study: error: no study 'a\\x1b[31m'; there are compare, best-constant, best-factor, seeds, bodies, criteria, front, mix, conditions, ablations, stiffness-cost, agreement, any-stiffness, identify, influence, learning-curves, leg-tuning, leg-sets, slope-tuning, thesis"),
     (["a\x1b[31m"], "springfoot: error: no command 'a\\x1b[31m'; there are train, evaluate, export and study"),
     (["export", "schedule", "--to", "onnx", "--out", "a\x1b[31m"], 'springfoot export: error: out must end in .onnx for onnx, got a\\x1b[31m'),
 ]

@@ -176,8 +176,9 @@ def test_a_fall_ends_the_episode_with_its_reason():
 
 def test_a_diverged_simulation_ends_its_episode_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
-    biped = Biped(BipedSettings(push_newton=1e20, push_interval=1.0), 2)  # a push at another time for each
+    biped = Biped(BipedSettings(push_newton=100.0, push_interval=1.0), 2)
     biped.reset(np.arange(2), [1, 0])
+    biped._task.rows["push"]["force"][1] = 1e20  # harder than settings allow
     result = biped.step(np.zeros((2, 4)))
     while not result.terminated.any():
         result = biped.step(np.zeros((2, 4)))
