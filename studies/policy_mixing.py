@@ -4,11 +4,11 @@
 
 Policies that were trained on from a common one are near enough that the mean of their weights walks as well
 (Wortsman et al. 2022, arXiv 2203.05482); shares may be negative. A candidate pays for what it misses undisturbed, and
-for return that it loses against the first policy in the world they were trained in, its bodies, speeds, slopes and
-pushes. The mean of the search is then judged on walks from other starts.
+for return that it loses against the first policy in the world they were trained in, its bodies, speeds and slopes, with
+harder pushes. The mean of the search is then judged on walks from other starts.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -38,7 +38,7 @@ MARGIN_PERCENT = 0.5
 """Nearness to the end of a criterion's range that is paid for already [% of that end]; chosen: about as much as the
 mean of a few walks differs from that of a hundred."""
 FALL_COST = 2.0
-"""Price of a fall undisturbed, beside the misses and the lost return [%]; chosen."""
+"""Price of each undisturbed walk that falls, beside the misses and the lost return [%]; chosen."""
 HARD_PUSH, TRAINED_SECONDS = 200.0, 8.0
 """How hard candidates are pushed in the world they were trained in [N], harder than in training, and how long they walk
 there [s]."""
@@ -82,6 +82,27 @@ def missed_percent(values: Mapping[str, Any], criteria: Sequence[Criterion] = CR
     return sum(max(percent + MARGIN_PERCENT, 0.0) for percent in beyond if percent is not None)
 
 
+def cheapest_shares(
+    pays: Callable[[NDArray], float],
+    count: int,
+    generations: int,
+    population: int,
+    sigma: float,
+    seed: int,
+    progress: OnProgress,
+) -> NDArray:
+    """(count,) shares whose sum is 1: where CMA-ES on what they pay, begun from equal ones, ends."""
+    options = {"popsize": population, "seed": seed, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy(np.full(count - 1, 1 / count), sigma, options)
+    for generation in range(generations):
+        found = strategy.ask()
+        paid = [pays(np.append(each, 1.0 - each.sum())) for each in found]
+        strategy.tell(found, paid)
+        tqdm.write(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}")
+        progress(1)
+    return np.append(strategy.mean, 1.0 - strategy.mean.sum())
+
+
 @dataclass(frozen=True, kw_only=True)
 class Mix(Study):
     """Find the weighted mean of policies that misses least of the criteria, and write it as a policy."""
@@ -99,9 +120,9 @@ class Mix(Study):
     seconds: float = 12.0
     """Length of each [s]."""
     trained: int = 48
-    """Walks of a candidate as it was trained, of 8 s."""
+    """Walks of a candidate in the world of its training, pushed harder, of 8 s."""
     judged: int = 20
-    """Undisturbed walks that judge what was found, and five times as many as it was trained."""
+    """Undisturbed walks that judge what was found, and five times as many in that world."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
@@ -136,23 +157,19 @@ class Mix(Study):
     def ask(self, progress: OnProgress) -> Answer:
         """Search, judge, and hand out the mean as `mix.safetensors`."""
         policies = [read_policy(name) for name in self.policies]
-        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
-        strategy = cma.CMAEvolutionStrategy(np.full(len(policies) - 1, 1 / len(policies)), self.sigma, options)
         first = self._walk(policies[0], self.episodes, self.trained, SEARCHED_FROM)
-        for generation in range(self.generations):
-            found = strategy.ask()
-            candidates = [mean_policy(policies, _all_shares(each)) for each in found]
-            paid = [_price(self._walk(each, self.episodes, self.trained, SEARCHED_FROM), first) for each in candidates]
-            strategy.tell(found, paid)
-            tqdm.write(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}")
-            progress(1)
-        shares = _all_shares(strategy.mean).round(4)
+
+        def pays(shares: NDArray) -> float:
+            return price(self._walk(mean_policy(policies, shares), self.episodes, self.trained, SEARCHED_FROM), first)
+
+        how = (self.generations, self.population, self.sigma, self.seed + 1, progress)
+        shares = cheapest_shares(pays, len(policies), *how).round(4)
         mean = mean_policy(policies, shares)
         walked = [self._walk(each, self.judged, 5 * self.judged, JUDGED_FROM) for each in (*policies, mean)]
         lines = []
         for name, share, walk in zip([*self.policies, "mix"], [*shares, None], walked, strict=True):
             missed = "; ".join(unmet(walk[0], CRITERIA))
-            lines.append([Path(name).stem, share, _price(walk, walked[0]), walk[1].mean(), int(walk[2].sum()), missed])
+            lines.append([Path(name).stem, share, price(walk, walked[0]), walk[1].mean(), int(walk[2].sum()), missed])
         head = ["policy", "share", "pays", "return as trained", "falls", "misses"]
         cells = [
             [f"`{name}`", text_of(share, "+.4f"), f"{price:.2f}", f"{earned:.0f}", str(falls), misses]
@@ -175,12 +192,7 @@ class Mix(Study):
         return measure(walk).metrics, returns, fell
 
 
-def _price(walk: Walk, first: Walk) -> float:
+def price(walk: Walk, first: Walk) -> float:
     """What a candidate pays: misses, falls, and return lost against the first policy [%]."""
     lost = 100.0 * (1.0 - walk[1].mean() / first[1].mean())
     return missed_percent(numbers(walk[0])) + FALL_COST * walk[0]["falls"] + max(lost, 0.0)
-
-
-def _all_shares(but_last: NDArray) -> NDArray:
-    """The shares, whose sum is 1, from all but the last."""
-    return np.append(but_last, 1.0 - but_last.sum())

@@ -1,16 +1,23 @@
 """The weighted mean of policies: whose weights, what it pays for, what is refused, what is written."""
 
 import csv
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from springfoot.agents import read_policy, save_policy
-from springfoot.evaluation.criteria import Criterion
+from springfoot.evaluation.criteria import Criterion, numbers
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.policies import CONDITIONS
+from springfoot.evaluation.recording import record
 from springfoot.gait.errors import SpringfootError
 from springfoot.studies.command import study_main
-from springfoot.studies.policy_mixing import MARGIN_PERCENT, mean_policy, missed_percent
+from springfoot.studies.policy_mixing import MARGIN_PERCENT, cheapest_shares, mean_policy, missed_percent, price
+
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +53,42 @@ def test_what_is_missed_counts_and_so_does_what_is_hardly_met():
     met, hardly, missed = 1.0, 2.0 * (1 - 0.002), 2.0 * (1 + 0.03)
     values = {"a": met, "b": hardly, "c": missed, "falls": 9}
     assert missed_percent(values, criteria) == pytest.approx((MARGIN_PERCENT - 0.2) + (MARGIN_PERCENT + 3.0))
+
+
+def test_the_search_finds_the_shares_that_pay_least():
+    best = np.array([0.9, -0.6, 0.7])
+    found = cheapest_shares(lambda shares: float(((shares - best) ** 2).sum()), 3, 40, 8, 0.3, 1, lambda done: None)
+    assert found.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(found, best, atol=1e-3)
+
+
+def test_falls_and_lost_return_have_their_price():
+    policy = read_policy("pretrained")
+    walk = record(policy, replace(policy.settings, **CONDITIONS | {"episode_seconds": 6.0}), name="p", episodes=1)
+    metrics = measure(walk).metrics
+    misses = missed_percent(numbers(metrics))
+    first = (metrics, np.array([90.0, 110.0]), np.zeros(2, bool))
+    for returns, falls, more in (
+        ([100, 100], 0, 0.0),
+        ([120, 120], 0, 0.0),
+        ([80, 100], 0, 10.0),
+        ([100, 100], 3, 6.0),
+    ):
+        walked = (metrics | {"falls": falls}, np.array(returns, float), np.zeros(2, bool))
+        assert price(walked, first) == pytest.approx(misses + more)
+
+
+def test_pretrained_is_the_mean_that_the_page_says():
+    page = (ROOT / "docs" / "mixed" / "README.md").read_text(encoding="utf-8")
+    shares = re.findall(r"^\| (\d\d) \| (−?[\d.]+) \|", page, re.MULTILINE)
+    policies = [read_policy(ROOT / "docs" / "mixed" / f"{name}.safetensors") for name, _ in shares]
+    mean = mean_policy(policies, np.array([float(share.replace("−", "-")) for _, share in shares]))
+    shipped = read_policy("pretrained")
+    assert len(policies) == 11 and mean.settings == shipped.settings
+    for own, found in zip((*shipped.weights, *shipped.biases), (*mean.weights, *mean.biases), strict=True):
+        np.testing.assert_array_equal(own, found)
+    np.testing.assert_array_equal(shipped.observation_mean, mean.observation_mean)
+    np.testing.assert_array_equal(shipped.observation_variance, mean.observation_variance)
 
 
 def test_a_search_writes_a_policy_and_the_shares_it_is_of(policies, tmp_path, capsys):
