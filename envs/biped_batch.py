@@ -207,7 +207,7 @@ class Biped(ExactState):
         if self._standing is not None:
             posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing") or posture
         place(self._simulation, self.subjects, ids, posture, noise)
-        self._simulation.measure()
+        self._simulation.measure(ids)
 
     def _fit(self, ids: list[int]) -> None:
         """Give environments `ids` the bodies of their subjects, and every leg its commanded speed."""

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from springfoot.envs.feet import kind_of
+from springfoot.envs.feet import feet_of, kind_of
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import scores as score
@@ -28,7 +28,8 @@ def kinds_of(settings: BipedSettings) -> dict[str, str]:
 
 def differ(settings: BipedSettings) -> bool:
     """Whether the two feet are not the same."""
-    return settings.left_foot != settings.right_foot
+    left, right = feet_of(settings.left_foot, settings.right_foot)
+    return left != right
 
 
 def leg_numbers(tally: StrideTally) -> dict[str, dict[str, Any]]:

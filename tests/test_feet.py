@@ -260,3 +260,22 @@ def test_every_number_of_a_foot_changes_the_foot():
         orthosis = {"ankle_stiffness": 50.0, "toe_stiffness": 5.0}
         other = {"kind": "intact", "orthosis": orthosis | {name: 0.45 * number.high}}
         assert foot_of(other) != foot_of({"kind": "intact", "orthosis": orthosis}), name
+
+
+def test_a_neighbours_reset_and_a_pause_leave_a_drop_foot_as_it_is():
+    """Its muscles go slack by the load of the window before, which is its own."""
+    settings = settings_from(right_foot="drop")
+
+    def walked(disturb):
+        biped = Biped(settings, 2)
+        biped.reset(np.arange(2), [0, 1])
+        seen = []
+        for step in range(45):
+            disturb(biped, step)
+            seen.append(biped.step(np.zeros((2, 4))).observation[0])
+        return np.array(seen)
+
+    alone = walked(lambda biped, step: None)
+    np.testing.assert_array_equal(walked(lambda biped, step: biped.reset(np.array([1]), [step])), alone)
+    pause = np.array([False, True])
+    np.testing.assert_array_equal(walked(lambda biped, step: biped.step(np.zeros((2, 4)), active=pause)), alone)

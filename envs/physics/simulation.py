@@ -161,7 +161,7 @@ class Simulation:
     def advance(self, ids: NDArray | None = None) -> None:
         """Run one control window with `control` held; the kernel `measure_bodies` then tells what came of it.
 
-        Only simulations `ids` run (all if None); the others stay as they are, and their contact forces read 0.
+        Only simulations `ids` run (all if None); the others stay as they are, contact forces included.
         """
         self._roll(ids, self._record)
 
@@ -181,22 +181,23 @@ class Simulation:
         self._held[:] = self.control
 
     def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
-        """Run the physics steps of a window and record what `out` names, 0 for those that do not run."""
+        """Run the physics steps of a window and record what `out` names: for those still, sensors stay, else 0."""
         if ids is None:
             self._batch.rollout(self._substeps, record=list(out), out=out)
             return
-        for values in out.values():
-            values[:] = 0.0
+        for name, values in out.items():
+            if name not in self._record:
+                values[:] = 0.0
         if len(ids):
             found = self._batch.rollout(self._substeps, record=list(out), ids=ids)
             for name, values in out.items():
                 values[ids] = found[name]
 
-    def measure(self) -> Measurement:
-        """The measurement right after a reset: the state as it stands, with torques and contact forces of zero."""
-        self.arrays.sensors[:] = 0.0
+    def measure(self, ids: NDArray | slice = slice(None)) -> Measurement:
+        """The measurement right after a reset of `ids`: their state as it stands, no torques or contact forces."""
+        self.arrays.sensors[ids] = 0.0
         measure_bodies(*self.arrays)
-        self.now.torque[:] = 0.0
+        self.now.torque[ids] = 0.0
         return self.now
 
     def data(self, index: int) -> MjData:

@@ -64,7 +64,7 @@ def place(
     base, rate = np.zeros((2, len(ids), 3))
     base[:, 2], rate[:, 0] = pitch, speed
     simulation.reset(ids, base, rate, angle, velocity)
-    lowest = simulation.measure().contact[ids, ..., 1].min(axis=(1, 2))
+    lowest = simulation.measure(ids).contact[ids, ..., 1].min(axis=(1, 2))
     base[:, 1] = -lowest - START_DEPTH * simulation.body.length_scale * scale["length"]
     simulation.reset(ids, base, rate, angle, velocity)
 
