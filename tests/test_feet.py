@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from walked_ticks import walked_ticks
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.foot_springs import FEET
@@ -39,17 +40,6 @@ def named(foot: Any) -> str:
     return foot if isinstance(foot, str) else " ".join([foot["kind"], *(key for key in foot if key != "kind")])
 
 
-def walk(biped: Biped, steps: int = 60, actions: Any = 0.3) -> list[Tick]:
-    """Steps of everybody still on their feet; the ticks of every control window."""
-    ticks: list[Tick] = []
-    biped.on_tick = ticks.append
-    biped.reset(np.arange(biped.num_envs), range(biped.num_envs))
-    active = np.ones(biped.num_envs, bool)
-    for _ in range(steps):
-        active = active & ~biped.step(np.broadcast_to(actions, (biped.num_envs, 4)), active).terminated
-    return ticks
-
-
 def of_right(ticks: list[Tick], what: str) -> np.ndarray:
     """(T, N, (ankle, toe)) of the right foot, NaN for those that did not run."""
     values = np.stack([getattr(tick.measurement, what)[:, RIGHT, FEET] for tick in ticks])
@@ -60,7 +50,7 @@ def of_right(ticks: list[Tick], what: str) -> np.ndarray:
 def together() -> tuple[Biped, list[Tick]]:
     """One body with each of the feet, side by side, and its walk."""
     biped = Biped(settings_from(), len(MIXED), feet=[feet_of(*pair) for pair in MIXED])
-    return biped, walk(biped)
+    return biped, walked_ticks(biped)
 
 
 @pytest.mark.parametrize("index", range(len(MIXED)), ids=lambda index: "-".join(map(named, MIXED[index])))
@@ -119,9 +109,9 @@ def test_masses_of_the_model_are_those_asked_for_and_the_com_is_that_of_mujoco()
 @pytest.mark.parametrize(("foot", "joint"), [("rigid", ANKLE), ("rigid_toe", TOE), ("no_toe", TOE)])
 def test_a_locked_joint_does_not_move(foot, joint):
     biped = Biped(settings_from(right_foot=foot), 4)
-    angle = of_right(walk(biped), "angle")[..., joint - ANKLE]
+    angle = of_right(walked_ticks(biped), "angle")[..., joint - ANKLE]
     assert np.nanmax(np.abs(np.degrees(angle))) < 0.3
-    other = of_right(walk(biped), "angle")[..., TOE - joint]
+    other = of_right(walked_ticks(biped), "angle")[..., TOE - joint]
     assert np.degrees(np.nanmax(other) - np.nanmin(other)) > 5.0
 
 
@@ -138,7 +128,7 @@ def test_a_passive_foot_is_the_same_spring_on_everybody_whatever_is_asked(mass):
     settings = settings_from(mass=mass, right_foot=SPRING | {"damping_time": 0.01})
     for actions in (-1.0, 1.0):
         biped = Biped(settings, 3)
-        ticks = walk(biped, 30, actions)
+        ticks = walked_ticks(biped, 30, actions)
         angle, rate, torque = (of_right(ticks, what) for what in ("angle", "velocity", "torque"))
         rest = np.radians([4.0, 5.0])
         np.testing.assert_allclose(torque, [400.0, 30.0] * (rest - angle - 0.01 * rate), atol=1e-9)
@@ -150,7 +140,7 @@ def test_a_passive_foot_is_the_same_spring_on_everybody_whatever_is_asked(mass):
 def test_an_adaptive_foot_has_the_stiffness_of_the_action_and_a_fixed_rest_angle():
     foot = {"kind": "adaptive", "ankle_deg": 3.0, "toe_deg": -2.0}
     biped, sound = Biped(settings_from(right_foot=foot), 2), Biped(settings_from(), 2)
-    for mine, intact in zip(walk(biped, 20), walk(sound, 20), strict=True):
+    for mine, intact in zip(walked_ticks(biped, 20), walked_ticks(sound, 20), strict=True):
         assert (mine.stiffness[:, :, FEET] == intact.stiffness[:, :, FEET]).all()
         np.testing.assert_allclose(np.degrees(mine.equilibrium[:, RIGHT, FEET]), [[3.0, -2.0]] * 2, atol=1e-9)
 
@@ -159,7 +149,7 @@ def test_an_adaptive_foot_has_the_stiffness_of_the_action_and_a_fixed_rest_angle
 def test_a_weak_calf_holds_its_moment_limit_and_reaches_it(strength):
     biped = Biped(settings_from(height=1.8, mass=80.0, right_foot={"kind": "weak", "strength": strength}), 6)
     limit = strength * TORQUE_LIMIT[ANKLE] * biped.body.strength_scale
-    ticks = walk(biped, 60, 0.9)
+    ticks = walked_ticks(biped, 60, 0.9)
     ankle = np.stack([tick.measurement.torque[:, :, ANKLE] for tick in ticks])
     assert ankle[..., RIGHT].min() >= -limit * (1.0 + 1e-12)
     assert ankle[..., LEFT].min() < -0.35 * TORQUE_LIMIT[ANKLE]
@@ -171,7 +161,7 @@ def test_a_weak_calf_holds_its_moment_limit_and_reaches_it(strength):
 
 def test_a_drop_foot_has_no_ankle_torque_in_swing_and_all_of_it_in_stance():
     biped = Biped(settings_from(right_foot="drop"), 6)
-    ticks = walk(biped, 45)
+    ticks = walked_ticks(biped, 45)
     load = np.stack([tick.measurement.force[:, RIGHT, :, 1].sum(-1) for tick in ticks])[:-1]
     phase = np.stack([tick.phase[:, RIGHT] for tick in ticks])[1:]
     torque, active = of_right(ticks, "torque")[1:, :, 0], np.stack([tick.active for tick in ticks])[1:]
@@ -199,7 +189,7 @@ def test_an_orthosis_is_a_spring_beside_the_joint_and_outside_the_moment_limit()
 @pytest.mark.parametrize("foot", FEET_SEEN, ids=named)
 def test_the_energy_ledger_is_closed(foot):
     biped = Biped(settings_from(right_foot=foot), 3)
-    ticks = walk(biped, 40)
+    ticks = walked_ticks(biped, 40)
     kept = [tick for tick in ticks if tick.active.all()]
     energy = {name: np.stack([tick.work.energy[name] for tick in kept]) for name in LEDGER.names or ()}
     change = energy["mechanical"][-1] - energy["mechanical"][0]
@@ -214,7 +204,7 @@ def test_the_controller_of_the_sound_side_and_of_hips_and_knees_is_unchanged(foo
     begun = []
     for right in (foot, "intact"):
         biped = Biped(settings_from(right_foot=right), 1)
-        ticks = walk(biped, 40, 0.4)
+        ticks = walked_ticks(biped, 40, 0.4)
         begun.append((ticks[0], biped.subjects.rows["legs"]["gains"]))
         for tick in ticks:  # at whatever phase it comes to
             rest = biped._springs.rest.at(tick.phase[:, LEFT])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tyro
+from walked_ticks import walked_ticks
 
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.envs.biped_batch import Biped
@@ -31,13 +32,8 @@ SCHEDULE = {"kind": "adaptive", "schedule": SPRINGS.to_json()}
 
 
 def walk(biped: Biped, steps: int = 50, action: float = 0.3) -> list[Tick]:
-    ticks: list[Tick] = []
-    biped.on_tick = ticks.append
-    biped.reset(np.arange(biped.num_envs), range(biped.num_envs))
-    active = np.ones(biped.num_envs, bool)
-    for _ in range(steps):
-        active = active & ~biped.step(np.full((biped.num_envs, 4), action), active).terminated
-    return [tick for tick in ticks if tick.active.all()]
+    """The ticks in which everybody walks."""
+    return [tick for tick in walked_ticks(biped, steps, action) if tick.active.all()]
 
 
 def test_a_torque_angle_table_gives_its_torque_at_the_angle_each_window_begins_with():

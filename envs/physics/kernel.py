@@ -43,7 +43,11 @@ def part(function: Function) -> Function:
 
 
 class _KernelCache(FunctionCache):
-    """numba's cache, whose damage costs compiling anew and nothing else."""
+    """numba's cache, whose damage costs compiling anew and nothing else.
+
+    numba keeps kernels as pickles, beside the code or where NUMBA_CACHE_DIR says: who may write there may write code
+    too, as with Python's own `__pycache__`. Nothing that a user hands over is read this way.
+    """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What is kept, or None where there is nothing or its files are damaged; those begin anew."""
