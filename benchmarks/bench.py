@@ -52,6 +52,8 @@ class Effort:
     """Blocks of each environment."""
     updates: int = 4
     """PPO updates of each recipe."""
+    starts: int = 9
+    """New processes of each environment."""
     sizes: Sequence[int] = BATCH_SIZES
     vectors: Sequence[int] = VECTOR_SIZES
     update_steps: int | None = None
@@ -59,7 +61,7 @@ class Effort:
 
 
 QUICK = Effort(
-    steps=3, rounds=1, repeats=1, updates=1, sizes=(1, 8, 64), vectors=(2,), update_steps=128, study_steps=16
+    steps=3, rounds=1, repeats=1, updates=1, starts=1, sizes=(1, 8, 64), vectors=(2,), update_steps=128, study_steps=16
 )
 
 
@@ -71,15 +73,18 @@ def bench(effort: Effort) -> dict[str, Any]:
     asynchronous = environments.walker_async(max(effort.vectors[:2]))
     walk = record_walk(max(max(effort.sizes), 64), effort.steps)
 
-    overhead, sim_rate, study_rate = {}, 0.0, 0.0
+    start = environments.start_over_others(effort.starts)
+    overhead, of_physics, sim_rate, study_rate = {}, {}, 0.0, 0.0
     print("Full step of 20 ms beside its physics (mj_step alone, same states and controls), CPU time, one thread")
     for num in OVERHEAD_SIZES:
         spent, apart = step_over_physics(walk, num, effort.rounds * (1 if num == 64 else 4))
         full, ours, study = (1e6 * np.median(spent, axis=1) / num).tolist()
         overhead[str(num)] = float(np.median((spent[0] - spent[1]) / spent[2]))
+        of_physics[str(num)] = float(np.median((spent[0] - spent[1]) / spent[1]))
         print(
             f"  N = {num:2d}: full {full:.1f} us, physics {ours:.1f}, physics at the study's settings {study:.1f}; "
-            f"(full - physics) / study {overhead[str(num)]:.3f}; same walk within {apart:.0e} rad"
+            f"(full - physics) / physics {of_physics[str(num)]:.3f}, / study {overhead[str(num)]:.3f}; "
+            f"same walk within {apart:.0e} rad"
         )
         if num == OVERHEAD_SIZES[0]:
             sim_rate, study_rate = 1e6 * STEP / full, 1e6 * STEP / study
@@ -99,7 +104,9 @@ def bench(effort: Effort) -> dict[str, Any]:
     training = PRESETS["walk"].timesteps / ours
     two = figures["springfoot, N = 64, 2 threads"].samples_per_second
     return {
-        "overhead_of_study": {num: overhead[num] for num in ("1", "8", "64")},
+        "overhead_of_physics": dict(reversed(of_physics.items())),
+        "overhead_of_study": dict(reversed(overhead.items())),
+        "start_over_walker2d": start,
         "thread_speedup_64": two / figures["springfoot, N = 64, 1 thread"].samples_per_second,
         "vs_dummy": two / _best(figures, "DummyVecEnv"),
         "vs_subproc": two / _best(figures, "SubprocVecEnv"),

@@ -1,8 +1,12 @@
 """Environments to time: ours behind each of its faces, and others' for the order of magnitude."""
 
 import multiprocessing
+import subprocess
+import sys
 from functools import partial
 from importlib.util import find_spec
+from statistics import median
+from time import perf_counter
 from typing import Any
 
 import gymnasium as gym
@@ -52,6 +56,26 @@ def subproc(walk: Walk, env: SubprocVecEnv) -> Case:
     """What `subprocesses` made."""
     workers = [process.pid or 0 for process in env.processes]
     return _sb3_case(f"SubprocVecEnv, N = {env.num_envs}", env, walk, workers)
+
+
+def start_over_others(repeats: int) -> float | None:
+    """Time from a new process to the first step over Gymnasium's walker's, kernels kept: median of pairs.
+
+    None where Gymnasium's MuJoCo environments do not import, as in `walker_async`.
+    """
+    if not find_spec("imageio"):
+        return None
+    first_step = (
+        "import gymnasium, sys; env = gymnasium.make(sys.argv[1]); env.reset(); env.step(env.action_space.sample())"
+    )
+
+    def seconds(name: str) -> float:
+        begin = perf_counter()
+        subprocess.run([sys.executable, "-c", first_step, name], check=True)
+        return perf_counter() - begin
+
+    pairs = [(seconds(OURS), seconds(OTHERS)) for _ in range(repeats + 1)][1:]  # the first keeps the kernels
+    return median(ours / others for ours, others in pairs)
 
 
 def walker_async(num: int) -> gym.vector.AsyncVectorEnv | None:
