@@ -4,7 +4,6 @@ An evaluation writes both of its walk (`springfoot.evaluation.schedule_tables`);
 them. K scales with the body; a file that names none is of 1.70 m and 63 kg.
 """
 
-import json
 from collections.abc import Callable
 from math import radians, sqrt
 from pathlib import Path
@@ -20,13 +19,15 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError, as_float, require_number, require_within
-from springfoot.gait.motion_files import Table, existing, read_csv
+from springfoot.gait.json_file import read_object
 from springfoot.gait.stiffness import SPRINGS, STIFFNESS_RANGE, Segment, StiffnessSchedule
+from springfoot.gait.text_table import Table, read_csv
 
 from .baselines import PolicyFunction, leg_phase, require_absolute, schedule
 
 SPRING_KEYS = ("stiffness_Nm_per_rad", "damping_time_s", "equilibrium_deg")
 """What a state says of each spring."""
+STATES_FILE = "table of finite states"
 SAME_BETA = 1e-4
 """Difference of damping times that is rounding [s]."""
 
@@ -146,17 +147,16 @@ def _follow(stiffness: NDArray, settings: BipedSettings) -> PolicyFunction:
 
 def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
     """The springs of a finite-state table, for the body of `settings`."""
-    text = existing(path).read_bytes()
+    table = read_object(path, STATES_FILE)
     try:
-        table = json.loads(text)
         states = table["states"]
         height, mass = table.get("height_m"), table.get("mass_kg")
         entries = [
             [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
         ]
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (LookupError, TypeError, AttributeError):
         raise SpringfootError(
-            f"{path} is no table of finite states: an object with states, a list in which each has phase, ankle and "
+            f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
             f"toe, and these {', '.join(SPRING_KEYS)}"
         ) from None
     beta, scale = damping_times(body_of(settings))[FEET], _scale(height, mass, settings)

@@ -29,7 +29,7 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
     """Write tensors and, under `key`, a JSON header, whole or not at all; equal contents give equal bytes."""
     json.dumps(header, allow_nan=False)  # raises for what is no JSON
     packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
-    text = _text(header | {DIGEST: _digest(header, packed)})  # one entry: safetensors has no order of several
+    text = _text(header | {DIGEST: digest_of(header, packed)})  # one entry: safetensors has no order of several
     write_atomically(path, to_safetensors(packed, {key: text}))
 
 
@@ -60,7 +60,7 @@ def read_tensors(
         raise SpringfootError(f"{path} is damaged: its header has an entry {quoted(unknown[0])}")
     if DIGEST in header:
         whole = text == _text(header)
-        if header.pop(DIGEST) != _digest(header, tensors) or not whole:
+        if header.pop(DIGEST) != digest_of(header, tensors) or not whole:
             raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
     for tensor_name, tensor in tensors.items():
         if tensor.dtype not in (np.float32, np.float64) or not np.isfinite(tensor).all():
@@ -72,9 +72,10 @@ def _text(header: Mapping[str, Any]) -> str:
     return json.dumps(header, sort_keys=True)
 
 
-def _digest(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
+def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
+    """The digest of a JSON header and arrays: of their names, types, shapes and bytes, in whatever order."""
     found = sha256(_text(header).encode())
     for name in sorted(tensors):
         found.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())
-        found.update(tensors[name].tobytes())
+        found.update(np.ascontiguousarray(tensors[name]).data)
     return found.hexdigest()

@@ -1,12 +1,10 @@
 """Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +30,8 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.com_plan import ComPlan
 from springfoot.gait.cycle import PERCENT
 from springfoot.gait.errors import SpringfootError
+
+from .array_file import read_arrays, write_arrays
 
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
@@ -110,24 +110,35 @@ class Recording:
         arrays: dict[str, Any] = {
             name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com", "plan_zmp")
         }
-        np.savez(path, header=np.array(json.dumps(header)), **(arrays | dict[str, Any](self.series)))
+        write_arrays(path, header, arrays | self.series)
 
 
 def load_recording(path: str | Path) -> Recording:
     """The recording in a `strides.npz`; raises `SpringfootError` for any other file, and for one of another version."""
+    header, arrays = read_arrays(Path(path), "strides.npz written by evaluate.py")
     try:
-        with Path(path).open("rb") as opened, np.load(opened) as file:
-            arrays = dict(file)
-        header: dict[str, Any] = json.loads(str(arrays.pop("header")))
         if missing := [name for name in ("plan_zmp", *SERIES) if name not in arrays]:
             raise SpringfootError(f"it has no {missing[0]}: another version of springfoot wrote it; evaluate again")
         series = {name: arrays.pop(name) for name in SERIES}
         settings = settings_from(**header["settings"])
-        return Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
-    except SpringfootError as error:
+        recording = Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
+        _require_whole(recording)
+        return recording
+    except (SpringfootError, KeyError, TypeError) as error:
         raise SpringfootError(f"{path}: {error}") from None
-    except (OSError, EOFError, BadZipFile, ValueError, KeyError, TypeError, AttributeError):
-        raise SpringfootError(f"{path} is not a strides.npz written by evaluate.py") from None
+
+
+def _require_whole(recording: Recording) -> None:
+    """Raise `SpringfootError` for arrays that are not of the same episodes."""
+    episodes, length = recording.series["phase"].shape[:2]
+    for name in ("ticks", "returns", "fall_reason"):
+        if getattr(recording, name).shape != (episodes,):
+            raise SpringfootError(f"{name} must be ({episodes},), is {getattr(recording, name).shape}")
+    for name, values in recording.series.items():
+        if values.shape[:2] != (episodes, length) or values.dtype != np.float32:
+            raise SpringfootError(f"{name} must be float32 ({episodes}, {length}, ...), is {values.shape}")
+    if recording.ticks.dtype.kind != "i" or not ((recording.ticks > 0) & (recording.ticks <= length)).all():
+        raise SpringfootError(f"ticks must be whole numbers in [1, {length}]")
 
 
 def require_recordable(settings: BipedSettings, episodes: int) -> None:

@@ -18,6 +18,7 @@ from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings import body_of, reference_gait
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
+from springfoot.gait.seal import BLANK, SEAL, sealed
 from springfoot.gait.stiffness import SPRINGS
 
 from .open_loop import MEAN_KNOTS, decided, mean_over_phase
@@ -39,11 +40,13 @@ def write_schedules(folder: Path, recording: Recording) -> None:
         "speed_m_s": settings.speed,
         "equilibrium": settings.equilibrium,
     }
-    rows = ([int(percent), *whose.values(), *(curve[percent] for curve in curves.values())] for percent in PERCENT)
-    text = csv_text(["percent", *whose, *curves], rows)
+    values = ([*whose.values(), *(curve[percent] for curve in curves.values())] for percent in PERCENT)
+    rows = ([int(percent), *row, BLANK] for percent, row in zip(PERCENT, values, strict=True))
+    text = sealed(csv_text(["percent", *whose, *curves, SEAL], rows))
     (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
-    table = json.dumps(finite_states(recording), indent=2, allow_nan=False, ensure_ascii=False)
-    (folder / "finite_states.json").write_text(table + "\n", encoding="utf-8")
+    states = finite_states(recording) | {SEAL: BLANK}
+    table = sealed(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    (folder / "finite_states.json").write_text(table, encoding="utf-8")
 
 
 def schedule_curves(recording: Recording) -> dict[str, NDArray]:

@@ -15,7 +15,8 @@ from .arrays import NDArray
 from .cycle import Contacts
 from .errors import SpringfootError
 from .human import FORCES
-from .motion_files import FILE_SIDES, Series, Trial, existing, not_empty
+from .motion_files import FILE_SIDES, Series, Trial, not_empty
+from .text_table import read_bytes
 
 PLATE_LOAD = 20.0
 """A force plate bears a foot above this force [N]; chosen, as usual in gait laboratories."""
@@ -83,7 +84,7 @@ def _refuse_broken(path: Path) -> None:
 
     Layout as in the C3D User Guide (c3d.org): header, a chain of parameters, the data, in blocks of 512 bytes.
     """
-    data = existing(path).read_bytes()
+    data = read_bytes(path)
     broken = SpringfootError(f"{path.name} is not a C3D file, or it is damaged")
     try:
         start = 512 * (data[0] - 1)

@@ -4,13 +4,13 @@ A table has a header and the columns `ankle_deg` and `ankle_torque_Nm`, `toe_deg
 dorsiflexion and toe up positive, torques as the angles, so that a torque falls where its angle rises.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
 from .errors import SpringfootError
-from .motion_files import read_csv
+from .json_file import read_object
 from .stiffness import SPRINGS
+from .text_table import read_csv
 
 
 def read_foot(path: str | Path) -> dict[str, Any]:
@@ -23,12 +23,7 @@ def read_foot(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     if path.suffix.lower() == ".csv":
         return {"kind": "passive"} | _tables(path)
-    try:
-        foot = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise SpringfootError(f"{path} is no readable JSON file, and its name does not end in .csv") from None
-    if not isinstance(foot, dict):
-        raise SpringfootError(f"{path}: a foot must be an object in braces, got {foot!r:.40}")
+    foot = read_object(path, "foot (a JSON object, or a table in a file .csv)")
     return {"kind": "adaptive", "schedule": foot} if set(foot) == set(SPRINGS) else foot
 
 

@@ -6,11 +6,10 @@ pelvis_tilt is positive backward, so thigh = hip_flexion + pelvis_tilt. A coordi
 of inverse dynamics) is positive as the coordinate, ours opposite.
 """
 
-import csv
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,10 @@ from .arrays import NDArray
 from .cycle import Contacts
 from .errors import SpringfootError
 from .human import COLUMNS, FORCES
+from .text_table import Table, make_table, text_lines
 
+LONGEST_HEADER = 200
+"""Lines among which a header must end; chosen."""
 PELVIS = "pelvis_anterior_tilt_deg"
 """Column (forward positive) that makes a thigh of a hip where there is no thigh."""
 TIME_COLUMNS = ("time_s", "time")
@@ -48,55 +50,6 @@ class Trial:
     """Side -> events that the file itself names."""
     speed: float | None = None
     """Walking speed [m/s], where the file tells."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """Rows of text with a header; errors name file, line and column."""
-
-    name: str
-    columns: list[str]
-    rows: list[tuple[int, list[str]]]
-    """Line number in the file, cells."""
-
-    def has(self, column: str) -> bool:
-        """Whether there is such a column, not all empty."""
-        return column in self.columns and any(cells[self.columns.index(column)].strip() for _, cells in self.rows)
-
-    def numbers(self, column: str) -> NDArray:
-        """A column's cells, all finite numbers, or `SpringfootError`."""
-        at = self.columns.index(column)
-        return np.array([self._number(line, column, cells[at]) for line, cells in self.rows])
-
-    def ascending(self, column: str) -> NDArray:
-        """As `numbers`, each greater than the one before, or `SpringfootError`."""
-        values = self.numbers(column)
-        for (line, _), before, value in zip(self.rows[1:], values[:-1], values[1:], strict=True):
-            if value <= before:
-                raise self.error(line, column, f"{value:g} must be greater than {before:g} in the row before")
-        return values
-
-    def error(self, line: int, column: str, what: str) -> SpringfootError:
-        """The error that says in one line what is wrong with a cell."""
-        return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
-
-    def _number(self, line: int, column: str, cell: str) -> float:
-        try:
-            value = float(cell)
-        except ValueError:
-            raise self.error(line, column, f"must be a number, got {cell.strip()!r:.40}") from None
-        if not isfinite(value):
-            raise self.error(line, column, f"must be a finite number, got {cell.strip()}")
-        return value
-
-
-def read_csv(path: Path) -> Table:
-    """A CSV file: header, then rows of as many cells. Raises `SpringfootError` for anything else."""
-    try:
-        lines = list(enumerate(csv.reader(_text(path).splitlines(), strict=True), 1))
-    except csv.Error as error:
-        raise SpringfootError(f"{path.name} is not a CSV file: {error}") from None
-    return _table(path.name, lines)
 
 
 def csv_trial(table: Table) -> Trial:
@@ -138,12 +91,16 @@ def opensim_trial(path: Path) -> Trial:
     4, `/jointset/.../value`), the same with `_moment` behind [N m], forces `ground_force_vx` (forward), `_vy` (up) [N],
     right; left as `_l`, and forces as `1_ground_force_v*`, `ground_force_2_v*` or `ground_force_l_v*`.
     """
-    lines = _text(path).splitlines()
-    end = next((n for n, line in enumerate(lines[:200]) if line.strip().lower() == "endheader"), None)
-    if end is None:
+    lines, header = text_lines(path), []
+    for line in islice(lines, LONGEST_HEADER):
+        if line.strip().lower() == "endheader":
+            break
+        header.append(line)
+    else:
         raise SpringfootError(f"{path.name}: no line 'endheader', so not an OpenSim .mot or .sto file")
-    in_degrees = next((m[1].lower() for line in lines[:end] if (m := re.match(r"\s*inDegrees\s*=\s*(\w+)", line))), "")
-    table = _table(path.name, [(n, _split(line)) for n, line in enumerate(lines[end + 1 :], end + 2)])
+    in_degrees = next((m[1].lower() for line in header if (m := re.match(r"\s*inDegrees\s*=\s*(\w+)", line))), "")
+    end = len(header)
+    table = make_table(path.name, ((n, _split(line)) for n, line in enumerate(lines, end + 2)))
     names = table.columns
     if "time" not in names:
         raise SpringfootError(f"{path.name}, line {end + 2}: no column time")
@@ -196,28 +153,8 @@ def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:
     return legs
 
 
-def _coordinate(name: str) -> str:
-    """`/jointset/knee_r/knee_angle_r/value` -> `knee_angle_r`."""
-    return name.split("/")[-2] if name.startswith("/") and name.endswith("/value") else name
-
-
 def _split(line: str) -> list[str]:
     return line.strip().split("\t") if "\t" in line.strip() else line.split()
-
-
-def _table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
-    """Numbered lines of cells, the first the header, empty ones left out."""
-    filled = [(line, cells) for line, cells in lines if any(cell.strip() for cell in cells)]
-    if len(filled) < 2:
-        raise SpringfootError(f"{name} has no data: it needs a line of column names and rows of numbers")
-    (header, names), *rows = filled
-    columns = [_coordinate(column.strip()) for column in names]
-    if twice := next((column for column in columns if columns.count(column) > 1), None):
-        raise SpringfootError(f"{name}, line {header}: column {twice} stands twice")
-    for line, cells in rows:
-        if len(cells) != len(columns):
-            raise SpringfootError(f"{name}, line {line}: {len(cells)} cells, but {len(columns)} columns")
-    return Table(name=name, columns=columns, rows=rows)
 
 
 def refuse_absurd(name: str, curves: Mapping[str, NDArray]) -> None:
@@ -227,20 +164,3 @@ def refuse_absurd(name: str, curves: Mapping[str, NDArray]) -> None:
             raise SpringfootError(f"{name}: the {joint} reaches {np.degrees(largest):.0f} deg; degrees or radians?")
     if "knee" in curves and curves["knee"].mean() < 0:
         raise SpringfootError(f"{name}: the knee is bent backward; flexion must be positive")
-
-
-def existing(path: Path) -> Path:
-    """The path of a file that is there, or `SpringfootError`."""
-    if not path.is_file():
-        raise SpringfootError(f"no file {path}")
-    return path
-
-
-def _text(path: Path) -> str:
-    try:
-        text = existing(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        text = "\0"
-    if "\0" in text:
-        raise SpringfootError(f"{path.name} is not a text file")
-    return text

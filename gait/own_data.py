@@ -17,9 +17,10 @@ from .c3d_file import c3d_trial
 from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
 from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series
-from .motion_files import Series, Table, csv_trial, opensim_trial, our_columns, read_csv, refuse_absurd
+from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
 from .plausible import require_plausible
 from .strides import MeasuredWalk, cut_strides, together
+from .text_table import Table, read_csv
 
 ACCEPTED = {
     "speed": (0.1, 4.0, "m/s"),

@@ -52,6 +52,7 @@ def test_what_a_schedule_says_is_what_it_plays_on_each_side(folder, tmp_path):
     assert [int(row["percent"]) for row in rows] == list(range(101))
     for row in rows:
         row["ankle_right_stiffness_Nm_per_rad"] = "123.0"
+        del row["sha256"]
     with (tmp_path / "limp.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, rows[0].keys())
         writer.writeheader()
@@ -177,6 +178,11 @@ BAD = [
     (
         "a.json",
         "[1]",
+        "a.json is no table of finite states: it must be an object in braces",
+    ),
+    (
+        "a.json",
+        '{"states": 1}',
         "a.json is no table of finite states: an object with states, a list in which each has phase, ankle and toe, "
         "and these stiffness_Nm_per_rad, damping_time_s, equilibrium_deg",
     ),

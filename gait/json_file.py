@@ -1,0 +1,34 @@
+"""JSON files: of a size that fits into memory, whole if they are sealed, an object in braces."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from .errors import SpringfootError, printable
+from .seal import require_whole
+from .text_table import read_bytes
+
+MOST_BYTES = 2**23
+"""Largest JSON file that is read; chosen, hundreds of times a usual one: an object takes twenty times its text."""
+
+
+def read_object(path: Path, what: str) -> dict[str, Any]:
+    """The object in a JSON file; else `SpringfootError`, which says that the file is no `what`."""
+    content = read_bytes(path, MOST_BYTES)
+    require_whole(path, content)
+    try:
+        value = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise SpringfootError(f"{path} is no {what}: it is not JSON, {json_fault(error)}") from None
+    if not isinstance(value, dict):
+        raise SpringfootError(f"{path} is no {what}: it must be an object in braces")
+    return value
+
+
+def json_fault(error: Exception) -> str:
+    """What is wrong with a text that is not JSON, in a few words."""
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno}, column {error.colno}: {error.msg[0].lower()}{error.msg[1:]}"
+    if isinstance(error, UnicodeDecodeError):
+        return "it is no UTF-8 text"
+    return "it is nested too deeply" if isinstance(error, RecursionError) else printable(str(error))[:80]
