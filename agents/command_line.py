@@ -1,12 +1,57 @@
 """What every command does around its work: tell bad input in one line, return an exit code, name its results."""
 
+import io
+import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
 from pathlib import Path
+from typing import TypeVar
+
+import tyro
 
 from springfoot.gait.errors import SpringfootError, printable
 
 from .baselines import FROZEN, SCHEDULE_SUFFIXES
+
+Flags = TypeVar("Flags")
+_OURS = {
+    r"^Error parsing (--\S+): ": r"\1 ",
+    r"invalid literal for int\(\) with base 10: ": "must be a whole number, got ",
+    r"could not convert string to float: ": "must be a number, got ",
+    r"^Missing value for argument '(\S+)'. Expected 1 values": r"\1 needs a value",
+    r"^Missing value for argument '(\S+)'. Expected (\d+) values": r"\1 needs \2 values",
+}
+"""What tyro says, and what we say in its place."""
+
+
+def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flags:
+    """The flags on the command line, `words` or those of the process; help on standard output ends with 0.
+
+    Bad flags end with 2, after one line on standard error that says what is wrong with which.
+    """
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return tyro.cli(flags, args=words, prog=program)
+    except SystemExit as end:
+        if end.code == 2:
+            print(f"{program}: error: {printable(_of_box(said.getvalue()))}", file=sys.stderr)
+        raise
+
+
+def _of_box(text: str) -> str:
+    """What a box of tyro says, in one line: its first part, and the first flag that it thinks was meant."""
+    lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
+    parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))
+    if not text.startswith("╭"):  # where there is no UTF-8, the title is above a line of its own
+        parts = parts[1:] or parts
+    what = " ".join(parts[0].split())
+    for theirs, ours in _OURS.items():
+        what = re.sub(theirs, ours, what)
+    what = what[:1].lower() + re.sub(r"(?<!\.)\.$", "", what[1:])
+    meant = re.search(r"Perhaps you meant: (--\S+)", " ".join(" ".join(parts[1:]).split()))
+    return f"{what}; perhaps {meant[1]}?" if meant else what
 
 
 def exit_code(name: str, work: Callable[[], int | None]) -> int:

@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from numbers import Integral
 from typing import Any
 
@@ -10,8 +11,9 @@ from springfoot.envs.setting_checks import MOST_ENVIRONMENTS
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import MOST_COUNT, SpringfootError, quoted, require_count, require_number
 
-WIDEST, DEEPEST = 8192, 32
-"""Units of the widest hidden layer, and most of those layers; chosen."""
+WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
+"""Units of the widest hidden layer, most of those layers, and most weights between them; chosen: a training state is
+then at most of half the size that is read."""
 _LARGEST = 1e3  # rate of learning or clip range; chosen
 _SIDE_BY_SIDE = ("num_envs", "eval_episodes")
 
@@ -76,6 +78,10 @@ class TrainingConfig:
         if max(layers) > WIDEST or len(layers) > DEEPEST:
             raise SpringfootError(
                 f"hidden must be at most {DEEPEST} layers of at most {WIDEST} units, got {quoted(self.hidden)}"
+            )
+        if (between := sum(below * above for below, above in pairwise(layers))) > MOST_WEIGHTS:
+            raise SpringfootError(
+                f"hidden must have at most {MOST_WEIGHTS:,} weights between its layers, has {between:,}"
             )
 
 

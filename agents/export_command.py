@@ -10,7 +10,7 @@ import tyro
 from springfoot.gait.errors import SpringfootError
 
 from .baselines import has_feedback
-from .command_line import exit_code
+from .command_line import exit_code, parse
 from .foreign_policy import is_function
 
 
@@ -34,7 +34,7 @@ def export_main(arguments: Sequence[str] | None = None, program: str = "springfo
 
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
-    flags = tyro.cli(ExportFlags, args=arguments, prog=program)
+    flags = parse(ExportFlags, arguments, program)
     return exit_code(program, lambda: run_export(flags))
 
 

@@ -6,9 +6,11 @@ import inspect
 import json
 import textwrap
 from collections.abc import Mapping
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from types import NoneType
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
@@ -16,7 +18,10 @@ from springfoot.envs.feet import FOOT_SETTINGS
 from springfoot.envs.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.gait.errors import quoted
 from springfoot.gait.foot_file import read_foot
+from springfoot.gait.json_file import json_fault, read_object
 from springfoot.gait.own_data import read_gait
+
+from .flag_words import NOT_GIVEN, flag_of, spec
 
 
 def _field_help(settings: type) -> dict[str, str]:
@@ -36,16 +41,13 @@ def _read_json(words: list[str]) -> dict[str, Any]:
     """A dictionary from JSON text, or from the JSON file of that name."""
     text = words[0]
     if not text.lstrip().startswith("{"):
-        try:
-            text = Path(text).read_text(encoding="utf-8")
-        except (OSError, ValueError):
-            raise ValueError(f"{quoted(text)} is neither JSON text in braces nor the name of a JSON file") from None
+        if not Path(text).is_file():
+            raise ValueError(f"must be JSON text in braces or the name of a JSON file, got {quoted(text)}")
+        return read_object(Path(text), "setting in JSON")
     try:
         value = json.loads(text)
-    except RecursionError:
-        raise ValueError("the JSON is nested too deeply") from None
-    if not isinstance(value, dict):
-        raise ValueError("the JSON must be an object in braces")
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"must be JSON, but {json_fault(error)}: {quoted(text)}") from None
     return value
 
 
@@ -63,6 +65,10 @@ def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
     if Path(file).is_file():
         return read_gait(file, condition=condition, trust_units=trust_units).to_json()
     return read_gait(words, trust_units=trust_units).to_json()
+
+
+def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | None:
+    return None if may_be_none and words == ["None"] else _read_json(words)
 
 
 def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
@@ -85,39 +91,12 @@ _TRUST_FLAG = Annotated[
     tyro.conf.FlagCreatePairsOff[bool],
     tyro.conf.arg(help="Take the file of --human as it is, even if its units or signs look wrong."),
 ]
-_JSON_FLAG = tyro.constructors.PrimitiveConstructorSpec(
-    nargs=1,
-    metavar="JSON|FILE",
-    instance_from_str=_read_json,
-    is_instance=lambda value: value is None or isinstance(value, dict),
-    str_from_instance=lambda value: [json.dumps(value)],
-)
-
-
-_WORD_FLAG = tyro.constructors.PrimitiveConstructorSpec(
-    nargs=1,
-    metavar="WORD|JSON|FILE",
-    instance_from_str=_read_word_or_json,
-    is_instance=lambda value: value is None or isinstance(value, (str, dict)),
-    str_from_instance=lambda value: [value if isinstance(value, str) else json.dumps(value)],
-)
-
-
-def _metavar(kind: Any) -> str:
-    """How a value of this type is written on the command line."""
-    parts = get_args(kind)
-    if get_origin(kind) is Literal:
-        return "|".join(map(str, parts))
-    if get_origin(kind) is tuple:
-        return f"{_metavar(parts[0])} ..." if parts[1:] == (...,) else " ".join(map(_metavar, parts))
-    parts = [part for part in parts if part is not type(None)]
-    return "|".join(map(_metavar, parts)) if parts else kind.__name__.upper()
 
 
 def optional_flags(
     name: str, settings: type, defaults: Any, leave_out: tuple[str, ...] = (), themes: Mapping[str, str] = THEMES
 ) -> type:
-    """A dataclass with every field of `settings` as an optional flag: None, its default, means "not given".
+    """A dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
 
     The help of each flag is the docstring of the field, with its value in `defaults` (an instance). Fields that name a
     theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
@@ -129,7 +108,7 @@ def optional_flags(
         if item_name not in leave_out:
             annotation = _optional_flag(item_name, kind, help_of[item_name], getattr(defaults, item_name))
             its_group = themed.get(metadata[item_name].get("theme", ""), flags)
-            its_group.append((item_name, annotation, None))
+            its_group.append((item_name, annotation, NOT_GIVEN))
             if item_name in FILE_FLAGS:
                 its_group.append((TRUST, _TRUST_FLAG, False))
     for theme, inside in themed.items():
@@ -147,15 +126,16 @@ def _flags_class(name: str, flags: list[tuple[str, Any, Any]], doc: str | None) 
 def _optional_flag(name: str, kind: Any, text: str, default: Any) -> Any:
     """The annotation of a flag for a setting of this type, with its help and the default that is shown."""
     shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
-    hint = f"(default: {shown})"
-    if name == "human":
-        return Annotated[str | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar="FILE")]
-    parts = get_args(kind)
-    if dict in (get_origin(kind), *map(get_origin, parts)):
-        if str in parts and get_origin(kind) is not dict:
-            return Annotated[str | dict | None, _WORD_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
-        return Annotated[dict | None, _JSON_FLAG, tyro.conf.arg(help=text, help_behavior_hint=hint)]
-    return Annotated[kind | None, tyro.conf.arg(help=text, help_behavior_hint=hint, metavar=_metavar(kind))]
+    hint, parts = f"(default: {shown})", get_args(kind)
+    if name in FILE_FLAGS:
+        how = spec(lambda words: words[0], "FILE")
+    elif dict not in (get_origin(kind), *map(get_origin, parts)):
+        how = flag_of(kind)
+    elif str in parts and get_origin(kind) is not dict:
+        how = spec(_read_word_or_json, "WORD|JSON|FILE")
+    else:
+        how = spec(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
+    return Annotated[Any, how, tyro.conf.arg(help=text, help_behavior_hint=hint)]
 
 
 def given(flags: Any) -> dict[str, Any]:
@@ -165,9 +145,9 @@ def given(flags: Any) -> dict[str, Any]:
         value = getattr(flags, item.name)
         if dataclasses.is_dataclass(value):
             values |= given(value)
-        elif item.name in FILE_FLAGS and value is not None:
+        elif item.name in FILE_FLAGS and value is not NOT_GIVEN:
             values[item.name] = FILE_FLAGS[item.name](value, getattr(flags, TRUST))
-        elif item.name != TRUST and value is not None:
+        elif item.name != TRUST and value is not NOT_GIVEN:
             values[item.name] = _foot(value) if item.name in FOOT_SETTINGS else value
     return values
 

@@ -8,7 +8,6 @@ learner is installed.
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
-from math import inf
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -16,10 +15,11 @@ import numpy as np
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, quoted
 
 from .fingerprint import fingerprint, require_same
 from .foreign_policy import ForeignPolicy, function_policy, is_function, observation_rows, onnx_policy
+from .number_bounds import LARGEST_WEIGHT, require_bounded
 from .numpy_player import ACTIVATIONS
 from .tensor_file import read_tensors, write_tensors
 
@@ -109,6 +109,8 @@ class Policy:
             rows = ACTIVATIONS[self.activation](rows) if layer else rows
             # einsum adds in the same order for any N; BLAS does not, and a batch must equal its rows alone.
             rows = np.einsum("...i,oi->...o", rows, weight.astype(np.float64), optimize=False) + bias
+        if not np.isfinite(rows).all():  # as the widest and deepest of unbounded layers can make it
+            raise SpringfootError("the policy's output is not finite")
         return (np.tanh(rows) if self.output == "tanh" else rows.clip(-1.0, 1.0)).astype(np.float32)
 
 
@@ -180,8 +182,10 @@ def read_policy(name: str | Path) -> Policy:
         what = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {what}") from None
     known = activation in ACTIVATIONS and output in get_args(Output)
-    if not known or floor is None or not 0 <= floor < inf or not (clip is None or 0 < clip < inf):
-        raise SpringfootError(f"{name}: its header asks for a network this version does not have: {network}")
+    if not known or floor is None or not 0 <= floor <= LARGEST_WEIGHT:
+        raise SpringfootError(f"{name}: its header asks for a network this version does not have: {quoted(network)}")
+    if clip is not None and not 0 < clip <= LARGEST_WEIGHT:
+        raise SpringfootError(f"{name}: observation_clip must be in (0, {LARGEST_WEIGHT:g}] or null, is {clip:g}")
     if len(sizes) < 2 or (sizes[0], sizes[-1]) != (len(biped.observation_names), len(biped.action_names)):
         raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to action")
     _check_tensors(name, tensors, sizes)
@@ -212,5 +216,4 @@ def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list
         found = tensors[tensor_name].shape if tensor_name in tensors else "absent"
         if found != wanted:
             raise SpringfootError(f"{name}: {tensor_name} must be {wanted}, is {found}")
-    if (tensors["observation.variance"] < 0).any():
-        raise SpringfootError(f"{name}: observation.variance must not be negative")
+    require_bounded(name, tensors)

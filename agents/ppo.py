@@ -18,6 +18,7 @@ from springfoot.gait.errors import SpringfootError
 
 from .config import TrainingConfig
 from .conversion import actor_of, ignoring_unvaried
+from .number_bounds import require_bounded, require_moments
 from .policy import Policy
 
 
@@ -87,6 +88,9 @@ class Learner:
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Continue from what `state` returned; raise `SpringfootError` if it does not fit this learner."""
+        what = "the training state"
+        require_bounded(what, arrays)
+        require_moments(what, arrays, len(list(self.ppo.policy.parameters())))
         try:
             network = {name: value for name, value in arrays.items() if name.startswith("network.")}
             self.ppo.policy.load_state_dict(

@@ -21,8 +21,8 @@ from .files import write_atomically
 
 DIGEST = "sha256"
 """Name of the digest among the entries of the header."""
-MOST_BYTES = 2**30
-"""Largest file that is read [bytes]; chosen, a thousand times a usual one."""
+MOST_BYTES, MOST_HEADER = 2**27, 2**24
+"""Largest file, and largest header in it, that are read or written [bytes]; chosen, hundreds of times usual ones."""
 
 
 def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping[str, np.ndarray]) -> None:
@@ -30,7 +30,10 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
     json.dumps(header, allow_nan=False)  # raises for what is no JSON
     packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
     text = _text(header | {DIGEST: digest_of(header, packed)})  # one entry: safetensors has no order of several
-    write_atomically(path, to_safetensors(packed, {key: text}))
+    content = to_safetensors(packed, {key: text})
+    if len(content) > MOST_BYTES or len(text) > MOST_HEADER:
+        raise SpringfootError(f"{path} must have at most {MOST_BYTES:,} bytes, would have {len(content):,}")
+    write_atomically(path, content)
 
 
 def read_tensors(
@@ -44,6 +47,12 @@ def read_tensors(
     try:
         if (size := path.stat().st_size) > MOST_BYTES:
             raise SpringfootError(f"{path} must have at most {MOST_BYTES:,} bytes, has {size:,}")
+        with path.open("rb") as opened:
+            if (header_size := int.from_bytes(opened.read(8), "little")) > MOST_HEADER:
+                raise SpringfootError(
+                    f"{path} is not a .safetensors file: its header would have {header_size:,} bytes, at most "
+                    f"{MOST_HEADER:,} are read"
+                )
         with safe_open(path, framework="numpy") as file:
             text = (file.metadata() or {}).get(key)
             if text is None:

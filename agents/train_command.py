@@ -11,7 +11,7 @@ import tyro
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count
 
-from .command_line import exit_code
+from .command_line import exit_code, parse
 from .config import PRESETS, TrainingConfig
 from .files import require_new
 from .flags import given, optional_flags
@@ -51,7 +51,7 @@ def train_main(arguments: Sequence[str] | None = None, program: str = "train.py"
 
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
-    flags = tyro.cli(TrainFlags, args=arguments, prog=program)
+    flags = parse(TrainFlags, arguments, program)
     return exit_code(program, lambda: run_training(flags))
 
 

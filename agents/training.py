@@ -81,8 +81,6 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
     header, arrays = read_tensors(out / STATE, STATE_KEY, "training state", {"timesteps"})
-    if any(name.endswith(".var") and (values < 0).any() for name, values in arrays.items()):
-        raise SpringfootError(f"{out / STATE} is damaged: a variance is negative")
     done = header.get("timesteps")
     if type(done) is not int or done < 0:
         raise SpringfootError(f"{out / STATE} does not say how many timesteps it has done")

@@ -12,7 +12,7 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.agents.baselines import FROZEN, has_feedback
-from springfoot.agents.command_line import exit_code, policy_label
+from springfoot.agents.command_line import exit_code, parse, policy_label
 from springfoot.agents.files import next_free, whole_folder
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.envs.physics.simulation import MOST_THREADS
@@ -65,7 +65,7 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
-    flags = tyro.cli(EvaluateFlags, args=words, prog=program)
+    flags = parse(EvaluateFlags, words, program)
     return exit_code(program, lambda: run_evaluation(flags, program, shlex.join([*program.split(), *words])))
 
 

@@ -105,12 +105,10 @@ def study_main(arguments: Sequence[str]) -> int:
     if name not in STUDIES:
         print(f"springfoot study: error: no study {name!r:.60}; there are {', '.join(STUDIES)}", file=sys.stderr)
         return 2
-    import tyro
-
-    from springfoot.agents.command_line import exit_code
+    from springfoot.agents.command_line import exit_code, parse
 
     program = f"springfoot study {name}"
-    study = tyro.cli(study_class(name), args=words, prog=program)
+    study = parse(study_class(name), words, program)
     study = replace(study, command=shlex.join([*program.split(), *words]))
     return exit_code(program, lambda: study.run(name))
 

@@ -187,7 +187,6 @@ VECTORS = [
     ({"max_episode_steps": 10**20}, 'max_episode_steps must be a whole number >= 1 and <= 1000000000000, got 100000000000000000000'),
     ({"max_episode_steps": 1.5}, 'max_episode_steps must be a whole number >= 1, got 1.5'),
     ({"autoreset_mode": 1j}, "autoreset_mode must be one of 'NextStep', 'SameStep', 'Disabled', got 1j"),
-    ({"render_mode": np.ones(2)}, 'render_mode must be None or one of human, rgb_array, got array([1., 1.])'),
 ]
 TRAININGS = [
     ({"timesteps": 10**20}, 'timesteps must be a whole number >= 1 and <= 1000000000000, got 100000000000000000000'),
@@ -203,6 +202,7 @@ TRAININGS = [
     ({"update_steps": 10**20}, 'update_steps must be a whole number >= 64 and <= 1000000000000, got 100000000000000000000'),
     ({"log_std": 1e308}, 'log_std must be a finite number >= -5 and <= 2, got 1e+308'),
     ({"epochs": 1j}, 'epochs must be a whole number >= 1, got 1j'),
+    ({"hidden": (8192, 8192)}, 'hidden must have at most 2,097,152 weights between its layers, has 67,108,864'),
     ({"hidden": "64"}, "hidden must be one or more positive whole numbers, got '64'"),
     ({"hidden": 64}, 'hidden must be one or more positive whole numbers, got 64'),
     ({"hidden": None}, 'hidden must be one or more positive whole numbers, got None'),

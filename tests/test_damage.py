@@ -1,14 +1,17 @@
 """Files that were damaged are refused: every bit of a policy and of a training state counts."""
 
 import json
+import re
 import shutil
 
 import numpy as np
 import pytest
+from safetensors import safe_open
+from safetensors.numpy import load, save
 
 from springfoot.agents.config import TrainingConfig
-from springfoot.agents.policy import read_policy
-from springfoot.agents.tensor_file import DIGEST, MOST_BYTES, read_tensors
+from springfoot.agents.policy import ENTRIES, read_policy
+from springfoot.agents.tensor_file import DIGEST, MOST_BYTES, read_tensors, write_tensors
 from springfoot.agents.training import STATE, STATE_KEY, resume, train
 from springfoot.envs import BipedSettings
 from springfoot.gait import SpringfootError
@@ -64,14 +67,85 @@ def test_a_file_cut_short_or_too_large_is_refused(run, tmp_path):
             read_policy(path)
     with path.open("wb") as file:
         file.truncate(MOST_BYTES + 1)  # sparse: it takes no room
-    with pytest.raises(SpringfootError, match=r"must have at most 1,073,741,824 bytes, has 1,073,741,825"):
+    with pytest.raises(SpringfootError, match=r"must have at most 134,217,728 bytes, has 134,217,729"):
         read_policy(path)
 
 
-def test_a_policy_of_an_earlier_version_has_no_digest_and_is_read(run, tmp_path):
-    from safetensors import safe_open
-    from safetensors.numpy import load, save
+def test_a_header_that_says_it_is_huge_is_refused_unread(tmp_path):
+    path = tmp_path / "policy.safetensors"
+    with path.open("wb") as file:
+        file.write((2**26).to_bytes(8, "little"))
+        file.truncate(2**26 + 9)
+    with pytest.raises(SpringfootError, match="its header would have 67,108,864 bytes, at most 16,777,216 are read"):
+        read_policy(path)
 
+
+POLICY = [
+    ("layer.0.weight", 3e38, "layer.0.weight must be in [-1e+06, 1e+06], has 3e+38"),
+    ("layer.1.bias", -2e6, "layer.1.bias must be in [-1e+06, 1e+06], has -2e+06"),
+    ("observation.variance", -1e-3, "observation.variance must be in [0, 1e+30], has -0.001"),
+    ("observation.mean", 1e31, "observation.mean must be in [-1e+30, 1e+30], has 1e+31"),
+    ("layer.0.weight", np.nan, "layer.0.weight must be finite float32 or float64 numbers"),
+    ("layer.0.weight", None, "layer.0.weight must be (8, 43), is absent"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "said"), POLICY)
+def test_numbers_that_no_training_makes_are_refused_in_a_policy_whose_digest_fits(run, tmp_path, name, value, said):
+    header, tensors = read_tensors(run / "best.safetensors", "springfoot", "policy", ENTRIES)
+    path = _forged(tmp_path / "forged.safetensors", "springfoot", header, tensors, name, value)
+    with pytest.raises(SpringfootError) as caught:
+        read_policy(path)
+    assert str(caught.value) == f"{path}: {said}"
+
+
+@pytest.mark.parametrize("clip", [float("inf"), 1e300, 0.0, -1.0])
+def test_a_clip_that_clips_nothing_or_all_is_refused(run, tmp_path, clip):
+    header, tensors = read_tensors(run / "best.safetensors", "springfoot", "policy", ENTRIES)
+    header["network"]["observation_clip"] = clip
+    text = json.dumps({"springfoot": json.dumps(header)})  # JSON proper has no infinity: a digest cannot be written
+    path = tmp_path / "forged.safetensors"
+    path.write_bytes(save(tensors, json.loads(text)))
+    with pytest.raises(SpringfootError, match=r"observation_clip must be in \(0, 1e\+06\] or null, is"):
+        read_policy(path)
+
+
+STATES = [
+    ("network.action_net.weight", 3e38, "network.action_net.weight must be in [-1e+06, 1e+06], has 3e+38"),
+    ("adam.0.exp_avg_sq", -1.0, "adam.0.exp_avg_sq must be in [0, 1e+12], has -1"),
+    ("adam.1.exp_avg", None, "has no adam.1.exp_avg"),
+    ("adam.2.step", None, "has no adam.2.step"),
+    ("observation.var", -1.0, "observation.var must be in [0, 1e+30], has -1"),
+    ("return.count", -1.0, "return.count must be in [0, 1e+30], has -1"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "said"), STATES)
+def test_numbers_that_no_training_makes_are_refused_in_a_state(run, tmp_path, name, value, said):
+    header, tensors = read_tensors(run / STATE, STATE_KEY, "training state", {"timesteps"})
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    _forged(folder / STATE, STATE_KEY, header, tensors, name, value)
+    with pytest.raises(
+        SpringfootError, match=re.escape(f"the training state{'' if said[:3] == 'has' else ':'} {said}")
+    ):
+        resume(folder, 64)
+
+
+def _forged(path, key, header, tensors, name, value):
+    """The file with one number of `name` changed, or without it, and with a digest that fits."""
+    tensors = {each: values.copy() for each, values in tensors.items()}
+    if value is None:
+        del tensors[name]
+    else:
+        tensors[name][...] = np.where(
+            np.arange(tensors[name].size).reshape(tensors[name].shape) == 0, value, tensors[name]
+        )
+    write_tensors(path, key, header, tensors)
+    return path
+
+
+def test_a_policy_of_an_earlier_version_has_no_digest_and_is_read(run, tmp_path):
     content = (run / "best.safetensors").read_bytes()
     with safe_open(run / "best.safetensors", framework="numpy") as file:
         header = json.loads(file.metadata()["springfoot"])
