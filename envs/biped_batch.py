@@ -74,8 +74,7 @@ class Biped(ExactState):
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
         self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
         self._arguments["right_legs"] = right_legs
-        self.settings = settings
-        self.num_envs = num_envs
+        self.settings, self.num_envs = settings, num_envs
         self.dt = settings.step_seconds
         """Time of one step [s]."""
         self.windows_per_step = round(self.dt / CONTROL_WINDOW)
@@ -92,7 +91,7 @@ class Biped(ExactState):
         incline = slope_table(slope or slope_constants())
         self._legs = LegController(table, self.subjects, right)
         curves = [foot_curves(settings, c, w) for c, w in (*table, *right)]
-        planned, stiffness = (np.stack(each) for each in zip(*curves, strict=True))
+        planned, stiffness = map(np.stack, zip(*curves, strict=True))
         rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
         self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)
@@ -108,9 +107,7 @@ class Biped(ExactState):
         self.observation_low, self.observation_high = self._task.low, self._task.high
         self._random: list[np.random.Generator | None] = [None] * num_envs
         self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
-        self._no_reason = np.zeros(num_envs, int)
-        self._no_reason.flags.writeable = False
-        self._steps = self._task.rows["steps"]
+        self._no_reason, self._steps = np.broadcast_to(0, num_envs), self._task.rows["steps"]
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._rows = self.subjects.rows, self._task.rows, forces
         curves = self._springs.rest, self._springs.schedule, self._legs.table, incline
@@ -159,6 +156,10 @@ class Biped(ExactState):
     def command(self, ids: NDArray, speed: NDArray) -> None:
         """Change the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s], at the rate `speed_rate`."""
         self.subjects.command(ids, speed)
+
+    def push(self, force: NDArray) -> None:
+        """Push the trunks forward by `force` (N,) [N] until the next call; `push_newton` must be 0, else it rules."""
+        self._simulation.push(real_numbers("force", force))
 
     def reset(
         self,
@@ -253,10 +254,9 @@ class Biped(ExactState):
                 self._after_window(tick)
                 begin_window(rows, physics, tables, springs.options, walking)
         tick = self._roll(running, walking, ids)
-        outcome = room(self.num_envs)
+        observation, reward, terminated, truncated, values = outcome = room(self.num_envs)
         ended = end_step(rows, physics, tables, self._task.options, walking, running, outcome)
         self._after_window(tick)
-        observation, reward, terminated, truncated, values = outcome
         if self.settings.sensor_noise:
             seen = np.flatnonzero(running)
             self._noise.draw(seen, [self._random[index] for index in seen])

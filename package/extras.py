@@ -8,6 +8,7 @@ EXTRA_OF = {
     "cma": "train",
     "ezc3d": "c3d",
     "matplotlib": "evaluate",
+    "mjviser": "live",
     "onnx": "onnx",
     "onnxruntime": "onnx",
     "rich": "evaluate",
@@ -17,6 +18,7 @@ EXTRA_OF = {
     "torch": "train",
     "tqdm": "evaluate",
     "tyro": "evaluate",
+    "viser": "live",
 }
 """Name in an import statement -> extra."""
 

@@ -14,10 +14,11 @@ from springfoot.terminal import at_terminal
 if TYPE_CHECKING:
     from .study import Study
 
-HELP = """usage: springfoot {train,evaluate,export,study} ...
+HELP = """usage: springfoot {train,evaluate,live,export,study} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
+  springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
   springfoot export POLICY          write it as a file that runs without springfoot: ONNX, torch or NumPy
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
 
@@ -68,6 +69,10 @@ def _run(words: list[str]) -> int:
                 from springfoot.evaluation.evaluate_command import evaluate_main
 
                 return evaluate_main(rest, "springfoot evaluate")
+            case ["live", *rest]:
+                from springfoot.evaluation.live_command import live_main
+
+                return live_main(rest)
             case ["export", *rest]:
                 from springfoot.agents.export_command import export_main
 
@@ -91,7 +96,7 @@ def _run(words: list[str]) -> int:
             file=sys.stderr,
         )
         return 2
-    known = "there are train, evaluate, export and study"
+    known = "there are train, evaluate, live, export and study"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 

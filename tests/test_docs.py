@@ -14,6 +14,7 @@ from springfoot.agents.export_command import ExportFlags
 from springfoot.agents.train_command import TrainFlags
 from springfoot.evaluation import prepare
 from springfoot.evaluation.evaluate_command import EvaluateFlags
+from springfoot.evaluation.live_command import LiveFlags
 from springfoot.gait import human_gait
 from springfoot.studies.command import STUDIES, main, study_class
 
@@ -116,7 +117,7 @@ def test_every_command_that_a_document_names_is_understood(command):
     if program[:2] == ("springfoot", "study") and program[2:]:
         tyro.cli(study_class(program[2]), args=words)  # exits where it does not understand
     elif program[0] == "springfoot" and program[1] != "study" and words:
-        flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags}
+        flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags, "live": LiveFlags}
         tyro.cli(flags[program[1]], args=words)
     else:
         assert program[0] != "springfoot" or words in ([], ["--help"], ["NAME"])

@@ -1,0 +1,95 @@
+"""The live walk in a real browser: its sliders and buttons steer the simulation, and nothing else is loaded."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from springfoot.evaluation.live_command import live_main
+from springfoot.evaluation.live_session import LiveSession
+from springfoot.studies.command import main
+
+pytest.importorskip("viser", reason="the extra live")
+
+
+@pytest.fixture(scope="module")
+def view():
+    """A walk that goes on in a thread of its own, as the command's does in the main one."""
+    from springfoot.evaluation.live_view import LiveView
+
+    view = LiveView(LiveSession("pretrained"), port=0)
+    ended = threading.Event()
+    walker = threading.Thread(target=lambda: [view.run(0.2) for _ in iter(ended.is_set, True)])
+    walker.start()
+    yield view
+    ended.set()
+    walker.join()
+    view.stop()
+
+
+def reaches(condition, seconds=30.0):
+    """Whether something comes true while the walk goes on."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return condition()
+
+
+def test_in_a_browser_sliders_set_the_k_that_acts_and_buttons_push_and_restart(chromium, view):
+    session = view._session
+    tab = chromium.new_page(viewport={"width": 1280, "height": 1000})
+    told, asked = [], []
+    tab.on("pageerror", lambda error: told.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(view.address)
+    tab.get_by_text("K that acts").wait_for(timeout=60_000)
+
+    tab.get_by_role("combobox").first.click()
+    tab.get_by_role("option", name="by hand").first.click()
+    assert reaches(lambda: session.wishes.ankle_source == "by hand")
+    (number,) = (each for each in tab.get_by_role("textbox").all() if each.input_value() == "300")
+    number.fill("420")
+    number.press("Enter")
+    assert reaches(lambda: np.allclose(session.frame.stiffness[:, 0], 420.0))  # as it acted in the simulation
+    assert session.data().ctrl.reshape(2, 4, 2)[:, 2, 0] == pytest.approx([420.0, 420.0])
+    tab.get_by_role("cell", name="420").first.wait_for()  # and as the page tells
+
+    tab.get_by_role("button", name="Push").click()
+    assert reaches(lambda: 150.0 in [frame.push for frame in list(view._history)])
+    assert reaches(lambda: view._history[-1].push == 0.0)
+    frames = list(view._history)
+    begin = next(at for at, frame in enumerate(frames) if frame.push)
+    assert frames[begin + 4].speed - frames[begin - 1].speed > 0.1  # 150 N for 0.1 s on 63 kg are 0.24 m/s
+    tab.get_by_role("button", name="Restart").click()
+    assert reaches(lambda: session.frame.time < 2.0)
+    tab.close()
+    assert told == []
+    assert {url.split("/")[2] for url in asked if url.startswith("http")} == {view.address.split("/")[2]}
+
+
+def test_only_this_machine_reaches_it_unless_told_otherwise(view):
+    assert view.address.startswith("http://127.0.0.1:")
+    assert view._server.get_host() == "127.0.0.1"
+
+
+def test_the_command_says_where_and_ends_in_its_time(capsys):
+    assert main(["live", "schedule", "--port", "0", "--seconds", "1"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("Live at http://127.0.0.1:") and said[1].endswith("pictures a second")
+    assert len(said) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nonsense"], "no policy 'nonsense'"),
+        (["schedule", "--port", "70000"], "port must be a whole number >= 0 and <= 65535, got 70000"),
+        (["schedule", "--speed", "2.0"], "speed must be a finite number >= 0.6 and <= 1.8, got 2.0"),
+        (["schedule", "--seconds", "0"], "seconds must be a finite number > 0 s, got 0.0"),
+    ],
+)
+def test_bad_flags_are_one_line(words, said, capsys):
+    assert live_main(words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("springfoot live: error: ") and said in error and error.count("\n") == 1
