@@ -15,7 +15,7 @@ from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, find_contacts
 
 from .per_leg import differ, kinds_of
 from .recording import TICK, Recording
-from .stride_tally import WARM_UP
+from .stride_series import WARM_UP
 
 SIZE = (460, 420)
 """Width and height of a frame [px]."""

@@ -124,8 +124,8 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
             print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{name}, with the same flags")
     page = "report.html; " if flags.report else ""
     print(
-        f"\nResults: {out} ({page}metrics.json, gait_cycle.csv, strides.npz, gait.png, walk.gif;\n"
-        "stiffness_schedule.csv, finite_states.json, walk.mot, walk.sto, model.xml)"
+        f"\nResults: {out} ({page}metrics.json, gait_cycle.csv, every_stride.csv, strides.npz,\n"
+        "gait.png, walk.gif; stiffness_schedule.csv, finite_states.json, walk.mot, walk.sto, model.xml)"
     )
 
 

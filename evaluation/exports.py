@@ -19,7 +19,7 @@ from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.gait.arrays import NDArray
 
 from .recording import TICK, Recording
-from .stride_tally import mid_tick
+from .stride_series import mid_tick
 
 COORDINATES = dict(zip(JOINTS, ("hip_flexion", "knee_angle", "ankle_angle", "mtp_angle"), strict=True))
 """Joint -> OpenSim's coordinate, of the same sign."""

@@ -12,14 +12,16 @@ import numpy as np
 
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.model import JOINTS
-from springfoot.envs.settings import body_of, reference_gait, settings_to_json
+from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of, reference_gait, settings_to_json
+from springfoot.envs.task.reward import TERMS
+from springfoot.envs.timing import ACTION_STEP
 from springfoot.gait import scores as score
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
 
 from .open_loop import feedback
 from .per_leg import ANGLE_COLUMNS, asymmetry, differ, kinds_of, leg_numbers
-from .recording import TICK, Recording
+from .recording import REWARD, TICK, Recording
 from .stride_curves import StrideCurves
 from .stride_tally import StrideTally, tally_strides
 
@@ -117,6 +119,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "came_to_rest": None if settings.stop_at is None else tally.at_rest,
         "seconds_mean": float(recording.ticks.mean() * TICK),
         "return": score.mean_sd(recording.returns),
+        "reward_terms": _reward_terms(recording),
         "strides": {"count": both.count, "in_episodes_that_fell": tally.strides_of_falls},
         "speed_m_s": score.mean_sd(tally.speed),
         "step_length_m": _mean(tally.step_length),
@@ -154,6 +157,20 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "asymmetry": None if legs is None else asymmetry(legs),
         "contact_travel_m": _mean(tally.travel),
         "toe_clearance_m": float(np.median(tally.clearance)) if tally.clearance else None,
+    }
+
+
+def _reward_terms(recording: Recording) -> dict[str, dict[str, float]]:
+    """`reward_terms`: what each term brings to the return of an episode."""
+    terms = np.nan_to_num(recording.series[REWARD].astype(float))
+    weights = DEFAULT_WEIGHTS | recording.settings.reward_weights
+    alive = terms[..., TERMS.index("alive")]
+    return {
+        name: {
+            "weight": float(weights[name]),
+            "return_mean": float(weights[name] * (alive * terms[..., term]).sum(1).mean() * TICK / ACTION_STEP),
+        }
+        for term, name in enumerate(TERMS)
     }
 
 

@@ -21,7 +21,7 @@ from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import SPRINGS
 
 from .recording import TICK, Recording, record
-from .stride_tally import WARM_UP
+from .stride_series import WARM_UP
 
 MEAN_KNOTS = 50
 """Phases at which a mean K is given, linear between them: every 2 % of the stride, on which all corners of the tuned

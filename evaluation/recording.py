@@ -25,7 +25,8 @@ from springfoot.envs.settings import (
     settings_from,
     settings_to_json,
 )
-from springfoot.envs.step_result import Tick
+from springfoot.envs.step_result import INFO, Tick
+from springfoot.envs.task.reward import TERMS
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.com_plan import ComPlan
 from springfoot.gait.cycle import PERCENT
@@ -62,6 +63,9 @@ SERIES: dict[str, Callable[[Tick], NDArray]] = {
 
 Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.physics.model`.
 """
+REWARD = "reward"
+"""The series (TERMS,) that no tick knows: the reward's terms, unweighted, of the step that a tick is part of."""
+_TERMS = slice(INFO.index(f"reward/{TERMS[0]}"), INFO.index(f"reward/{TERMS[-1]}") + 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,7 +89,7 @@ class Recording:
     plan_zmp: NDArray
     """(101,) planned ZMP over percent of the step, x from the same ankle [m]."""
     series: dict[str, NDArray]
-    """Name -> (E, T, ...) float32, as listed in `SERIES`."""
+    """Name -> (E, T, ...) float32, as listed in `SERIES`, and `REWARD`."""
 
     @property
     def example(self) -> int:
@@ -105,7 +109,7 @@ class Recording:
             "settings": settings_to_json(self.settings),
             "seed": self.seed,
             "tick_s": TICK,
-            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS, "energy": ledger_entries()},
+            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS, "energy": ledger_entries(), "term": TERMS},
         }
         arrays: dict[str, Any] = {
             name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com", "plan_zmp")
@@ -117,9 +121,9 @@ def load_recording(path: str | Path) -> Recording:
     """The recording in a `strides.npz`; raises `SpringfootError` for any other file, and for one of another version."""
     header, arrays = read_arrays(Path(path), "strides.npz written by evaluate.py")
     try:
-        if missing := [name for name in ("plan_zmp", *SERIES) if name not in arrays]:
+        if missing := [name for name in ("plan_zmp", *SERIES, REWARD) if name not in arrays]:
             raise SpringfootError(f"it has no {missing[0]}: another version of springfoot wrote it; evaluate again")
-        series = {name: arrays.pop(name) for name in SERIES}
+        series = {name: arrays.pop(name) for name in (*SERIES, REWARD)}
         settings = settings_from(**header["settings"])
         recording = Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
         _require_whole(recording)
@@ -253,7 +257,7 @@ def _walk(
     length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
     ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
     reason = np.full(episodes, "", dtype="U64")
-    series: dict[str, NDArray] = {}
+    series: dict[str, NDArray] = {REWARD: np.full((episodes, length, len(TERMS)), np.nan, np.float32)}
     for first in range(0, episodes, BATCH):
         rows = slice(first, min(first + BATCH, episodes))
         count = rows.stop - first
@@ -275,8 +279,10 @@ def _walk(
         active = np.ones(count, bool)
         observation = biped.observe()
         while active.any():
+            begun = int(ticks[rows].max())
             result = biped.step(policy(observation), active=active)
             observation = result.observation
+            series[REWARD][rows, begun : int(ticks[rows].max())][active] = result.values[active, None, _TERMS]
             returns[rows][active] += result.reward[active]
             fell = active & result.terminated
             reason[rows][fell] = result.reasons[fell]

@@ -3,12 +3,14 @@
 metrics.json                    every number
 gait_cycle.csv, _left, _right   mean curves over percent of stride, and their spread
 strides.npz                     the 100 Hz series all of it is computed from
+every_stride.csv, .parquet      the curves of each stride
 gait.png, walk.gif              pictures
 stiffness_schedule.csv, finite_states.json   K and theta_eq as tables, which are policies again
 walk.mot, walk.sto, model.xml   the walk for OpenSim, the body for MuJoCo
 """
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
 
 from .animation import save_animation
+from .every_stride import write_every_stride
 from .exports import write_model, write_opensim
 from .gait_figure import save_gait_figure
 from .metrics import Gait
@@ -43,6 +46,7 @@ def write_report(folder: Path, recording: Recording, gait: Gait) -> None:
     recording.save(folder / "strides.npz")
     save_gait_figure(folder / "gait.png", recording, gait)
     save_animation(folder / "walk.gif", recording)
+    write_every_stride(folder, recording)
     write_schedules(folder, recording)
     write_opensim(folder, recording)
     write_model(folder / "model.xml", recording)
@@ -118,21 +122,35 @@ def _leg_table(metrics: dict[str, Any]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     for name in ("each leg", "", *(f"{side}: {kind}" for side, kind in metrics["feet"].items())):
         table.add_column(name, justify="left" if name == "each leg" else "right", no_wrap=True)
+    for row in leg_rows(metrics):
+        table.add_row(*row)
+    return table
+
+
+def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """What, unit, left and right leg; nothing where the feet are the same."""
+    if metrics["per_leg"] is None:
+        return []
     legs = metrics["per_leg"].values()
-    for label, unit, key, pattern in (
+
+    def row(label: str, unit: str, values: Iterable[float | None], pattern: str) -> tuple[str, str, str, str]:
+        left, right = (text_of(value, pattern) for value in values)
+        return label, unit, left, right
+
+    of_leg = (
         ("step length", "m", "step_length_m", ".3f"),
         ("stance", "%", "stance_percent", ".1f"),
         ("vertical force, peak 1", "BW", "vertical_peak1_bw", ".2f"),
         ("vertical force, peak 2", "BW", "vertical_peak2_bw", ".2f"),
         ("forward force", "BW", "forward_peak_bw", ".2f"),
-    ):
-        table.add_row(label, unit, *(text_of(leg[key], pattern) for leg in legs))
+    )
+    rows = [row(label, unit, (leg[key] for leg in legs), pattern) for label, unit, key, pattern in of_leg]
     for joint in ("knee", "ankle", "toe"):
-        table.add_row(f"{joint} range", "deg", *(text_of(leg["joint_range_deg"][joint], ".1f") for leg in legs))
+        rows.append(row(f"{joint} range", "deg", (leg["joint_range_deg"][joint] for leg in legs), ".1f"))
     for joint in ("hip", "knee", "ankle", "toe"):
         work = (leg["joint_work_J_kg"][joint]["positive"] for leg in legs)
-        table.add_row(f"{joint} work, positive", "J/kg", *(text_of(value, ".2f") for value in work))
-    return table
+        rows.append(row(f"{joint} work, positive", "J/kg", work, ".2f"))
+    return rows
 
 
 def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:

@@ -1,6 +1,6 @@
 """report.html: one page that opens offline, with the verdict in words and all that a walk's numbers come from.
 
-Its drawings are SVG by a small script of the page's own (`page.html`, 24 kB): the bundle that pip brings with plotly is
+Its drawings are SVG by a small script of the page's own (`page.html`, 26 kB): the bundle that pip brings with plotly is
 4.8 MB, and would not draw the body.
 """
 
@@ -14,11 +14,11 @@ from typing import Any
 from springfoot.agents.source import source
 from springfoot.envs.settings import reference_gait, settings_from
 
-from .criteria import LOADS_LIKE_PEOPLE, MOVES_LIKE_PEOPLE, WORKS_LIKE_PEOPLE, Criterion, unmet
+from .criteria import LOADS_LIKE_PEOPLE, MOVES_LIKE_PEOPLE, WORKS_LIKE_PEOPLE, Criterion, number_text, numbers
 from .metrics import Gait
 from .page_data import policy_data
 from .recording import Recording
-from .report import people_metrics, table_rows
+from .report import leg_rows, people_metrics, table_rows
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
 JUDGED_SPEED = 1.2
@@ -30,6 +30,7 @@ def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str
     data = {
         "policies": [policy_data(recording, gait) for recording, gait in walks],
         "tables": [table_rows(gait.metrics) for _, gait in walks],
+        "legs": [leg_rows(gait.metrics) for _, gait in walks],
         "made": _made(walks, command),
     }
     verdicts = "\n".join(_verdict(index, gait.metrics) for index, (_, gait) in enumerate(walks))
@@ -97,10 +98,11 @@ _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
 def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: bool) -> str:
     if not judged:
         return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
-    missed = unmet(dict(metrics), criteria)
+    values = numbers(dict(metrics))
+    missed = [f"{each.label or each.name}: {number_text(each, values)}" for each in criteria if not each.holds(values)]
     if not missed:
         return f"Meets all {len(criteria)} criteria of a human-like walk."
-    return f"Misses {len(missed)} of {len(criteria)} criteria: {'; '.join(missed)}."
+    return f"Misses {len(missed)} of {len(criteria)} criteria ({'; '.join(missed)})."
 
 
 def _text(value: float | None, pattern: str) -> str:

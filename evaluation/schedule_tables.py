@@ -23,7 +23,7 @@ from springfoot.gait.stiffness import SPRINGS
 
 from .open_loop import MEAN_KNOTS, decided, mean_over_phase
 from .recording import TICK, Recording
-from .stride_tally import WARM_UP
+from .stride_series import WARM_UP
 
 STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "late push-off", "swing")
 """Phases of the stride in which a finite-state controller holds K and theta_eq."""

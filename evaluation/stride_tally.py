@@ -10,48 +10,29 @@ import numpy as np
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import CONTACTS
-from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE, contact_material
+from springfoot.envs.physics.model import SIDES, contact_material
 from springfoot.envs.settings import body_of
+from springfoot.envs.task.reward import TERMS
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait import scores as score
 from springfoot.gait.arrays import NDArray
-from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, next_after, on_percent
+from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
 
-from .recording import TICK, Recording
+from .recording import REWARD, TICK, Recording
 from .stride_curves import StrideCurves
+from .stride_series import (
+    GAIT_CYCLE_COLUMNS,
+    WARM_UP,
+    foot_contacts,
+    mid_tick,
+    stride_curves,
+    strides_within,
+)
 
-WARM_UP = 3.0
-"""Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
 SHORTEST_SPEED = 1.0
 """An episode that ends earlier than this after the warm-up [s] does not count for the speed."""
 CLEARANCE_SWING = (0.25, 0.75)
 """Part of the swing over which toe clearance is measured [share of the swing]."""
-
-GAIT_CYCLE_COLUMNS = (
-    "hip_flexion_deg",
-    "knee_flexion_deg",
-    "ankle_dorsiflexion_deg",
-    "pelvis_anterior_tilt_deg",
-    "thigh_flexion_deg",
-    "shank_pitch_deg",
-    "foot_pitch_deg",
-    "hip_moment_Nm_per_kg",
-    "knee_moment_Nm_per_kg",
-    "ankle_moment_Nm_per_kg",
-    "hip_power_W_per_kg",
-    "knee_power_W_per_kg",
-    "ankle_power_W_per_kg",
-    "grf_vertical_bw",
-    "grf_forward_bw",
-    "mtp_dorsiflexion_deg",
-    "mtp_moment_Nm_per_kg",
-    "ankle_stiffness_Nm_per_rad",
-    "toe_stiffness_Nm_per_rad",
-    "ankle_equilibrium_deg",
-    "mtp_equilibrium_deg",
-)
-"""Columns of gait_cycle.csv. Hip: thigh to trunk; shank pitch: foot ahead; foot pitch: toes up. Moments are internal
-(actuator and joint damping), hip and knee extension, ankle and toe (mtp) plantarflexion positive; power: generation."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -68,6 +49,8 @@ class StrideTally:
     """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
     cop: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x",)))
     """CoP of both feet over the step, x from the same ankle [m]."""
+    reward: StrideCurves = field(default_factory=lambda: StrideCurves(names=TERMS))
+    """The reward's terms over the step, unweighted [-]."""
     strides_of_falls: int = 0
     """Strides of episodes that ended in a fall."""
     at_rest: int = 0
@@ -131,24 +114,13 @@ def _add_episode(
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
 
-    # Forces and moments are means over a tick, so they belong to its middle; states to its end.
     vertical = series["force"][..., 1].sum(axis=2)
-    contacts = [
-        find_contacts(vertical[:, side], TICK, CONTACT_THRESHOLD_BW * weight, first=TICK / 2)
-        for side in range(len(SIDES))
-    ]
+    contacts = foot_contacts(series, body)
     material = contact_material(body, series["contact"], series["base"], series["angle"])
     for side, foot in enumerate(contacts):
-        strides = foot.strides(after=steady[0])
-        strides = strides[strides[:, 2] <= steady[1]]
+        strides = strides_within(foot, steady)
         heel_strike, toe_off, end = strides.T
-        curves = np.concatenate(
-            [
-                on_percent(_states(series, side, body), heel_strike, end, TICK, first=TICK),
-                on_percent(_means(series, side, body), heel_strike, end, TICK, first=TICK / 2),
-            ],
-            axis=-1,
-        )[..., _ORDER]
+        curves = stride_curves(series, side, body, strides)
         tally.feet[side].add(curves)
         tally.both.add(curves)
         tally.strides_of_falls += fell * len(strides)
@@ -180,6 +152,7 @@ def _add_steps(
         tally.com.add(on_percent(relative, begin, end, TICK, first=TICK))
         cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
+        tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
         # Step length: where the other foot lands at the step's end, less where this one landed at its start.
         at = np.floor(np.stack([begin, end]) / TICK).astype(int)
         ankle = series["ankle"][..., 0]
@@ -212,52 +185,9 @@ def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     return _sums(flow, begin, end)
 
 
-def mid_tick(state: NDArray) -> NDArray:
-    """What is known at the ends of ticks (T, ...) at their middles."""
-    return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
-
-
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
     """(T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
     load, place = series["force"][..., 1], mid_tick(series["contact"][..., 0])
     total = load.sum(axis=(1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
         return (load * place).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)
-
-
-def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without those of `_means`."""
-    angle = np.degrees(series["angle"][:, side])
-    pitch = np.degrees(series["base"][:, 2])
-    thigh = angle[:, HIP] - pitch
-    shank = thigh - angle[:, KNEE]
-    equilibrium = np.degrees(series["equilibrium"][:, side])
-    return np.column_stack(
-        [
-            *(angle[:, joint] for joint in (HIP, KNEE, ANKLE)),
-            pitch,
-            thigh,
-            shank,
-            shank + angle[:, ANKLE],
-            angle[:, TOE],
-            series["stiffness"][:, side],
-            equilibrium,
-        ]
-    )
-
-
-def _means(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T, C) curves that are means over ticks, in the order of `_MEANS`."""
-    force = series["force"][:, side].sum(axis=1) / (body.mass * GRAVITY)
-    moment = -series["joint_torque"][:, side] / body.mass
-    power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass
-    return np.column_stack([force[:, ::-1], moment, power[:, :TOE]])
-
-
-_MEANS = (
-    *("grf_vertical_bw", "grf_forward_bw"),
-    *(f"{joint}_moment_Nm_per_kg" for joint in ("hip", "knee", "ankle", "mtp")),
-    *(f"{joint}_power_W_per_kg" for joint in ("hip", "knee", "ankle")),
-)
-_STATES = tuple(name for name in GAIT_CYCLE_COLUMNS if name not in _MEANS)
-_ORDER = [(_STATES + _MEANS).index(name) for name in GAIT_CYCLE_COLUMNS]

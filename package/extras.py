@@ -5,12 +5,15 @@ from contextlib import contextmanager
 
 EXTRA_OF = {
     "PIL": "evaluate",
+    "axe_playwright_python": "browser",
     "cma": "train",
     "ezc3d": "c3d",
     "matplotlib": "evaluate",
     "mjviser": "live",
     "onnx": "onnx",
     "onnxruntime": "onnx",
+    "playwright": "browser",
+    "pyarrow": "parquet",
     "rich": "evaluate",
     "safetensors": "evaluate",
     "stable_baselines3": "train",

@@ -29,7 +29,7 @@ from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_STIF
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import TICK, Recording, record
-from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError

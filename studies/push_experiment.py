@@ -18,7 +18,7 @@ from springfoot.envs.physics.model import ANKLE
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import TICK, Recording
-from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.identification import PhaseSpring, identify

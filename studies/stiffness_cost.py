@@ -30,7 +30,7 @@ from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import TICK, Recording, record
-from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd

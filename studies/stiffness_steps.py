@@ -19,7 +19,7 @@ from springfoot.envs.physics.model import JOINTS, LEFT, RIGHT, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.step_result import Tick
 from springfoot.evaluation.recording import TICK
-from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, on_percent, sample

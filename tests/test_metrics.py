@@ -8,10 +8,12 @@ import pytest
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot_contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.settings import BipedSettings
+from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import SERIES, Recording, load_recording, record, record_each
-from springfoot.evaluation.stride_tally import GAIT_CYCLE_COLUMNS, tally_strides
+from springfoot.evaluation.stride_series import GAIT_CYCLE_COLUMNS
+from springfoot.evaluation.stride_tally import tally_strides
 from springfoot.gait import GRAVITY, Body, human_gait
 from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT
 
@@ -82,6 +84,7 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None, **settings) -> Recording
         "phase": phase,
         "stiffness": np.broadcast_to([300.0, 40.0], (count, 2, 2)),
         "equilibrium": np.zeros((count, 2, 2)),
+        "reward": np.broadcast_to(np.arange(len(TERMS)) / 10, (count, len(TERMS))),
     }
     stacked = {name: np.stack([values] * episodes).astype(np.float32) for name, values in series.items()}
     ticks = np.full(episodes, count)

@@ -152,7 +152,11 @@ def test_links_of_the_index_page_lead_to_the_files_of_their_version(version, com
 
 
 def test_each_package_of_a_users_extra_is_known_by_its_import():
-    imports = {"pillow": "PIL", "stable-baselines3": "stable_baselines3"}
+    imports = {
+        "pillow": "PIL",
+        "stable-baselines3": "stable_baselines3",
+        "axe-playwright-python": "axe_playwright_python",
+    }
     extras = PROJECT["project"]["optional-dependencies"]
     users = {extra: map(Requirement, extras[extra]) for extra in set(extras) - {"bench", "dev", "gpu", "mjx"}}
     brought = {

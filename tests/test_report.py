@@ -22,7 +22,7 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import load_recording, record
 from springfoot.evaluation.report import people_metrics, print_table, write_report
-from springfoot.evaluation.stride_tally import GAIT_CYCLE_COLUMNS
+from springfoot.evaluation.stride_series import GAIT_CYCLE_COLUMNS
 from springfoot.gait import SpringfootError, human_gait
 from springfoot.studies.body_sweep import draw_pairs, walk_pairs
 
@@ -32,6 +32,7 @@ FILES = {
     "gait_cycle_left.csv",
     "gait_cycle_right.csv",
     "strides.npz",
+    "every_stride.csv",
     "gait.png",
     "walk.gif",
     "stiffness_schedule.csv",
@@ -40,6 +41,8 @@ FILES = {
     "walk.sto",
     "model.xml",
 }
+PARQUET = {"every_stride.parquet"}
+"""Where pyarrow is installed."""
 
 
 def walked(episodes=2, name="schedule", **settings):
@@ -65,7 +68,7 @@ def rows_of(path):
 
 
 def test_the_folder_holds_what_it_promises(folder, recording):
-    assert {path.name for path in folder.iterdir()} == FILES
+    assert {path.name for path in folder.iterdir()} - PARQUET == FILES
     metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert metrics == measure(load_recording(folder / "strides.npz")).metrics
 
@@ -101,7 +104,7 @@ def test_a_walk_that_only_falls_is_reported_too(tmp_path):
     gait = measure(fallen)
     assert gait.metrics["falls"] == 1 and gait.metrics["strides"]["count"] == 0
     write_report(tmp_path, fallen, gait)
-    assert {path.name for path in tmp_path.iterdir()} == FILES
+    assert {path.name for path in tmp_path.iterdir()} - PARQUET == FILES
     assert "nan" not in (tmp_path / "gait_cycle.csv").read_text(encoding="utf-8").lower()
     assert rows_of(tmp_path / "gait_cycle.csv")[50]["knee_flexion_deg"] == ""
     text = printed(gait.metrics)
@@ -199,7 +202,7 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
     assert code == 0
     assert str(Path("runs", "eval-random-2")) in out
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"eval-random-1", "eval-random-2"}
-    assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} == {*FILES, "report.html"}
+    assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} - PARQUET == {*FILES, "report.html"}
 
 
 def test_a_gait_that_was_measured_here_can_be_walked_after(command, folder, tmp_path):
@@ -285,6 +288,7 @@ def test_every_column_and_array_is_documented_and_nothing_else(folder):
     )
     with np.load(folder / "strides.npz") as file:
         assert sorted(documented("### `strides.npz`")) == sorted(file)
+    assert (*documented("### `every_stride.csv`"), *GAIT_CYCLE_COLUMNS) == (*rows_of(folder / "every_stride.csv")[0],)
     assert sorted(documented("### `stiffness_schedule.csv`")) == sorted(rows_of(folder / "stiffness_schedule.csv")[0])
     states = json.loads((folder / "finite_states.json").read_text(encoding="utf-8"))
     inside = {f"states[].{key}" for state in states["states"] for key in keys_of(state)}

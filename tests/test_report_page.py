@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from html.parser import HTMLParser
 from typing import Any
 
@@ -10,13 +9,13 @@ import numpy as np
 import pytest
 
 from springfoot.envs.settings import reference_gait
+from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.evaluate_command import evaluate_main
 from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.page_figure import foot_words
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 from springfoot.evaluation.report_page import spoken_verdict, write_page
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def walked(name, label=None, **given):
@@ -111,6 +110,59 @@ def test_its_figure_is_two_strides_from_a_left_heel_strike(page, walk):
     assert np.abs(np.array(figure["zmp"]) - np.array(figure["com"])[:, 0]).max() < 0.5
 
 
+def test_the_rewards_terms_are_drawn_over_the_step_and_add_up_to_the_return(page, walk):
+    recording, gait = walk
+    policy = Reader(page.read_text(encoding="utf-8")).data["policies"][0]
+    panels = {panel["title"]: panel for panel in policy["panels"]}
+    pose = panels["Reward term pose"]
+    assert pose["axis"] == "step" and pose["mean"] == pytest.approx(gait.tally.reward.mean("pose"), rel=1e-3)
+    assert panels["Reward term alive"]["mean"] == [1.0] * 101
+    brought = [term["return_mean"] for term in policy["metrics"]["reward_terms"].values()]
+    assert sum(brought) == pytest.approx(recording.returns.mean(), rel=1e-6)
+    stiffest = np.nanmax(recording.series["reward"][..., TERMS.index("stiffness")])
+    assert 0.0 < max(panels["Reward term stiffness"]["mean"]) <= stiffest
+
+
+FEET = {
+    "left_foot": {"kind": "passive", "ankle_stiffness": 500.0, "shank_mass_ratio": 0.6},
+    "right_foot": {"kind": "no_toe", "orthosis": {"ankle_stiffness": 100.0}},
+}
+
+
+def test_feet_of_other_kinds_are_told_drawn_and_measured_apart(tmp_path):
+    recording, gait = walked("pretrained", **FEET)
+    write_page(tmp_path / "report.html", [(recording, gait)])
+    data = Reader((tmp_path / "report.html").read_text(encoding="utf-8")).data
+    policy = data["policies"][0]
+    left, right = policy["figure"]["feet"]
+    assert left["words"].startswith("passive (ankle stiffness 500 N m/rad, shank mass ratio 0.6")
+    assert right["words"] == "no toe (in an orthosis with ankle stiffness 100 N m/rad)"
+    assert left["joints"] == ["device", "device"] and right["joints"] == ["muscles", "lock"]
+    assert (left["one_piece"], right["one_piece"]) == (False, True) and (left["orthosis"], right["orthosis"]) == (0, 1)
+    knee = next(panel for panel in policy["panels"] if panel["title"] == "Knee angle")
+    for side, leg in enumerate(knee["legs"]):
+        assert leg["mean"] == pytest.approx(gait.feet[side].mean("knee_flexion_deg"), rel=1e-3, abs=1e-3)
+    assert policy["loops"][0]["legs"][1]["x"] == pytest.approx(
+        gait.feet[1].mean("ankle_dorsiflexion_deg"), rel=1e-3, abs=1e-3
+    )
+    rows = {row[0]: row for row in data["legs"][0]}
+    assert rows["stance"][2:] == ([f"{leg['stance_percent']:.1f}" for leg in gait.metrics["per_leg"].values()])
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("rigid_toe", "rigid toe"),
+        ({"kind": "weak", "strength": 0.4}, "weak (strength 0.4 (of the sound leg))"),
+        ({"kind": "passive", "ankle_deg": 3.0}, "passive (ankle rest angle 3 deg)"),
+        ({"kind": "passive", "ankle_table": [[-10, 60], [10, -60]]}, "passive (ankle table of 2 points)"),
+        ({"kind": "drop", "orthosis": {}}, "drop (in an orthosis with no spring)"),
+    ],
+)
+def test_a_foot_in_words(setting, words):
+    assert foot_words(setting) == words
+
+
 def test_the_verdict_is_told_in_words(walk):
     said = spoken_verdict(walk[1].metrics)
     assert list(said) == ["Falls", "Speed", "Joints", "Forces", "Energy"]
@@ -168,51 +220,3 @@ def test_machines_get_one_json_object(tmp_path, monkeypatch, capsys):
     told = json.loads(capsys.readouterr().out)
     stand = [(tmp_path / "two" / name / "metrics.json").read_text(encoding="utf-8") for name in ("random", "constant")]
     assert told == {"folder": "two", "metrics": [json.loads(text) for text in stand]}
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; how to get one is the reason of the skip."""
-    how = "needs a browser: pip install playwright, and Debian's chromium (apt install chromium)"
-    driver = pytest.importorskip("playwright.sync_api", reason=how)
-    binary = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if binary is None:
-        pytest.skip(how)
-    with driver.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=binary, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.mark.parametrize("width", [1280, 390])
-def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scrubber(chromium, page, width):
-    tab = chromium.new_page(viewport={"width": width, "height": 900})
-    told, asked = [], []
-    tab.on("console", lambda message: told.append(message.text))
-    tab.on("pageerror", lambda error: told.append(str(error)))
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto(page.as_uri())
-    assert tab.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
-    cursors, walkers = tab.locator(".cursor"), tab.locator("svg[data-frame]")
-    assert walkers.count() == 2 and cursors.count() > 20
-
-    def at():
-        return [each.get_attribute("data-frame") for each in walkers.all()], cursors.first.get_attribute("data-percent")
-
-    (begin, _), first = at()
-    tab.keyboard.press("ArrowRight")
-    (after, _), second = at()
-    assert (begin, after) == ("0", "1") and float(second) > float(first)
-    tab.locator("#scrub").evaluate("each => { each.value = 250; each.dispatchEvent(new Event('input')) }")
-    frames, percent = at()
-    assert float(percent) == pytest.approx(50.0, abs=1.5) and int(frames[0]) > 40
-    dot = tab.locator("svg[aria-label^='Knee angle'] .dot").first
-    line = tab.locator("svg[aria-label^='Knee angle'] .cursor").first
-    assert float(dot.get_attribute("cx")) == pytest.approx(float(line.get_attribute("x1")), abs=2.0)
-    tab.keyboard.press(" ")
-    assert tab.locator("#play").inner_text() == "Pause"
-    while at()[0] == frames:  # it plays, so that this ends
-        tab.wait_for_timeout(50)
-    tab.keyboard.press("End")
-    tab.close()
-    assert told == [] and asked == [page.as_uri()]

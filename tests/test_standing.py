@@ -26,7 +26,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
-from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait import scores as score
 from springfoot.gait.body import GRAVITY, Body
 from springfoot.gait.errors import SpringfootError

@@ -9,7 +9,7 @@ import pytest
 from springfoot.envs.biped_batch import Biped
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
-from springfoot.evaluation.stride_tally import WARM_UP
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.studies import stiffness_cost as tradeoff
 from springfoot.studies.command import study_main
 from springfoot.studies.stiffness_cost import config_of, folder_of, knee, stiffness_cost
