@@ -1,8 +1,8 @@
 """A training run, new or resumed: a folder that holds its policies, its state and its results.
 
 `best.safetensors` and `last.safetensors` are policies, `state.safetensors` is what `resume` needs, `run.json` holds
-what is needed to repeat the run, and its results; beside them are TensorBoard's event files. Each file is written whole
-or not at all.
+what is needed to repeat the run, and its results; beside them are TensorBoard's event files, and pictures
+(`agents.run_pictures`). Each file is written whole or not at all.
 """
 
 import dataclasses
@@ -10,7 +10,7 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
@@ -27,12 +27,15 @@ from springfoot.gait.errors import SpringfootError, require_number
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
 from .fingerprint import fingerprint
-from .policy import BEST, LAST, RUN, read_policy, save_policy
+from .policy import BEST, LAST, RUN, Policy, read_policy, save_policy
 from .ppo import Learner
 from .progress import Progress
+from .run_pictures import Gallery, draw_run
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 from .source import source
 from .tensor_file import read_tensors, write_tensors
+from .training_callbacks import Onlooker, Onlookers, tell
+from .training_log import log_configuration
 
 STATE, STATE_KEY = "state.safetensors", "springfoot-training"
 """Name of a run folder's training state, and of its header's entry."""
@@ -42,25 +45,28 @@ PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "sta
 """Packages whose versions decide the result of a training."""
 
 
-def train(config: TrainingConfig, out: str | Path) -> dict[str, Any]:
+def train(config: TrainingConfig, out: str | Path, callbacks: Sequence[Onlooker] = ()) -> dict[str, Any]:
     """Train a new policy into the new folder `out`; return what `run.json` holds.
 
+    `callbacks` look on: stable-baselines3's, and functions of each periodic evaluation, a dictionary as in `run.json`.
+    One that returns False ends the training, with status `interrupted`.
     The training ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM. Raises
     `SpringfootError`, with nothing written, if `out` exists and is not an empty folder.
     """
     out = require_new(out)
-    run = _Run(config, out, {"sessions": [], "evaluations": []})
+    run = _Run(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks)
     make_folder(out)
     return run.learn()
 
 
-def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
+def resume(out: str | Path, timesteps: int | None = None, callbacks: Sequence[Onlooker] = ()) -> dict[str, Any]:
     """Continue the run in `out` with its saved settings; return what `run.json` holds.
 
     Args:
         out: the run's folder.
         timesteps: how many more to train after those already done, the step size falling linearly to the new end;
             None finishes an interrupted run.
+        callbacks: as for `train`.
 
     Environments start new episodes and noise is drawn again, both seeded by the run's seed and the steps done. Raises
     `SpringfootError` for a folder without a run, and for a run that this version cannot continue.
@@ -88,7 +94,7 @@ def resume(out: str | Path, timesteps: int | None = None) -> dict[str, Any]:
     total = config.timesteps if timesteps is None else done + timesteps
     if total <= done:
         raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
-    run = _Run(dataclasses.replace(config, timesteps=total), out, record, done)
+    run = _Run(dataclasses.replace(config, timesteps=total), out, record, done, callbacks)
     run.learner.restore(arrays)
     return run.learn()
 
@@ -118,8 +124,16 @@ def evaluate_returns(
 class _Run(BaseCallback):
     """One session of a run: PPO's callback, which logs, evaluates and saves between the updates."""
 
-    def __init__(self, config: TrainingConfig, out: Path, record: dict[str, Any], done: int = 0) -> None:
+    def __init__(
+        self,
+        config: TrainingConfig,
+        out: Path,
+        record: dict[str, Any],
+        done: int = 0,
+        callbacks: Sequence[Onlooker] = (),
+    ) -> None:
         super().__init__()
+        self._onlookers, self._gallery = callbacks, Gallery(out, done, config.timesteps)
         self._config, self._out, self._record = config, out, record
         threads = config.threads or processors()
         settings = settings_to_json(config.environment)
@@ -140,17 +154,23 @@ class _Run(BaseCallback):
         self._record |= {"config": config_to_json(self._config), "status": "running"}
         self._record["sessions"].append({"from_timesteps": self._first, **source(PACKAGES)})
         ppo.set_logger(configure(str(self._out), ["tensorboard"]))
+        log_configuration(ppo.logger, self._config)
         ppo.num_timesteps = self._first
+        onlookers = Onlookers(self, self._onlookers, self._stop)
         try:
             with self._progress, self._signals():
-                ppo.learn(self._config.timesteps - self._first, self, reset_num_timesteps=False)
+                ppo.learn(self._config.timesteps - self._first, onlookers, reset_num_timesteps=False)
             status = "interrupted" if self._stopping else "finished"
         finally:
             self._record["status"] = status
             self._save(policies=status != "failed")
             ppo.logger.close()
             self.learner.normalized.close()
+        draw_run(self._out, self._record, self._evaluation, EVALUATION_SEED)
         return self._record
+
+    def _stop(self) -> None:
+        self._stopping = True
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
@@ -175,6 +195,7 @@ class _Run(BaseCallback):
     def _on_rollout_start(self) -> None:
         self._trained = self.learner.ppo.num_timesteps
         self._sums, self._ended = {}, []
+        self._gallery.keep(self._trained, self._policy)
         past = self._record["evaluations"]
         due = not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval
         if due and not self._stopping:
@@ -201,11 +222,13 @@ class _Run(BaseCallback):
     def _on_training_end(self) -> None:
         if not self._stopping:
             self._trained = self.learner.ppo.num_timesteps
+            self._gallery.keep(self._trained, self._policy)
             self._evaluate()
+            self._stopping = False  # whatever an onlooker says, all is done
 
     def _evaluate(self) -> None:
         """Evaluate the policy on the fixed seeds, keep it if it is the best so far, and save."""
-        policy = self.learner.policy(self._fingerprint)
+        policy = self._policy()
         returns, seconds, fell = evaluate_returns(self._evaluation, policy, EVALUATION_SEED)
         entry = {
             "timesteps": self._trained,
@@ -225,6 +248,10 @@ class _Run(BaseCallback):
         self.logger.dump(self._trained)
         self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {len(returns)} fell")
         self._save()
+        self._stopping |= not tell(self._onlookers, entry)
+
+    def _policy(self) -> Policy:
+        return self.learner.policy(self._fingerprint)
 
     def _seconds(self) -> float:
         """Wall time of this session and the earlier ones [s]."""
@@ -235,7 +262,7 @@ class _Run(BaseCallback):
         best = max(self._record["evaluations"], key=lambda entry: entry["return_mean"], default=None)
         self._record |= {"timesteps": self._trained, "seconds": round(self._seconds(), 1), "best": best}
         if policies:
-            save_policy(self._out / LAST, self.learner.policy(self._fingerprint))
+            save_policy(self._out / LAST, self._policy())
             write_tensors(self._out / STATE, STATE_KEY, {"timesteps": self._trained}, self.learner.state())
         write_atomically(self._out / RUN, (json.dumps(self._record, indent=2) + "\n").encode())
 

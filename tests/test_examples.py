@@ -23,6 +23,10 @@ RUNS = {
         ["schedule", "--episodes", "1", "--seconds", "7", "--out", "schedule.png"],
         "schedule.png: 0 of 1 fell",
     ),
+    "search_with_optuna.py": (
+        ["--trials", "2", "--timesteps", "9000", "--seconds", "0.4"],
+        "best of 2 trials: learning rate ",
+    ),
 }
 
 
@@ -34,6 +38,8 @@ def test_every_example_is_run_and_short():
 @pytest.mark.parametrize("name", RUNS)
 def test_example_does_what_it_says(name, tmp_path):
     words, said = RUNS[name]
+    if name == "search_with_optuna.py":
+        pytest.importorskip("optuna", reason="needs Optuna: pip install optuna")
     command = [sys.executable, "-W", "error", str(EXAMPLES / name), *words]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

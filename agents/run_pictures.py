@@ -1,0 +1,152 @@
+"""What a run folder shows of a training: its learning curve, and a gallery of how the policy walked on the way.
+
+`learning_curve.png` is of the periodic evaluations in run.json. The policies after 0, 25, 50 and 100 % of the timesteps
+stand in `gallery/`, named by theirs; `gallery.png` has the first seconds of the same episode walked by each.
+"""
+
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.physics.foot_contact import CONTACTS
+from springfoot.envs.physics.model import HIP, KNEE
+from springfoot.envs.step_result import Tick
+from springfoot.gait import Body
+from springfoot.gait.arrays import NDArray
+
+from .files import write_atomically
+from .policy import Policy, read_policy, save_policy
+
+GALLERY_SHARES = (0.0, 0.25, 0.5, 1.0)
+"""Of the timesteps, after which a policy is kept; chosen."""
+SECONDS_SHOWN, SECONDS_BETWEEN = 6.0, 0.3
+"""How long each of the gallery walks at most, and the time between two of its figures [s]; chosen."""
+GALLERY, NEAR, FAR, TRUNK = "gallery", "#0b6e8f", "#9ec4d1", "#404e5c"
+
+
+class Gallery:
+    """The policies of a run folder that are kept on the way, from `done` to `total` timesteps."""
+
+    def __init__(self, out: Path, done: int, total: int) -> None:
+        self._folder = out / GALLERY
+        self._due = [share * total for share in GALLERY_SHARES if share * total >= done]
+
+    def keep(self, timesteps: int, policy: Callable[[], Policy]) -> None:
+        """Keep the policy after so many timesteps, if it is time; costs nothing otherwise."""
+        if self._due and timesteps >= self._due[0]:
+            self._due = [share for share in self._due if share > timesteps]
+            self._folder.mkdir(exist_ok=True)
+            save_policy(self._folder / f"{timesteps}.safetensors", policy())
+
+
+def draw_run(out: Path, record: dict[str, Any], biped: Biped, seed: int) -> None:
+    """Write `learning_curve.png` and `gallery.png` of the run in `out`.
+
+    Args:
+        out: the run's folder.
+        record: what its run.json holds.
+        biped: in which the kept policies walk, its first environment.
+        seed: of the episode they walk.
+    """
+    figures = {}
+    if record["evaluations"]:
+        figures["learning_curve.png"] = curve_figure(record)
+    kept = {int(path.stem): path for path in (out / GALLERY).glob("*.safetensors")}
+    if kept:
+        policies = {steps: read_policy(kept[steps]) for steps in sorted(kept)}
+        figures["gallery.png"] = gallery_figure(policies, record["config"]["timesteps"], biped, seed)
+    for name, figure in figures.items():
+        picture = BytesIO()
+        figure.savefig(picture, format="png", dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+        write_atomically(out / name, picture.getvalue())
+
+
+def curve_figure(record: dict[str, Any]) -> Any:
+    """A Matplotlib figure of the periodic evaluations of a run: return with its SD, and share of falls, over steps."""
+    from matplotlib.figure import Figure  # not above: it takes a while, and a training need not wait for it
+
+    steps, mean, sd, falls = (
+        np.array([entry[name] for entry in record["evaluations"]], float)
+        for name in ("timesteps", "return_mean", "return_sd", "falls")
+    )
+    share = 100 * falls / [entry["episodes"] for entry in record["evaluations"]]
+    best = record["best"]
+    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    returns, fallen = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    returns.fill_between(steps, mean - sd, mean + sd, color=NEAR, alpha=0.2, linewidth=0)
+    returns.plot(steps, mean, color=NEAR, marker="o", markersize=3)
+    returns.plot(best["timesteps"], best["return_mean"], "o", color=TRUNK, markersize=7, fillstyle="none")
+    returns.set(ylabel="return of an episode", title="Periodic evaluations: mean ± SD over episodes, ring: the best")
+    fallen.plot(steps, share, color="#d55e00", marker="o", markersize=3)
+    fallen.set(ylabel="episodes that fell (%)", xlabel="environment steps", ylim=(-5, 105))
+    fallen.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
+    return figure
+
+
+def gallery_figure(policies: dict[int, Policy], total: int, biped: Biped, seed: int) -> Any:
+    """A Matplotlib figure of the same episode walked by each of the `policies`, by timesteps; `total` are all."""
+    from matplotlib.figure import Figure
+
+    walks, total = [_walked(biped, policy, seed) for policy in policies.values()], max(total, *policies)
+    reach, top = np.max([figures.max(axis=(0, 1)) for figures, _ in walks], axis=0)
+    figure = Figure(figsize=(10.0, 2.2 * len(policies)), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(len(policies), 1))
+    for ax, steps, (figures, said) in zip(axes, policies, walks, strict=True):
+        ax.set_title(f"after {steps:,} steps ({100 * steps / total:.0f} %): {said}", loc="left", fontsize=9)
+        ax.axhline(0.0, color="#888888", linewidth=0.8)
+        for points in figures:
+            trunk, legs = points[:2], points[2:].reshape(2, -1, 2)
+            for leg, colour in zip(legs[::-1], (FAR, NEAR), strict=True):
+                ax.plot(*leg.T, color=colour, linewidth=1.2, solid_capstyle="round")
+            ax.plot(*trunk.T, color=TRUNK, linewidth=2.4, solid_capstyle="round")
+        ax.set(xlim=(-0.6, reach + 0.3), ylim=(-0.1, top + 0.1), aspect="equal", ylabel="m")
+        ax.tick_params(labelsize=8)
+    return figure
+
+
+def _walked(biped: Biped, policy: Policy, seed: int) -> tuple[NDArray, str]:
+    """Points (figures, 18, 2) [m] of the body as it walks, and in words how far it came."""
+    active, every, count = np.arange(biped.num_envs) == 0, round(SECONDS_BETWEEN / Biped.tick_dt), 0
+    figures: list[NDArray] = []
+    biped.reset(np.flatnonzero(active), [seed])
+    body = biped.subjects.bodies[0]
+
+    def see(tick: Tick) -> None:
+        nonlocal count
+        if count % every == 0:
+            figures.append(_points(tick, body))
+        count += 1
+
+    biped.on_tick = see
+    try:
+        observation, gone, why = biped.observe(), False, ""
+        while not gone and count * Biped.tick_dt < SECONDS_SHOWN:
+            result = biped.step(policy(observation), active=active)
+            observation, gone, why = result.observation, bool(result.terminated[0]), result.reasons[0]
+            if result.truncated[0]:
+                break
+    finally:
+        biped.on_tick = None
+    seconds = count * Biped.tick_dt
+    return np.stack(figures), f"{why} after {seconds:.1f} s" if gone else f"walks {seconds:.1f} s"
+
+
+def _points(tick: Tick, body: Body) -> NDArray:
+    """Hip and shoulder; then of either leg hip, knee, ankle, heel, ball, ankle, ball, toe tip."""
+    m = tick.measurement
+    x, z, pitch = m.base[0]
+    hip = np.array([x, z])
+    points = [hip, hip + body.trunk_length * np.array([np.sin(pitch), np.cos(pitch)])]
+    for side in range(2):
+        thigh = m.angle[0, side, HIP] - pitch
+        knee = hip + body.thigh_length * np.array([np.sin(thigh), -np.cos(thigh)])
+        ankle = knee + body.shank_length * np.array(
+            [np.sin(thigh - m.angle[0, side, KNEE]), -np.cos(thigh - m.angle[0, side, KNEE])]
+        )
+        heel, ball, toe = m.contact[0, side, : len(CONTACTS)]
+        points += [hip, knee, ankle, heel, ball, ankle, ball, toe]
+    return np.stack(points).copy()
