@@ -56,8 +56,8 @@ def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]
 
 
 def _write_parquet(path: Path, strides: Sequence[tuple[dict[str, Any], NDArray]]) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    import pyarrow as pa  # pyright: ignore[reportMissingImports]  # optional
+    import pyarrow.parquet as pq  # pyright: ignore[reportMissingImports]
 
     kinds = (pa.int32(), pa.string(), pa.int32(), pa.float64(), pa.float64(), pa.int8())
     columns = {

@@ -69,7 +69,7 @@ def test_a_walk_without_strides_has_a_table_without_rows(tmp_path):
     write_every_stride(tmp_path, walked("thesis_printed"))
     assert rows_of(tmp_path / "every_stride.csv") == []
     if (tmp_path / "every_stride.parquet").exists():
-        import pyarrow.parquet
+        import pyarrow.parquet  # pyright: ignore[reportMissingImports]  # optional
 
         assert pyarrow.parquet.read_table(tmp_path / "every_stride.parquet").num_rows == 0
 

@@ -297,5 +297,4 @@ def test_every_column_and_array_is_documented_and_nothing_else(folder):
 
 def test_every_column_of_a_pair_is_documented_and_nothing_else():
     policy, settings = prepare("schedule", {"episode_seconds": 0.1})
-    who = draw_pairs(settings, 1)
-    assert documented("### `pairs.csv`") == list(walk_pairs(policy, settings, who, name="schedule")[0])
+    assert documented("### `pairs.csv`") == list(walk_pairs(policy, settings, draw_pairs(settings, 1), name="x")[0])
