@@ -28,6 +28,8 @@ SHORTEST_PUSH_INTERVAL = 0.01
 _NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}  # NumPy's kinds
 MOST_ENVIRONMENTS = 1_000_000
 """Largest batch; chosen."""
+CONSTRUCTOR_ARGUMENTS = ("render_mode", "num_envs", "num_threads", "autoreset_mode")
+"""Of the environments, beside the settings: what a misspelled name may have meant."""
 
 
 class UnknownSettingError(SpringfootError, TypeError):
@@ -38,7 +40,7 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
     """Refuse what is none of `names`, the settings, as Python refuses an unknown keyword argument."""
     for name in given:
         if name not in names:
-            likely = get_close_matches(name, names, n=3, cutoff=0.5)
+            likely = get_close_matches(name, [*names, *CONSTRUCTOR_ARGUMENTS], n=3, cutoff=0.5)
             which = f"likely: {', '.join(likely)}" if likely else f"valid: {', '.join(names)}"
             raise UnknownSettingError(f"got an unexpected keyword argument {name!r}, which is no setting; {which}")
 

@@ -13,7 +13,7 @@ from springfoot.envs.physics.kernel import _fingerprint
 
 ENVS = Path(__file__).parents[1] / "envs"
 KERNELS = {
-    kernel.py_func.__name__: kernel
+    f"{path.stem}.{kernel.py_func.__name__}": kernel
     for path in sorted(ENVS.rglob("*.py"))
     if path.name != "__init__.py"
     for kernel in vars(
@@ -24,10 +24,11 @@ KERNELS = {
 
 
 @pytest.mark.parametrize("name", KERNELS)
-def test_a_kernel_stands_below_all_that_it_uses_and_takes_ten_arguments_at_most(name):
+def test_a_kernel_stands_below_all_that_it_uses_and_tells_its_ten_arguments_at_most(name):
     function = KERNELS[name].py_func
-    assert function.__qualname__ == f"{name}_{_fingerprint(function)}"  # nothing came to be known since
+    assert function.__qualname__ == f"{function.__name__}_{_fingerprint(function)}"  # nothing came to be known since
     assert function.__code__.co_argcount <= 10
+    assert function.__doc__
 
 
 CALLEE = """

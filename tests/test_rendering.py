@@ -56,6 +56,23 @@ for mode in sys.argv[1:]:
 print("nothing to say")
 """
 
+TWO_WINDOWS = """
+import copy
+import gymnasium as gym
+import numpy as np
+from springfoot.gait import SpringfootError
+env = gym.make("springfoot.envs:SegmentedFootBiped-v0", render_mode="human")
+env.reset(seed=0)
+other = copy.deepcopy(env)
+try:
+    other.step(np.zeros(4))
+except SpringfootError as error:
+    print(error)
+env.step(np.zeros(4))
+env.close()
+other.step(np.zeros(4))
+"""
+
 WINDOW = """
 import select
 import sys
@@ -127,6 +144,14 @@ def test_checkers_have_nothing_to_say_about_frames_without_a_screen():
 def test_checkers_have_nothing_to_say_about_windows(screen):
     environment, _ = screen
     assert run(CHECKERS, "human", **environment) == "nothing to say"
+
+
+def test_a_second_window_is_refused_while_there_is_one(screen):
+    environment, _ = screen
+    assert run(TWO_WINDOWS, **environment) == (
+        "cannot open a second window: a process has one at a time; close() the other environment of "
+        'render_mode="human", or use render_mode="rgb_array"'
+    )
 
 
 @pytest.mark.parametrize("end", [[], ["close"]], ids=["left open", "closed"])

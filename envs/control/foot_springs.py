@@ -201,7 +201,8 @@ def _hold(rows, bodies, state, feet, held):
     """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in the control of `state` (N, numbers).
 
     They act without delay, and the work of both changes is counted as that of `stiffen` and `move`. A device, and a
-    rest angle that is the foot's own, stay.
+    rest angle that is the foot's own, stay. `rows` (N,) of `CONTROL_ROW`, `bodies` (N,) of `BODY_ROW`, `feet` a
+    `FootLines`.
     """
     for i in range(len(rows)):
         if not held[i]:

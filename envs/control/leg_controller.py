@@ -57,6 +57,7 @@ def slope_table(constants: SlopeConstants) -> PhaseTable:
 
 @part
 def _between(low, high, weight):
+    """The number, or array, at `weight` in [0, 1] of the way from `low` to `high`."""
     return low + weight * (high - low)
 
 
@@ -119,6 +120,7 @@ def drive(rows, bodies, state, table, incline) -> None:
 
 @part
 def _load(force):
+    """Vertical force [N] on a foot whose contacts carry `force` (3, 2), forward and up."""
     return force[0, 1] + force[1, 1] + force[2, 1]
 
 

@@ -50,7 +50,10 @@ def read(table, place, phase, curves) -> None:
 
 @kernel
 def _read_all(table, place, phase, curves):
-    """Read phases (M,) into `curves` (M, C), an equal number of them at each of the places."""
+    """Read `phase` (M,) in [0, 1) into `curves` (M, C), an equal number of them at each of the places.
+
+    `table` (R, SAMPLES, C); `place` (P,) of `PLACE`.
+    """
     each = max(len(phase) // len(place), 1)
     for i in range(len(phase)):
         read(table, place[i // each], phase[i], curves[i])

@@ -126,6 +126,18 @@ def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
 
 @kernel
 def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
+    """Add the work of a window's physics steps to `work` and `energy` [J], and mean torques [N m] to `torque`.
+
+    Args:
+        parts: (N,) of `PARTS`.
+        steps: `StepRecord`.
+        control: (N, 2, 4, 2), K and K theta_eq held in the window [N m/rad, N m].
+        push: (N,) [N].
+        timestep: of the physics [s].
+        torque: (N, 2, 4).
+        work: (N, 2, 4, 2), positive and negative.
+        energy: (N,) of `LEDGER`.
+    """
     count = steps.velocity.shape[1]
     for i in range(len(parts)):
         own, entry, pitch = parts[i], energy[i], steps.pitch[i]
@@ -154,6 +166,11 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
 
 @kernel
 def _sum_changes(parts, control, held, angle, energy):
+    """Add to `energy` (N,) what springs gained as K and theta_eq changed under load [J].
+
+    `parts` (N,) of `PARTS`; `control` and `held` (N, 2, 4, 2), K and K theta_eq now and before [N m/rad, N m]; `angle`
+    (N, 2, 4) [rad].
+    """
     for i in range(len(energy)):
         for side in range(2):
             for joint in range(4):
@@ -179,7 +196,10 @@ def _part_energy(part, x, z, x_rate, z_rate, turn, spin):
 
 @kernel
 def _add_mechanical(parts, position, rate, energy):
-    """Planar kinematics as in `envs.physics.measurement`."""
+    """Set the kinetic and potential energy [J] of `energy` (N,), by kinematics as in `envs.physics.measurement`.
+
+    `parts` (N,) of `PARTS`; `position` and `rate` (N, 11), MuJoCo's coordinates [m, rad] and their rates.
+    """
     for i in range(len(energy)):
         own, total = parts[i], 0.0
         q, v = position[i], rate[i]

@@ -145,13 +145,15 @@ def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
 
 @part
 def _turned(offset, c, s):
+    """The offset (u, w) [m] in the world, (x, z), of a segment turned by an angle of cosine `c` and sine `s`."""
     return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c
 
 
 @part
 def _locate(segments, position, rate, m):
-    """Planar forward kinematics.
+    """Planar forward kinematics: fill the places and rates [m, m/s, rad, rad/s] of `m`, of `MEASURED`.
 
+    `segments` of `SEGMENTS`; `position` and `rate` (11,), MuJoCo's coordinates [m, rad] and their rates.
     A segment is turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its
     frame is then (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world, and moves at ds/dt (-z, x).
     """
@@ -196,6 +198,10 @@ def _above(ground, m):
 
 @part
 def _read_joints(segments, plant, m):
+    """Fill angle, velocity and torque (2, 4) [rad, rad/s, N m] of `m`, of `MEASURED`.
+
+    The torque is the spring's, within the limits of `segments`, at the state of `plant`, of `PLANT`.
+    """
     beta, torque = segments.beta, segments.torque
     for side in range(2):
         for joint in range(4):
@@ -208,6 +214,7 @@ def _read_joints(segments, plant, m):
 
 @part
 def _average(sensors, force):
+    """Mean of `sensors` (steps, 2, 3, 3) [N], each contact's force, into `force` (2, 3, 2), forward and up."""
     steps = len(sensors)
     for side in range(2):
         for contact in range(3):

@@ -24,14 +24,20 @@ NO_GL = (
     "cannot render: no OpenGL here ({}). Without a screen install libosmesa6 or libegl1 and set MUJOCO_GL=osmesa or "
     "MUJOCO_GL=egl before Python starts; everything but rendering works without"
 )
+ONE_WINDOW = (
+    'cannot open a second window: a process has one at a time; close() the other environment of render_mode="human", '
+    'or use render_mode="rgb_array"'
+)
 
 
 class Camera:
     """Draws bodies, one model at a time, in a window ("human") or into arrays ("rgb_array").
 
-    Open one window at a time in a process: each draws in a thread of its own, and GLFW is not made for several. Raises
-    `SpringfootError` with a hint where there is no OpenGL, or no screen for a window.
+    Raises `SpringfootError` with a hint where there is no OpenGL, or no screen for a window; and for a second window
+    in a process: each draws in a thread of its own, and GLFW is not made for several.
     """
+
+    _with_window: "weakref.ref[Camera] | None" = None
 
     def __init__(self, model: mujoco.MjModel, mode: str, frames_per_second: float) -> None:
         self._mode = mode
@@ -45,6 +51,10 @@ class Camera:
     def _open(self, model: mujoco.MjModel) -> None:
         self._model = model
         if self._mode == "human":
+            other = Camera._with_window and Camera._with_window()
+            if other and other._window is not None and other._window.is_running():
+                raise SpringfootError(ONE_WINDOW)
+            Camera._with_window = weakref.ref(self)
             self._data = mujoco.MjData(model)
             self._window, self._drawing = _open_window(model, self._data)
         else:

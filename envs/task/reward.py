@@ -81,6 +81,7 @@ def _near_zmp(scale, control, planned, m, forces, i):
 
 @part
 def _pose_error(scale, pitch, angle, people):
+    """Weighted squared distance [rad^2] of a leg's `angle` (4,) [rad] under a trunk at `pitch` [rad] from `people`."""
     error = 0.0
     for joint in range(4):
         lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
@@ -106,6 +107,7 @@ def _force_distance(scale, forces, i, side, people):
 
 @part
 def _positive_power(m):
+    """Power [W] of the joints of `m`, of `MEASURED`, that do positive work."""
     power = 0.0
     for side in range(2):
         for joint in range(4):
