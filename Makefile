@@ -7,7 +7,7 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help install walk test test-wheel test-sdist test-learners check format bench clean
+.PHONY: help install walk test test-wheel test-sdist test-learners check format bench feet clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -18,6 +18,7 @@ help:
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
+	@echo "make feet     docs/feet.md from committed people and policies; goes on after a stop; FULL=1: searches, trains"
 	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
@@ -94,6 +95,14 @@ check: install build/typing/made
 format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# What is measured, searched for and trained is kept in runs/feet: after a stop the same command goes on.
+FEET := $(BIN)/springfoot study
+feet: install
+	@set -ex; \
+	if [ -n "$(FULL)" ]; then $(FEET) adapt-all; cp runs/feet/adapted.json envs/control/adapted.json; fi; \
+	$(FEET) prosthesis $(if $(FULL),--train) --keep runs/feet/prosthesis.json --page docs/feet.md; \
+	$(FEET) orthosis --keep runs/feet/orthosis.json --page docs/feet.md
 
 bench: install
 	$(BIN)/python -m benchmarks.bench

@@ -29,7 +29,7 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     """
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
     numbers: list[Any] = []
-    for legs, walk in rows(biped.walks):
+    for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
         curves = (leg_curves(legs, walk), *foot_curves(biped.settings, legs, walk))
         numbers += [*asdict(legs).values(), *(curve[::50] for curve in curves)]
     return {

@@ -76,11 +76,13 @@ def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
     return _read_json(words) if words[0].lstrip().startswith("{") else words[0]
 
 
-def _foot(given: str | dict[str, Any]) -> str | dict[str, Any]:
-    """A foot as it is, or that of the file of that name."""
+def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
+    """The foot that a flag is given: as it is, or that of the file of that name."""
     return read_foot(given) if isinstance(given, str) and Path(given).is_file() else given
 
 
+FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]
+"""The type of a flag for a foot; `foot_given` makes a setting of what is given."""
 FILE_FLAGS = {"human": read_own_gait}
 """Settings whose flag is the name of a file, and what makes the setting of it."""
 
@@ -148,7 +150,7 @@ def given(flags: Any) -> dict[str, Any]:
         elif item.name in FILE_FLAGS and value is not NOT_GIVEN:
             values[item.name] = FILE_FLAGS[item.name](value, getattr(flags, TRUST))
         elif item.name != TRUST and value is not NOT_GIVEN:
-            values[item.name] = _foot(value) if item.name in FOOT_SETTINGS else value
+            values[item.name] = foot_given(value) if item.name in FOOT_SETTINGS else value
     return values
 
 

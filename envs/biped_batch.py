@@ -17,7 +17,7 @@ from .control.equilibrium import foot_curves
 from .control.foot_springs import FootSprings, draw_delay
 from .control.leg_constants import LegConstants, SlopeConstants, slope_constants
 from .control.leg_controller import LegController, slope_table
-from .control.reference_walk import reference_walks, rows
+from .control.reference_walk import rows, walks_of_legs
 from .control.standing import WALKING, Standing, off_phase
 from .control.subjects import Subjects
 from .exact_state import ExactState
@@ -80,11 +80,10 @@ class Biped(ExactState):
         self.windows_per_step = round(self.dt / CONTROL_WINDOW)
         """Control windows in one step."""
         self.on_tick: Callable[[Tick], None] | None = None
-        self.walks = reference_walks(settings, legs)
+        self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
         own = next(walk for walk in self.walks if walk.speed == settings.speed)
         self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
-        table = list(rows(self.walks))
-        right = list(rows(reference_walks(settings, right_legs))) if right_legs else []
+        table, right = list(rows(self.walks)), list(rows(self.right_walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
         feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * num_envs

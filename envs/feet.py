@@ -1,6 +1,7 @@
 """The feet that the settings `left_foot` and `right_foot` name: kinds, their numbers, and what makes a `Foot` of them.
 
-A foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind, in plain JSON values.
+A foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind, in plain JSON values;
+`adapted` says that the person has adapted to it (`envs.adapted`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any, NamedTuple
 from springfoot.gait.errors import SpringfootError, require_within
 from springfoot.gait.stiffness import StiffnessSchedule
 
+from .adapted import ADAPTED, adapted_setting
 from .physics.foot import LOCK, Feet, Foot, FootJoint, Spring
 
 FOOT_SETTINGS = ("left_foot", "right_foot")
@@ -93,8 +95,8 @@ def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
         return kind
     plain: dict[str, Any] = {"kind": kind}
     own = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
-    given = {key: number for key, number in value.items() if key not in ("kind", "orthosis", *own)}
-    more = *own, "orthosis"
+    given = {key: number for key, number in value.items() if key not in ("kind", "orthosis", ADAPTED, *own)}
+    more = *own, "orthosis", ADAPTED
     plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, more)
     for key in own:
         if value.get(key) is not None:
@@ -109,6 +111,8 @@ def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
                 f"{name}: orthosis must be a dictionary of {', '.join(ORTHOSIS_NUMBERS)}, got {orthosis!r:.60}"
             )
         plain["orthosis"] = _numbers(f"{name}: orthosis", "an orthosis", orthosis, ORTHOSIS_NUMBERS)
+    if value.get(ADAPTED) is not None:
+        plain[ADAPTED] = adapted_setting(name, value[ADAPTED])
     return kind if len(plain) == 1 else plain
 
 
@@ -161,6 +165,10 @@ def _numbers(
     }
 
 
+def _adapted(setting: str | Mapping[str, Any]) -> Any:
+    return None if isinstance(setting, str) else setting.get(ADAPTED)
+
+
 def kind_of(setting: str | Mapping[str, Any]) -> str:
     """The kind of a foot of the settings."""
     return setting if isinstance(setting, str) else setting["kind"]
@@ -170,6 +178,7 @@ def foot_of(setting: str | Mapping[str, Any]) -> Foot:
     """The foot of a setting in its plain form."""
     given: dict[str, Any] = {"kind": setting} if isinstance(setting, str) else dict(setting)
     kind, orthosis = given.pop("kind"), given.pop("orthosis", None)
+    given.pop(ADAPTED, None)  # of the person, not of the foot
     value: dict[str, Any] = _usual(KINDS[kind]) | given
     beside = (None, None) if orthosis is None else _springs(_usual(ORTHOSIS_NUMBERS) | orthosis)
     ankle, toe = (FootJoint(orthosis=spring) for spring in beside)
@@ -213,6 +222,9 @@ def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], li
         name: [foot_setting(name, foot) for foot in listed.get(name, [settings.get(name, "intact")] * num)]
         for name in FOOT_SETTINGS
     }
+    for name, feet in plain.items():
+        if any(_adapted(foot) != _adapted(feet[0]) for foot in feet):
+            raise SpringfootError(f"{name}: all feet of a list must have the same {ADAPTED}, as legs are of the batch")
     first = {name: feet[0] for name, feet in plain.items() if name in listed}
     pairs = [feet_of(*pair) for pair in zip(*plain.values(), strict=True)]
     return {**settings, **first}, pairs if listed else None

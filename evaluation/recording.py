@@ -1,6 +1,6 @@
 """Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -16,6 +16,7 @@ from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.control.subjects import DRAWN
 from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.physics.foot import Feet
 from springfoot.envs.physics.foot_contact import CONTACTS
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.simulation import MjModel
@@ -185,7 +186,8 @@ def record(
         raise SpringfootError(
             f"a recording is of one body at one speed in one world: {', '.join(DRAWN_SETTINGS)} must be None"
         )
-    ticks, returns, reason, series = _walk(policy, settings, {}, episodes, seed, threads, (model, legs), progress)
+    seeds, other = range(seed, seed + episodes), (model, legs, None)
+    ticks, returns, reason, series = walk_all(policy, settings, {}, seeds, threads, other, progress)
     return Recording(
         policy=name,
         settings=settings,
@@ -193,7 +195,7 @@ def record(
         ticks=ticks,
         returns=returns,
         fall_reason=reason,
-        **_planned(reference_walk_at(settings, settings.speed).plan),
+        **planned_course(reference_walk_at(settings, settings.speed).plan),
         series=series,
     )
 
@@ -219,7 +221,8 @@ def record_each(
         )
     columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
     given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
-    ticks, returns, reason, series = _walk(policy, settings, given, episodes, seed, threads, (None, None), progress)
+    seeds = range(seed, seed + episodes)
+    ticks, returns, reason, series = walk_all(policy, settings, given, seeds, threads, (None, None, None), progress)
     recordings = []
     for index in range(episodes):
         own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
@@ -232,26 +235,25 @@ def record_each(
                 ticks=ticks[row],
                 returns=returns[row],
                 fall_reason=reason[row],
-                **_planned(reference_walk_at(alone, alone.speed).plan),
+                **planned_course(reference_walk_at(alone, alone.speed).plan),
                 series={key: values[row] for key, values in series.items()},
             )
         )
     return recordings
 
 
-def _walk(
+def walk_all(
     policy: PolicyFunction,
     settings: BipedSettings,
     given: Mapping[str, NDArray],
-    episodes: int,
-    seed: int,
+    seeds: Sequence[int],
     threads: int,
-    other: tuple[MjModel | None, LegConstants | None],
+    other: tuple[MjModel | None, LegConstants | None, Sequence[Feet] | None],
     progress: Callable[[float], object],
 ) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
-    """Ticks, returns, fall reasons and series of E episodes, as in `Recording`; `given` as in `Biped.reset`; `other`
-    model and leg constants as in `record`."""
-    model, legs = other
+    """Ticks, returns, fall reasons and series of E episodes of `seeds`, as in `Recording`; `given` as in `Biped.reset`;
+    `other` model and leg constants as in `record`, and the feet of each episode."""
+    (model, legs, feet), episodes = other, len(seeds)
     require_recordable(settings, episodes)
     step = settings.step_seconds
     length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
@@ -261,10 +263,9 @@ def _walk(
     for first in range(0, episodes, BATCH):
         rows = slice(first, min(first + BATCH, episodes))
         count = rows.stop - first
-        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs])
-        biped.reset(
-            np.arange(count), [seed + first + i for i in range(count)], None, {k: v[rows] for k, v in given.items()}
-        )
+        worn = feet and feet[rows]
+        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs], feet=worn)
+        biped.reset(np.arange(count), list(seeds[rows]), None, {k: v[rows] for k, v in given.items()})
 
         def keep(tick: Tick, rows: slice = rows) -> None:
             index = int(ticks[rows].max())
@@ -291,7 +292,7 @@ def _walk(
     return ticks, returns, reason, series
 
 
-def _planned(plan: ComPlan) -> dict[str, NDArray]:
+def planned_course(plan: ComPlan) -> dict[str, NDArray]:
     """`plan_com` and `plan_zmp` of a `Recording`."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)

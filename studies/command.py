@@ -43,6 +43,13 @@ STUDIES = {
     "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
     "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
     "leg-sets": ("leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
+    "adapt": ("adapt.Adapt", "How does a person walk who has adapted to a foot? (searches for minutes)"),
+    "adapt-all": (
+        "adapt_all.AdaptAll",
+        "Do the searches of all adapted feet find the same again? (searches for hours)",
+    ),
+    "prosthesis": ("prosthesis.Prosthesis", "What are rigid, passive and adaptive feet worth to who wears them?"),
+    "orthosis": ("orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
     "slope-tuning": ("slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
     "thesis": ("thesis_page.Thesis", "How do the thesis's figures and claims stand against people?"),
 }

@@ -1,7 +1,7 @@
 """How sure a number is: intervals of means and shares, and tests of two rows that walked the same episodes."""
 
 import numpy as np
-from scipy.stats import binomtest, bootstrap
+from scipy.stats import binomtest, bootstrap, t
 
 from springfoot.gait.arrays import NDArray
 
@@ -28,6 +28,15 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
         rng=np.random.default_rng(0),
     )
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
+    """Student's interval of the mean of a few values (n,), as of training seeds; of one value, everything."""
+    if len(values) < 2:
+        return -np.inf, np.inf
+    mean, half = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    half *= float(t.ppf(0.5 + 0.5 * level, len(values) - 1))
+    return mean - half, mean + half
 
 
 def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:

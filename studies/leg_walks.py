@@ -13,6 +13,7 @@ from springfoot.envs.control.foot_springs import action_of, stiffness_ranges
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.physics.foot import Feet
 from springfoot.envs.physics.measurement import Measurement
 from springfoot.envs.physics.model import contact_material
 from springfoot.envs.settings import BipedSettings
@@ -44,10 +45,13 @@ def walk(
     foreign: Sequence[NDArray] = FOREIGN,
     seconds: float = SECONDS,
     watched: bool = True,
+    right: Sequence[LegConstants] | None = None,
+    feet: Sequence[Feet] | None = None,
 ) -> tuple[NDArray, Biped, list[Tick]]:
     """Walk candidates equally often, one walk for each of `seeds`, at an equilibrium that is the share `ease` planned.
 
-    The last walks of each have the stiffnesses `foreign`, the others the schedule.
+    The last walks of each have the stiffnesses `foreign`, the others the schedule. `right` are the constants of each
+    candidate's right leg, if it has its own, and `feet` each candidate's, in place of those of the settings.
 
     Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end, and standing
     still counts as one; the core; and, if `watched`, every tick.
@@ -55,14 +59,18 @@ def walk(
     num, walks = len(seeds), len(seeds) // len(candidates)
     variant = np.repeat(np.arange(len(candidates)), walks)
     rest = _eased(settings, candidates, ease) if ease else None
-    biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest)
+    worn = feet and [feet[index] for index in variant.tolist()]
+    biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest, feet=worn, right_legs=right)
     biped.reset(np.arange(num), seeds)
     role = np.tile(np.arange(walks), len(candidates)) - (walks - len(foreign))
     ticks: list[Tick] = []
     biped.on_tick = ticks.append if watched else None
     active, walked = np.ones(num, bool), np.zeros(num)
     for _ in range(round(seconds / biped.dt)):
-        action = action_of(biped.scheduled_stiffness(), settings, biped.body)
+        if settings.action_mode == "residual":
+            action = np.zeros((num, 2, 2))
+        else:
+            action = action_of(biped.scheduled_stiffness(), settings, biped.body)
         for index, stiffness in enumerate(foreign):
             place = (biped.leg_phase[role == index] * len(GRID)).astype(int)
             action[role == index] = action_of(stiffness[place], settings, biped.body)

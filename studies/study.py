@@ -74,7 +74,7 @@ class Study:
     def write_page(self, page: Path, answer: Answer) -> None:
         """Write the answer's sections, each with the command that made it."""
         for name, text in answer.sections.items():
-            write_section(page, name, f"{text}\n\nMade by `{_without_places(self.command)}`.")
+            write_section(page, name, f"{text}\n\nMade by `{without_places(self.command)}`.")
 
     def run(self, name: str) -> int:
         """Do the study, print its answer, write its files and its page; `name` is that of its command.
@@ -111,7 +111,7 @@ class Study:
         return 1 if answer.failed else 0
 
 
-def _without_places(command: str) -> str:
+def without_places(command: str) -> str:
     """A command without the folder and the page it writes to, which are somebody's own."""
     words = shlex.split(command)
     for flag in ("--out", "--page"):

@@ -22,9 +22,9 @@ PASSIVE = {"kind": "passive", "ankle_stiffness": 400}
 KIND_LIST = ", ".join(map(repr, KINDS))
 OF_A_SPRING = "ankle_stiffness, ankle_deg, toe_stiffness, toe_deg, damping_time"
 RATIOS = "shank_mass_ratio, shank_com_ratio, shank_inertia_ratio, foot_mass_ratio, foot_inertia_ratio"
-OF_A_FOOT = f"{RATIOS}, orthosis"
-OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis"
-OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis"
+OF_A_FOOT = f"{RATIOS}, orthosis, adapted"
+OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis, adapted"
+OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis, adapted"
 
 WRONG_KINDS: list[tuple[Any, str]] = [
     ("rigd", f"right_foot must be one of {KIND_LIST}, got 'rigd'"),

@@ -20,8 +20,10 @@ from springfoot.gait.human import HumanGait
 from springfoot.gait.kinetics import planned_moments
 from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
 
+from ..physics.model import LEFT, RIGHT
 from ..settings import BipedSettings, body_of, reference_gait
-from .leg_constants import LegConstants, leg_constants
+from .adapted_legs import adapted_foot, person_constants
+from .leg_constants import LegConstants
 from .phase_table import GRID
 from .standing import SLOW_SPEED
 
@@ -54,17 +56,30 @@ class ReferenceWalk:
     """(SAMPLES, 3) moments of hip, knee and ankle to feed forward [N m], extension and plantarflexion positive."""
 
 
-def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[ReferenceWalk, ...]:
-    """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first.
+def walks_of_legs(
+    settings: BipedSettings, left: Sequence[LegConstants] | None = None, right: Sequence[LegConstants] | None = None
+) -> tuple[tuple[ReferenceWalk, ...], tuple[ReferenceWalk, ...]]:
+    """The walks of both legs, and those of the right leg where it has constants of its own, else none.
+
+    `left` and `right` are leg constants in place of the committed ones, as in `reference_walks`.
+    """
+    own = right or (left is None and adapted_foot(settings))
+    return reference_walks(settings, left), reference_walks(settings, right, RIGHT) if own else ()
+
+
+def reference_walks(
+    settings: BipedSettings, legs: Sequence[LegConstants] | None = None, side: int = LEFT
+) -> tuple[ReferenceWalk, ...]:
+    """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first, with the leg of `side`.
 
     `legs` are leg constants in place of the committed ones, and the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
     """
-    return tuple(reference_walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
+    return tuple(reference_walk_at(settings, float(speed), legs, side) for speed in tabulated_speeds(settings))
 
 
 def reference_walk_at(
-    settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None
+    settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None, side: int = LEFT
 ) -> ReferenceWalk:
     """The walk of the settings' body at `speed` [m/s]."""
     body = body_of(settings)
@@ -75,7 +90,7 @@ def reference_walk_at(
     else:
         plan = plan_walk(body, speed, settings.cadence, human=human)
     equal_speed = speed / sqrt(body.length_scale)
-    legs = legs or [leg_constants(settings.equilibrium, settings.cadence, equal_speed, settings.feedforward)]
+    legs = legs or [person_constants(settings, equal_speed, side)]
     return ReferenceWalk(
         body=body,
         speed=speed,
@@ -102,7 +117,7 @@ def _plans_moments(plan: WalkPlan) -> NDArray:
 
 def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, ReferenceWalk]]:
     """The rows of a table over variants and speeds, in order: speeds within variants."""
-    for variant, walk in product(range(len(walks[0].constants)), walks):
+    for variant, walk in product(range(len(walks[0].constants) if walks else 0), walks):
         yield walk.constants[variant], walk
 
 

@@ -1,0 +1,155 @@
+"""Which spring beside the right ankle helps a weak calf, and which a drop foot?
+
+    springfoot study orthosis --page docs/feet.md
+
+Nobody adapts here: legs and both feet's stiffness are those of sound feet (`pretrained`), so that all that changes is
+the muscle and the spring. The stiffness of an orthosis is in N m/deg, as Waterval et al. (2019) measured them.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.agents.files import csv_text
+from springfoot.envs.feet import foot_of
+from springfoot.envs.physics.foot import Spring
+from springfoot.envs.physics.model import ANKLE, RIGHT, damping_times
+from springfoot.envs.settings import body_of
+from springfoot.evaluation.metrics import measure
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import TICK, Recording
+from springfoot.evaluation.recording_feet import record_feet
+from springfoot.evaluation.stride_tally import WARM_UP
+
+from .foot_walks import Kept, numbers_of
+from .orthosis_page import best_springs, draw_drop, draw_weak, drop_text, weak_text
+from .study import Answer, OnProgress, WalkingStudy
+
+PER_DEG = 180.0 / np.pi
+"""N m/rad in 1 N m/deg."""
+WEAK_SPRINGS = (0.0, 0.9, 1.8, 2.7, 3.6, 4.9, 6.2, 7.4, 8.7)
+"""Stiffness of an orthosis for a weak calf [N m/deg]; Waterval et al. (2019) tried 0.9 to 8.7."""
+STRENGTHS = (0.15, 0.2, 0.25, 0.3)
+"""Strength of the calf over a sound one's; a sound walk at 1.2 m/s asks for 0.4."""
+MASSES = (50.0, 63.0, 80.0)
+"""[kg] at 1.70 m."""
+WALKED_SPEEDS = (0.8, 1.2, 1.6)
+"""[m/s]."""
+SWING_SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
+"""Stiffness of an orthosis for a drop foot [N m/rad]."""
+SWING_RESTS = (-5.0, 0.0, 5.0, 10.0)
+"""Its rest angle, dorsiflexion positive [deg]."""
+EFFICIENCY = {"positive": 0.25, "negative": 1.2}
+"""Mechanical work of muscles over the energy it takes (Margaria 1968, Int. Z. angew. Physiol. 25:339)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orthosis(WalkingStudy):
+    """Walk with a weak calf, or a drop foot, and an orthosis of every stiffness."""
+
+    episodes: int = 4
+    """Episodes of each spring, and with a drop foot as many pushed."""
+    seconds: float = 12.0
+    """Length of each."""
+    policy: str = "pretrained"
+    """Who sets the stiffness of both feet."""
+    push_newton: float = 150.0
+    """Pushes of the walks with a drop foot [N]."""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File in which the numbers of each body, speed and strength are kept, to go on after a stop."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "keep": None}
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls."""
+        weak = len(list(self._weak_cells())) * len(WEAK_SPRINGS)
+        drop = 2 * len(list(self._speeds())) * len(SWING_SPRINGS) * len(SWING_RESTS)
+        return (weak + drop) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk with every spring."""
+        kept = Kept(self.keep)
+        how = {**self.how, "threads": 0, "policy": self.policy, "seconds": self.seconds}
+        weak: list[dict[str, Any]] = []
+        for mass, speed, strength in self._weak_cells():
+            where = {"mass_kg": mass, "speed_m_s": speed, "strength": strength}
+            orthoses = [{"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": 0.0} for spring in WEAK_SPRINGS]
+            feet = [{"kind": "weak", "strength": strength, "orthosis": each} for each in orthoses]
+            key = [how, where, feet]
+            cell = kept.get(key, lambda m=mass, s=speed, f=feet: self._walk({"mass": m, "speed": s}, f, progress))
+            pairs = zip(WEAK_SPRINGS, cell["walks"], strict=True)
+            weak += [{**where, "spring_Nm_deg": spring, **_renamed(own)} for spring, own in pairs]
+        drop: list[dict[str, Any]] = []
+        springs = list(product(SWING_SPRINGS, SWING_RESTS))
+        feet = [{"kind": "drop", "orthosis": {"ankle_stiffness": k, "ankle_deg": rest}} for k, rest in springs]
+        for speed in self._speeds():
+            cells = []
+            for push in (0.0, self.push_newton):
+                given = {"speed": speed, "push_newton": push}
+                cells.append(kept.get([how, given, feet], lambda g=given: self._walk(g, feet, progress))["walks"])
+            for (stiffness, rest), own, pushed in zip(springs, *cells, strict=True):
+                line = {"speed_m_s": speed, "spring_Nm_rad": stiffness, "rest_deg": rest, **_renamed(own)}
+                drop.append({**line, "falls_pushed": pushed["falls"]})
+        best = best_springs(weak)
+        files = {
+            "weak.csv": _csv(weak),
+            "best.csv": _csv(best),
+            "drop.csv": _csv(drop),
+            "weak.png": partial(draw_weak, rows=weak, best=best),
+            "drop.png": partial(draw_drop, rows=drop),
+        }
+        text = {"WEAK": weak_text(weak, best, self.what_ran), "DROP": drop_text(drop, self.what_ran, self.push_newton)}
+        return Answer(text="\n\n".join(text.values()), files=files, sections=text)
+
+    def _weak_cells(self) -> Iterator[tuple[float, float, float]]:
+        return iter([(63.0, 1.2, 0.25)]) if self.quick else product(MASSES, WALKED_SPEEDS, STRENGTHS)
+
+    def _speeds(self) -> Sequence[float]:
+        return (1.2,) if self.quick else WALKED_SPEEDS
+
+    def _walk(self, given: Mapping[str, Any], feet: Sequence[dict[str, Any]], progress: OnProgress) -> dict[str, Any]:
+        """`walks`: the numbers of each of the right `feet`, the same episodes for each."""
+        acting, settings = prepare(self.policy, {**given, "episode_seconds": self.seconds})
+        recordings = record_feet(acting, settings, feet, name=self.policy, progress=progress, **self.how)
+        own = [{**numbers_of(measure(each)), "energy_J_kg_m": muscle_energy(each)} for each in recordings]
+        return {"walks": own}
+
+
+def muscle_energy(recording: Recording) -> float | None:
+    """Energy that muscles take [J/kg/m] after `WARM_UP`: work of every joint without the orthosis's, by `EFFICIENCY`.
+
+    The right ankle's is of the mean torque and the change of angle of each 10 ms; None without progress.
+    """
+    settings, first = recording.settings, round(WARM_UP / TICK)
+    orthosis = foot_of(settings.right_foot).ankle.orthosis or Spring()
+    beta = damping_times(body_of(settings))[ANKLE] if orthosis.damping_time is None else orthosis.damping_time
+    energy = way = 0.0
+    for episode, end in enumerate(recording.ticks):
+        if end <= first + 1:
+            continue
+        work = recording.series["joint_work"][episode, first + 1 : end].astype(float)
+        angle = recording.series["angle"][episode, first:end, RIGHT, ANKLE].astype(float)
+        torque = recording.series["joint_torque"][episode, first + 1 : end, RIGHT, ANKLE].astype(float)
+        change, middle = np.diff(angle), 0.5 * (angle[1:] + angle[:-1])
+        spring = orthosis.stiffness * (orthosis.rest - middle - beta * change / TICK)
+        muscle = (torque - spring) * change
+        work[:, RIGHT, ANKLE] = np.stack([np.maximum(muscle, 0.0), np.minimum(muscle, 0.0)], -1)
+        up, down = work[..., 0].sum(), -work[..., 1].sum()
+        energy += up / EFFICIENCY["positive"] + down / EFFICIENCY["negative"]
+        way += float(recording.series["com"][episode, end - 1, 0] - recording.series["com"][episode, first, 0])
+    return energy / (body_of(settings).mass * way) if way > 0.5 else None
+
+
+def _renamed(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    return {("walked_m_s" if key == "speed_m_s" else key): value for key, value in numbers.items()}
+
+
+def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    return csv_text(list(rows[0]), [list(row.values()) for row in rows])

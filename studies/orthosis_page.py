@@ -1,0 +1,187 @@
+"""What `orthosis` found, in tables and pictures: the best spring for a weak calf, and what ends the falls of a drop
+foot."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.stats import rankdata
+
+from springfoot.agents.markdown import MISSING, table, text_of
+from springfoot.evaluation.gait_figure import STYLE
+
+Row = Mapping[str, Any]
+OF_A_CELL = ("mass_kg", "speed_m_s", "strength")
+COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#555555")
+
+
+def best_springs(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """The spring with which muscles take least energy, of those with which nobody falls, for each body, speed and
+    strength; and by how much the worst of those springs takes more."""
+    found = []
+    for cell in _cells(rows):
+        walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row["energy_J_kg_m"] is not None]
+        line = {**dict(zip(OF_A_CELL, cell, strict=True)), "springs_without_falls": len(walking)}
+        names = ("best_Nm_deg", "energy_J_kg_m", "walked_m_s", "worst_Nm_deg", "worst_more_percent")
+        line |= dict.fromkeys(names)
+        if walking:
+            best, worst = (of(walking, key=lambda row: row["energy_J_kg_m"]) for of in (min, max))
+            line |= {"best_Nm_deg": best["spring_Nm_deg"], "worst_Nm_deg": worst["spring_Nm_deg"]}
+            line |= {"energy_J_kg_m": best["energy_J_kg_m"], "walked_m_s": best["walked_m_s"]}
+            line["worst_more_percent"] = 100 * (worst["energy_J_kg_m"] / best["energy_J_kg_m"] - 1)
+        found.append(line)
+    return found
+
+
+def _cells(rows: Sequence[Row]) -> list[tuple[float, ...]]:
+    return list(dict.fromkeys(tuple(row[name] for name in OF_A_CELL) for row in rows))
+
+
+def _of(rows: Sequence[Row], cell: tuple[float, ...]) -> list[Row]:
+    return [row for row in rows if tuple(row[name] for name in OF_A_CELL) == cell]
+
+
+def weak_text(rows: Sequence[Row], best: Sequence[Row], what_ran: str) -> str:
+    """The section of the weak calf."""
+    speeds = sorted({row["speed_m_s"] for row in best})
+    lines = []
+    for strength in sorted({row["strength"] for row in best}):
+        for mass in sorted({row["mass_kg"] for row in best}):
+            cells = []
+            for speed in speeds:
+                (row,) = _of(best, (mass, speed, strength))
+                more = text_of(row["worst_more_percent"], ".0f")
+                told = "all fall" if row["best_Nm_deg"] is None else f"{row['best_Nm_deg']:g} (+{more} %)"
+                cells.append(told if row["springs_without_falls"] != 1 else f"{row['best_Nm_deg']:g} (alone)")
+            lines.append([f"{100 * strength:.0f} %", f"{mass:g}", *cells])
+    head = ["calf", "kg", *(f"best N·m/deg at {speed:g} m/s" for speed in speeds)]
+    first = next((row["falls"], row["spring_Nm_deg"]) for row in rows)
+    springs = sorted({row["spring_Nm_deg"] for row in rows})
+    alone = [row for row in rows if row["spring_Nm_deg"] == springs[0]]
+    fallen = sum(1 for row in alone if row["falls"] > 0)
+    return (
+        f"![The best orthosis](weak.png)\n\n{table(head, lines)}\n\n{directions(best)}\n\nWith a spring of "
+        f"{first[1]:g} N·m/deg (none) someone falls in {fallen} of {len(alone)} of these. {what_ran} of each of "
+        f"{len(springs)} springs of 0 to {springs[-1]:g} N·m/deg at rest at 0°, legs and stiffness of both feet as of "
+        "sound feet. Best: least energy of all muscles per metre (positive work / 0.25 + negative / 1.2, without the "
+        "orthosis's own) where no episode falls; in brackets, by how much the worst of those takes more."
+    )
+
+
+def directions(best: Sequence[Row]) -> str:
+    """Whether the best stiffness rises with weakness, mass and speed, in words."""
+    known = [row for row in best if row["best_Nm_deg"] is not None]
+    told = []
+    for name, label, sign in (("strength", "weakness", -1), ("mass_kg", "mass", 1), ("speed_m_s", "speed", 1)):
+        levels = sorted({row[name] for row in known}, key=lambda value: sign * value)
+        means = [np.mean([row["best_Nm_deg"] for row in known if row[name] == level]) for level in levels]
+        pairs = np.array([(sign * row[name], row["best_Nm_deg"]) for row in known]).reshape(-1, 2)
+        varies = len(levels) > 1 and np.ptp(pairs[:, 1]) > 0
+        ranks = np.apply_along_axis(rankdata, 0, pairs)
+        rho = f"ρ {np.corrcoef(ranks.T)[0, 1]:+.2f}" if varies else "ρ –"
+        steps = ", ".join(f"{level:g}: {mean:.1f}" for level, mean in zip(levels, means, strict=True))
+        told.append(f"{label} {rho} ({steps})")
+    return (
+        "Best stiffness against " + "; ".join(told) + ": Spearman's correlation over the cells that walk, and the mean "
+        "best at each level [N·m/deg]. Waterval et al. found more with weakness, mass and speed."
+    )
+
+
+def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
+    """The weakest spring with which, and with all stiffer ones of its rest angle, none falls."""
+    cures = []
+    for rest in sorted({row["rest_deg"] for row in rows}):
+        own = sorted((row for row in rows if row["rest_deg"] == rest), key=lambda row: -row["spring_Nm_rad"])
+        standing = []
+        for row in own:
+            if row[column] > 0:
+                break
+            standing.append(row)
+        cures += standing[-1:]
+    return min(cures, key=lambda row: row["spring_Nm_rad"], default=None)
+
+
+def drop_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
+    """The section of the drop foot."""
+    parts = []
+    for speed in dict.fromkeys(row["speed_m_s"] for row in rows):
+        here = [row for row in rows if row["speed_m_s"] == speed]
+        rests = sorted({row["rest_deg"] for row in here})
+        lines = []
+        for stiffness in sorted({row["spring_Nm_rad"] for row in here}):
+            own = {row["rest_deg"]: row for row in here if row["spring_Nm_rad"] == stiffness}
+            lines.append([f"{stiffness:g}", *(_cell(own[rest]) for rest in rests)])
+        head = [f"K N·m/rad at {speed:g} m/s", *(f"rest {rest:g}°" for rest in rests)]
+        cures = [weakest_cure(here, column) for column in ("falls", "falls_pushed")]
+        told = [
+            "no spring of the map" if cure is None else f"{cure['spring_Nm_rad']:g} N·m/rad at {cure['rest_deg']:g}°"
+            for cure in cures
+        ]
+        parts.append(f"{table(head, lines)}\n\nWeakest that ends the falls: {told[0]}; under pushes: {told[1]}.")
+    return (
+        "![Drop foot](drop.png)\n\n"
+        + "\n\n".join(parts)
+        + (
+            f"\n\nShare that falls, undisturbed / pushed by ±{push_newton:g} N, and median toe clearance of the right "
+            f"foot in mid-swing [mm]. {what_ran} of each, legs and stiffness of both feet as of sound feet; muscles "
+            "of the right ankle are slack in swing, the spring is there always. Ends the falls: none falls with it, "
+            "nor with any stiffer one of its rest angle."
+        )
+    )
+
+
+def _cell(row: Row) -> str:
+    clearance = MISSING if row["clearance_m"] is None else f"{1000 * row['clearance_m']:.0f} mm"
+    return f"{row['falls']:.0%} / {row['falls_pushed']:.0%}, {clearance}"
+
+
+def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
+    """Write the picture: energy over stiffness, a panel a speed at the middle mass, a line a strength."""
+    masses = sorted({row["mass_kg"] for row in rows})
+    mass, speeds = masses[len(masses) // 2], sorted({row["speed_m_s"] for row in rows})
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+        for ax, speed in zip(
+            np.ravel(figure.subplots(1, len(speeds), sharey=True, squeeze=False)), speeds, strict=True
+        ):
+            for strength, color in zip(sorted({row["strength"] for row in rows}), COLORS * 9, strict=False):
+                own = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
+                x, y = [row["spring_Nm_deg"] for row in own], [row["energy_J_kg_m"] for row in own]
+                ax.plot(x, y, "o-", color=color, ms=3.5, lw=1.3, label=f"{100 * strength:.0f} % of a calf")
+                for row in _of(best, (mass, speed, strength)):
+                    if row["best_Nm_deg"] is not None:
+                        ax.plot(row["best_Nm_deg"], row["energy_J_kg_m"], "o", color=color, ms=9, mfc="none")
+            ax.set(title=f"{speed:g} m/s, {mass:g} kg", xlabel="orthosis (N·m/deg)")
+            ax.grid(color="#ededed", lw=0.6)
+        figure.axes[0].set_ylabel("energy of muscles (J/kg/m)")
+        figure.axes[0].legend(frameon=False)
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+def draw_drop(path: Path, rows: Sequence[Row]) -> None:
+    """Write the maps: toe clearance over stiffness and rest angle, a panel a speed, crosses where someone falls."""
+    speeds = list(dict.fromkeys(row["speed_m_s"] for row in rows))
+    stiffness, rests = (sorted({row[name] for row in rows}) for name in ("spring_Nm_rad", "rest_deg"))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+        image = None
+        for ax, speed in zip(
+            np.ravel(figure.subplots(1, len(speeds), sharey=True, squeeze=False)), speeds, strict=True
+        ):
+            grid = np.full((len(rests), len(stiffness)), np.nan)
+            for row in (row for row in rows if row["speed_m_s"] == speed):
+                place = rests.index(row["rest_deg"]), stiffness.index(row["spring_Nm_rad"])
+                grid[place] = np.nan if row["clearance_m"] is None else 1000 * row["clearance_m"]
+                mark = "x" if row["falls"] else "+" if row["falls_pushed"] else ""
+                ax.plot(place[1], place[0], mark or ",", color="#a03030", ms=7)
+            image = ax.imshow(grid, origin="lower", aspect="auto", cmap="viridis", vmin=0.0, vmax=35.0)
+            ax.set_xticks(range(len(stiffness)), [f"{value:g}" for value in stiffness])
+            ax.set_yticks(range(len(rests)), [f"{value:g}" for value in rests])
+            ax.set(title=f"{speed:g} m/s", xlabel="swing K (N·m/rad)")
+        figure.axes[0].set_ylabel("rest angle (deg)")
+        if image is not None:
+            figure.colorbar(image, ax=figure.axes, label="toe clearance (mm); x falls, + falls when pushed")
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})

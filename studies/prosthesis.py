@@ -1,0 +1,179 @@
+"""What is a foot worth to the person who wears it on the right: rigid, the best passive spring, adaptive, intact?
+
+    springfoot study prosthesis --page docs/feet.md
+    springfoot study prosthesis --train --page docs/feet.md
+
+The feet and the people who have adapted to them are the committed ones of `springfoot study adapt`, two independent
+searches of each kind at the same budget: of the passive foot stiffness and rest angles too, of the adaptive one its
+schedule and rest angles. With --train a policy learns on each, from several seeds, as factors on the schedule that
+the search found; it sets the stiffness of the sound foot, and of the right one where that is adaptive.
+"""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import tyro
+
+from springfoot.agents.config import PRESETS, TrainingConfig
+from springfoot.agents.files import csv_text
+from springfoot.agents.policy import BEST
+from springfoot.envs.adapted import ADAPTED, committed_feet, without_person
+from springfoot.envs.control.leg_constants import TUNED_SPEED
+from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
+from springfoot.gait.errors import SpringfootError
+
+from .adapt import kept_name
+from .foot_walks import PUSH_NEWTON, SCHEDULE, Kept, for_body, walked
+from .prosthesis_page import ADAPTED_ALONE, NOT_ADAPTED, WITH_POLICY, draw, sections, share_rows
+from .study import Answer, OnProgress
+from .trainings import TrainingStudy
+
+WORN = ("rigid", "passive", "adaptive")
+"""Feet that were adapted to."""
+TRAINED = ("passive", "adaptive")
+"""Those on which policies learn."""
+SEARCHES = (1, 2)
+BODIES = ((REFERENCE_HEIGHT, REFERENCE_MASS), (1.55, 50.0), (1.85, 90.0))
+"""Height [m] and mass [kg]."""
+WALKED_SPEEDS = (TUNED_SPEED, 0.8, 1.6)
+"""[m/s]."""
+STEPS = 150_000
+"""Environment steps of each training, from the schedule of the search on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prosthesis(TrainingStudy):
+    """Walk on each foot, with legs that have not adapted, legs that have, and policies trained on them."""
+
+    episodes: int = 10
+    """Episodes of each row, undisturbed, and as many pushed."""
+    seconds: float = 12.0
+    """Length of each."""
+    seeds: int = 5
+    """Seeds of the trainings."""
+    episodes_elsewhere: int = 4
+    """Episodes of each row of other bodies and speeds."""
+    seeds_elsewhere: int = 2
+    """Seeds of the trainings that walk there."""
+    timesteps: int | None = STEPS
+    """Steps of 20 ms of each training."""
+    train: bool = False
+    """Train what is missing and keep it in `policies`."""
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/feet/trainings")
+    """Folder of the trainings."""
+    policies: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("docs/feet")
+    """Folder of their policies, KIND-SEARCH-SEED.safetensors."""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File in which each row's numbers are kept, to go on after a stop."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "seeds": 1, "train": False, "keep": None}
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls, of what is not kept."""
+        here = [_here(row) for row, _, _ in self._rows()]
+        episodes = sum(self.episodes if first else self.episodes_elsewhere for first in here)
+        return 2.0 * episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Train what is asked for and missing, and walk."""
+        failed = self._train() if self.train else False
+        kept, rows = Kept(self.keep), []
+        for row, policy, given in self._rows():
+            how = self.how if _here(row) else {**self.how, "episodes": self.episodes_elsewhere}
+            asked = [row, policy, _digest(policy, given), given, {**how, "threads": 0}, PUSH_NEWTON]
+            found = kept.get(asked, lambda p=policy, g=given, h=how: walked(p, g, progress=progress, **h))
+            rows.append({**row, **found})
+        shares = share_rows(rows)
+        columns = list(rows[0])
+        elsewhere = f"{self.episodes_elsewhere} episodes of each row, of {self.seeds_elsewhere} seeds"
+        text = sections(rows, shares, (self.what_ran, elsewhere), self.policies)
+        files = {
+            "prosthesis.csv": csv_text(columns, [[row[name] for name in columns] for row in rows]),
+            "recovered.csv": csv_text(list(shares[0]), [list(each.values()) for each in shares]) if shares else "",
+            "prosthesis.png": partial(draw, rows=rows),
+        }
+        files = {name: content for name, content in files.items() if content}
+        return Answer(text="\n\n".join(text.values()), files=files, sections=text, failed=failed)
+
+    def _rows(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
+        """What a row is of, its policy, and its settings."""
+        feet, quick = committed_feet(), self.quick
+        for (height, mass), speed in [(body, speed) for body in BODIES for speed in WALKED_SPEEDS][
+            : 1 if quick else None
+        ]:
+            given = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
+            where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
+
+            yield _row("intact", NOT_ADAPTED, where), "pretrained", given
+            for kind in WORN:
+                for search in SEARCHES:
+                    name = kept_name(kind, search)
+                    if name not in feet:
+                        continue
+                    bare = for_body(without_person(feet[name]), height, mass)
+                    worn = {**bare, ADAPTED: name}
+                    if kind != "adaptive":  # without its schedule nothing says what an adaptive one would do
+                        yield _row(kind, NOT_ADAPTED, where, search), "pretrained", {**given, "right_foot": bare}
+                    own = {**given, **SCHEDULE[1], "right_foot": worn}
+                    yield _row(kind, ADAPTED_ALONE, where, search), SCHEDULE[0], own
+                    seeds = self.seeds if _here(where) else min(self.seeds, self.seeds_elsewhere)
+                    for seed in range(seeds if kind in TRAINED else 0):
+                        policy = self.policies / f"{kind}-{search}-{seed}.safetensors"
+                        if policy.is_file():
+                            its = {**given, "right_foot": worn}
+                            yield _row(kind, WITH_POLICY, where, search, seed), str(policy), its
+
+    def _train(self) -> bool:
+        jobs = []
+        for search in SEARCHES:
+            for seed in range(self.seeds):
+                for kind in TRAINED:
+                    config = config_of(kept_name(kind, search), seed, self.timesteps or STEPS)
+                    folder = self.runs / f"{kind}-{search}" / f"seed-{seed}"
+                    jobs.append((config, folder, f"{kind} {search}, seed {seed}"))
+        failed = self.train_missing(jobs)
+        self.policies.mkdir(parents=True, exist_ok=True)
+        for _, folder, _ in jobs:
+            if (folder / BEST).is_file():
+                shutil.copyfile(folder / BEST, self.policies / f"{folder.parent.name}-{folder.name[5:]}.safetensors")
+        return failed
+
+
+def _here(where: Mapping[str, Any]) -> bool:
+    """Whether a row is of the body and the speed that was searched for and trained on."""
+    return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], WALKED_SPEEDS[0])
+
+
+def _row(
+    foot: str, person: str, where: Mapping[str, float], search: int | str = "", seed: int | str = ""
+) -> dict[str, Any]:
+    return {"foot": foot, "person": person, "search": search, "seed": seed, **where}
+
+
+def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
+    """Preset `walk` on the adapted foot of that name, its stiffness factors on the schedule of the search."""
+    if name not in committed_feet():
+        raise SpringfootError(f"no adapted foot {name!r}; there are {', '.join(committed_feet())}")
+    preset = PRESETS["walk"]
+    worn = {**without_person(committed_feet()[name]), ADAPTED: name}
+    return replace(
+        preset,
+        seed=seed,
+        timesteps=timesteps,
+        environment=replace(preset.environment, action_mode="residual", right_foot=worn),
+    )
+
+
+def _digest(policy: str, given: Mapping[str, Any]) -> str:
+    """Of the policy's file, and of the legs and the foot that go by a name."""
+    path, foot = Path(policy), given.get("right_foot")
+    name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
+    content = path.read_bytes() if path.is_file() else b""
+    return hashlib.sha256(content + json.dumps(committed_feet().get(name)).encode()).hexdigest()
