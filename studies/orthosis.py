@@ -35,7 +35,7 @@ PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
 WEAK_SPRINGS = (0.0, 0.9, 1.8, 2.7, 3.6, 4.9, 6.2, 7.4, 8.7)
 """Stiffness of an orthosis for a weak calf [N m/deg]; Waterval et al. (2019) tried 0.9 to 8.7."""
-STRENGTHS = (0.15, 0.2, 0.25, 0.3)
+STRENGTHS = (0.2, 0.25, 0.3)
 """Strength of the calf over a sound one's; a sound walk at 1.2 m/s asks for 0.4."""
 MASSES = (50.0, 63.0, 80.0)
 """[kg] at 1.70 m."""
@@ -53,7 +53,7 @@ EFFICIENCY = {"positive": 0.25, "negative": 1.2}
 class Orthosis(WalkingStudy):
     """Walk with a weak calf, or a drop foot, and an orthosis of every stiffness."""
 
-    episodes: int = 4
+    episodes: int = 3
     """Episodes of each spring, and with a drop foot as many pushed."""
     seconds: float = 12.0
     """Length of each."""

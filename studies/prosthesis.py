@@ -41,8 +41,8 @@ TRAINED = ("passive", "adaptive")
 SEARCHES = (1, 2)
 BODIES = ((REFERENCE_HEIGHT, REFERENCE_MASS), (1.55, 50.0), (1.85, 90.0))
 """Height [m] and mass [kg]."""
-WALKED_SPEEDS = (TUNED_SPEED, 0.8, 1.6)
-"""[m/s]."""
+PLACES = (*((body, TUNED_SPEED) for body in BODIES), (BODIES[0], 0.8), (BODIES[0], 1.6))
+"""Bodies, and speeds [m/s]; the first was searched for and trained on."""
 STEPS = 150_000
 """Environment steps of each training, from the schedule of the search on."""
 
@@ -59,7 +59,7 @@ class Prosthesis(TrainingStudy):
     """Seeds of the trainings."""
     episodes_elsewhere: int = 4
     """Episodes of each row of other bodies and speeds."""
-    seeds_elsewhere: int = 2
+    seeds_elsewhere: int = 1
     """Seeds of the trainings that walk there."""
     timesteps: int | None = STEPS
     """Steps of 20 ms of each training."""
@@ -105,9 +105,7 @@ class Prosthesis(TrainingStudy):
     def _rows(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
         """What a row is of, its policy, and its settings."""
         feet, quick = committed_feet(), self.quick
-        for (height, mass), speed in [(body, speed) for body in BODIES for speed in WALKED_SPEEDS][
-            : 1 if quick else None
-        ]:
+        for (height, mass), speed in PLACES[: 1 if quick else None]:
             given = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
             where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
 
@@ -148,7 +146,7 @@ class Prosthesis(TrainingStudy):
 
 def _here(where: Mapping[str, Any]) -> bool:
     """Whether a row is of the body and the speed that was searched for and trained on."""
-    return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], WALKED_SPEEDS[0])
+    return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
 
 
 def _row(
