@@ -25,18 +25,16 @@ _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles
 }
 
 
-def c3d_trial(path: Path) -> Trial:
-    """A C3D file with Plug-in Gait output; needs ezc3d (the extra `c3d`).
+def read_c3d(path: Path) -> Trial:
+    """A C3D file with Plug-in Gait output, read in this process (`c3d_process` says why to do that in another).
 
     It reads the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
     Model's `LHXFFA` (toe) [deg] and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg]; right with R;
     the events Foot Strike and Foot Off; and the force plates, where the markers LHEE, LTOE, RHEE and RTOE tell which
     foot stands on them and which way is forward.
     """
-    try:
-        import ezc3d  # an extra: only C3D files need it
-    except ImportError:
-        raise SpringfootError(f"{path.name}: reading C3D needs ezc3d; install springfoot[c3d]") from None
+    import ezc3d  # an extra: only C3D files need it
+
     _refuse_broken(path)
     try:
         try:

@@ -1,6 +1,6 @@
 """Curves that users bring: a measured walk in a file -> strides -> mean and spread -> a `HumanGait`.
 
-Read are CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_file`). Heel strikes and toe-offs
+Read are CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_process`). Heel strikes and toe-offs
 are found in the vertical force; without it, in the events that the file names; without those, in the leg's motion.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from .arrays import NDArray
 from .body import MASS_RANGE
-from .c3d_file import c3d_trial
+from .c3d_process import c3d_trial
 from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
 from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series

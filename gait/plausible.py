@@ -39,6 +39,14 @@ MISTAKEN_UNITS = {
 """What may be in place of our units, and by how much larger it makes a curve."""
 LARGEST_KNEE = np.radians(100)
 """Largest mean flexion of a knee over the stride [rad]; chosen. More is the angle between thigh and shank."""
+BORNE = (0.25, 0.8)
+"""Least and largest mean vertical force over the stride [body weights]; chosen. Two feet bear one body weight, so that
+each bears half of it."""
+LEVERS = (0.03, 0.3)
+"""Least and largest distance of the force from the ankle where its moment peaks, for moments in N m/kg and forces in
+body weights [m]; chosen: it is about the length of the forefoot, 0.14 m."""
+LEAST_LOAD = 0.3
+"""Least vertical force where the ankle's moment peaks [body weights]; chosen."""
 TURNED = -0.5
 """Correlation with people's curve below which a curve counts as turned; chosen."""
 LEAST_SHIFT, SHIFT_GAIN = 12, 0.15
@@ -85,6 +93,7 @@ def _doubts(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterat
         yield "hip, knee and ankle moments are opposite to people's: external moments? internal ones are needed"
     for curve in turned:
         yield f"{COLUMNS[curve]} is opposite to people's (r = {fit[curve]:.2f}): {_sign(curve)}"
+    yield from _unborne(mean)
 
 
 def _kind(curve: str) -> str:
@@ -119,6 +128,32 @@ def _shifted(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Itera
         yield (
             f"its curves are people's {best} % of the stride late: does it begin at the other foot's heel strike? "
             "0 % must be that of the same foot"
+        )
+
+
+def _unborne(mean: Mapping[str, NDArray]) -> Iterator[str]:
+    """Forces that bear no body, and an ankle moment that is not theirs times a foot's lever."""
+    if "grf_vertical" not in mean:
+        return
+    force, (least, most), (nearest, farthest) = mean["grf_vertical"], BORNE, LEVERS
+    borne = float(force[:-1].mean())
+    if not least <= borne <= most:
+        guess = "both feet together, or not per body weight?" if borne > most else "not per body weight?"
+        yield f"{COLUMNS['grf_vertical']} is {borne:.2g} on the average, where each foot bears half of 1: {guess}"
+    if "ankle_moment" not in mean:
+        return
+    peak, column = int(mean["ankle_moment"].argmax()), COLUMNS["ankle_moment"]
+    lever = float(mean["ankle_moment"][peak] / (GRAVITY * max(force[peak], LEAST_LOAD)))
+    if force[peak] < LEAST_LOAD:
+        yield (
+            f"{column} peaks at {peak} % of the stride, where the foot bears {force[peak]:.2g} body weights: "
+            "moment and force of one foot?"
+        )
+    elif not nearest <= lever <= farthest:
+        than = "longer" if lever > farthest else "shorter"
+        yield (
+            f"{column} at its peak is the force at a lever of {lever:.2g} m, {than} than a foot's: N m/kg and body "
+            "weights?"
         )
 
 

@@ -6,7 +6,7 @@ import ezc3d
 import numpy as np
 import pytest
 
-from springfoot.gait import GRAVITY, SpringfootError, human_gait
+from springfoot.gait import GRAVITY, SpringfootError, c3d_process, human_gait
 from springfoot.gait.human import FORCES
 from springfoot.gait.motion_files import FILE_SIDES
 from springfoot.gait.own_data import read_gait
@@ -154,3 +154,24 @@ def test_a_damaged_file_is_refused_in_one_line(tmp_path, change, words):
     with pytest.raises(SpringfootError, match=rf"lab\.c3d {words}") as caught:
         read_gait(path)
     assert "\n" not in str(caught.value)
+
+
+def test_bytes_that_crash_or_fill_the_library_end_a_child_and_not_us(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "SECONDS", 2.5)
+    path = laboratory(tmp_path / "lab.c3d", events=True)
+    content = bytearray(path.read_bytes())
+    for place, value in ((1720, 176),):  # found by changing bytes at random
+        changed = content.copy()
+        changed[place] = value
+        path.write_bytes(changed)
+        with pytest.raises(SpringfootError, match=r"^lab\.c3d is (damaged|not a C3D file)"):
+            read_gait(path)
+    path.write_bytes(content)
+    small = "import springfoot.gait.c3d_process as reading; reading.MOST_MEMORY = 2**20; reading.main()"
+    monkeypatch.setattr(c3d_process, "_CHILD", small)
+    with pytest.raises(SpringfootError, match=r"^lab\.c3d is (damaged|not a C3D file)"):
+        read_gait(path)
+    monkeypatch.setattr(c3d_process, "_CHILD", "import time; time.sleep(60)")
+    monkeypatch.setattr(c3d_process, "MOST_WAIT", 1)
+    with pytest.raises(SpringfootError, match=r"lab\.c3d is damaged: reading it did not end within 1 s"):
+        read_gait(path)

@@ -88,6 +88,21 @@ WRONG = {
     ),
     "a knee of 175 deg": (knee_from_straight, "the angle between thigh and shank?"),
     "all zeros": (times(0, *COLUMNS), "is 0 throughout the stride: was it measured?"),
+    "both feet together": (
+        lambda curves: curves | {"grf_vertical": curves["grf_vertical"] + late(50)(curves)["grf_vertical"]},
+        "grf_vertical_bw is 1 on the average, where each foot bears half of 1: both feet together,",
+    ),
+    "the force of half a body": (times(0.4, "grf_vertical"), "where each foot bears half of 1: not per body weight?"),
+    "moments over height and weight": (times(1 / GRAVITY / HEIGHT, *MOMENTS), "_Nm_per_kg goes from"),
+    "the ankle's moment over mass and height": (
+        times(0.15, "ankle_moment"),
+        "ankle_moment_Nm_per_kg at its peak is the force at a lever of 0.0",
+    ),
+    "the ankle's moment in pound-feet": (times(3.0, "ankle_moment"), "longer than a foot's: N m/kg and body weights?"),
+    "a moment of another stride": (
+        lambda curves: curves | {"ankle_moment": late(25)(curves)["ankle_moment"]},
+        "body weights: moment and force of one foot?",
+    ),
     "no force": (times(0, "grf_vertical"), "grf_vertical_bw is 0 throughout the stride: was it measured?"),
 }
 
