@@ -34,7 +34,7 @@ LIVE_SPEEDS = (0.6, 1.8)
 """Commanded speeds [m/s]; chosen, those at which the fixed schedule walks and a little beyond."""
 LIVE_HEIGHTS, LIVE_MASSES = (1.45, 2.0), (45.0, 110.0)
 """Heights [m] and masses [kg]; chosen, as adults are."""
-FACTORS = (0.25, 4.0)
+LIVE_FACTORS = (0.25, 4.0)
 """Factors on the policy's K [-]; chosen."""
 OFFSETS_DEG = (-15.0, 15.0)
 """What is added to theta_eq [deg]; chosen, more than the ankle moves in stance."""
@@ -74,8 +74,8 @@ OFFSETS = ("ankle_offset_deg", "toe_offset_deg")
 ANEW = ("slope_deg", "height", "mass", "left_foot", "right_foot")
 """Wishes that begin the walk anew."""
 WISH_RANGES = {
-    "ankle_factor": FACTORS,
-    "toe_factor": FACTORS,
+    "ankle_factor": LIVE_FACTORS,
+    "toe_factor": LIVE_FACTORS,
     "ankle_offset_deg": OFFSETS_DEG,
     "toe_offset_deg": OFFSETS_DEG,
     "speed": LIVE_SPEEDS,

@@ -24,7 +24,7 @@ from springfoot.gait.stiffness import SPRINGS
 
 from .live_scene import LiveScene
 from .live_session import (
-    FACTORS,
+    LIVE_FACTORS,
     LIVE_HEIGHTS,
     LIVE_MASSES,
     LIVE_PUSHES,
@@ -119,7 +119,7 @@ class LiveView:
                 self._handles[name].value = _shown(getattr(self._session.wishes, name))
 
     def _add_buttons(self) -> None:
-        push, restart = self._gui.add_button("Push", icon=None), self._gui.add_button("Restart")
+        push, restart = self._gui.add_button("Push"), self._gui.add_button("Restart")
         size = self._gui.add_slider(
             "Push, N", *LIVE_PUSHES, step=10.0, initial_value=FIRST_PUSH, hint="forward positive"
         )
@@ -131,7 +131,7 @@ class LiveView:
         for joint, name in enumerate(SPRINGS):
             with self._gui.add_folder(f"{name.capitalize()}: stiffness K"):
                 self._choose(f"{name}_source", "from", get_args(Source))
-                self._slide(f"{name}_factor", "scaled: factor", FACTORS, 0.05)
+                self._slide(f"{name}_factor", "scaled: factor", LIVE_FACTORS, 0.05)
                 low, high = most[joint].tolist()
                 self._slide(f"{name}_stiffness", "by hand, N·m/rad", (round(low), round(high)), 1.0)
                 self._slide(f"{name}_offset_deg", "θ_eq, added deg", OFFSETS_DEG, 0.5)
