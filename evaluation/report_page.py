@@ -1,13 +1,12 @@
 """report.html: one page that opens offline, with the verdict in words and all that a walk's numbers come from.
 
-Its drawings are SVG by a small script of the page's own (`page.html`, 26 kB): the bundle that pip brings with plotly is
+Its drawings are SVG by a small script of its own (`drawing.js`, 18 kB): the bundle that pip brings with plotly is
 4.8 MB, and would not draw the body.
 """
 
 import json
 from collections.abc import Mapping, Sequence
 from html import escape
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from springfoot.envs.settings import reference_gait, settings_from
 from .criteria import LOADS_LIKE_PEOPLE, MOVES_LIKE_PEOPLE, WORKS_LIKE_PEOPLE, Criterion, number_text, numbers
 from .metrics import Gait
 from .page_data import policy_data
+from .page_parts import as_json, filled
 from .recording import Recording
 from .report import leg_rows, people_metrics, table_rows
 
@@ -34,9 +34,7 @@ def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str
         "made": _made(walks, command),
     }
     verdicts = "\n".join(_verdict(index, gait.metrics) for index, (_, gait) in enumerate(walks))
-    text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    page = resources.files("springfoot.evaluation").joinpath("page.html").read_text(encoding="utf-8")
-    path.write_text(page.replace("<!--VERDICT-->", verdicts).replace("<!--DATA-->", text), encoding="utf-8")
+    path.write_text(filled("page.html", {"VERDICT": verdicts, "DATA": as_json(data)}), encoding="utf-8")
 
 
 def _made(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:

@@ -1,7 +1,5 @@
 """report.html in a real browser, Debian's Chromium by Playwright, from file://, as wide as a desk's and a phone's."""
 
-import shutil
-
 import pytest
 
 from springfoot.evaluation.metrics import measure
@@ -9,7 +7,6 @@ from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 from springfoot.evaluation.report_page import write_page
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CUT_OFF = """() => [...document.querySelectorAll("svg text")].filter(text => {
   const own = text.getBoundingClientRect(), around = text.ownerSVGElement.getBoundingClientRect();
   return own.width && (own.left < around.left - 1 || own.right > around.right + 1
@@ -30,20 +27,6 @@ def page(tmp_path_factory):
     other = walked("constant", right_foot="no_toe", left_foot={"kind": "rigid_toe", "orthosis": {}})
     write_page(path, [walked("schedule"), other], "evaluate.py schedule constant")
     return path
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """A browser; how to get one is the reason of the skip."""
-    how = "needs a browser: pip install playwright, and Debian's chromium (apt install chromium)"
-    driver = pytest.importorskip("playwright.sync_api", reason=how)
-    binary = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if binary is None:
-        pytest.skip(how)
-    with driver.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=binary, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 def opened(browser, page, width, **how):
