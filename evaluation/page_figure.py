@@ -63,7 +63,7 @@ def figure_data(recording: Recording) -> dict[str, Any]:
         "angle": shown_numbers(series["angle"].reshape(len(series["angle"]), -1)),
         "com": shown_numbers(series["com"]),
         "plan": shown_numbers(series["com_reference"]),
-        "zmp": shown_numbers(_planned_zmp(recording, whole)[first:last]),
+        "zmp": shown_numbers(planned_zmp(recording, whole)[first:last]),
         "force": [
             shown_numbers(
                 np.stack([forces[f"ground_force_{side[0]}_{part}"] / unit for part, unit in acting.items()], -1)
@@ -88,7 +88,7 @@ def _percent_of(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
     return 100 * (strides % 1.0)
 
 
-def _planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
+def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     """(T,) forward place of the planned ZMP [m]: over the step of the leg whose stance began last, from its ankle."""
     phase = series["phase"] % 1.0
     side = np.where(phase[:, 0] < phase[:, 1], 0, 1)

@@ -1,4 +1,4 @@
-"""The parts that pages share, report.html and play.html: one style, one script that draws, data that no text can leave."""
+"""The parts that pages share: one style, one script that draws, and data that no text can leave."""
 
 import json
 from collections.abc import Mapping

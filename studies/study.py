@@ -105,7 +105,7 @@ class Study:
         if study.page is not None:
             study.write_page(study.page, answer)
             for file, content in answer.files.items():
-                if file.endswith(".png"):
+                if file.endswith((".html", ".png")):
                     _write(study.page.parent / file, content)
         print(f"\nResults: {out} ({', '.join(answer.files)})")
         return 1 if answer.failed else 0
