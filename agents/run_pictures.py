@@ -25,7 +25,7 @@ GALLERY_SHARES = (0.0, 0.25, 0.5, 1.0)
 """Of the timesteps, after which a policy is kept; chosen."""
 SECONDS_SHOWN, SECONDS_BETWEEN = 6.0, 0.3
 """How long each of the gallery walks at most, and the time between two of its figures [s]; chosen."""
-GALLERY, NEAR, FAR, TRUNK = "gallery", "#0b6e8f", "#9ec4d1", "#404e5c"
+GALLERY, LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR = "gallery", "#0b6e8f", "#9ec4d1", "#404e5c"
 
 
 class Gallery:
@@ -77,9 +77,9 @@ def curve_figure(record: dict[str, Any]) -> Any:
     best = record["best"]
     figure = Figure(figsize=(7.0, 4.6), layout="constrained")
     returns, fallen = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    returns.fill_between(steps, mean - sd, mean + sd, color=NEAR, alpha=0.2, linewidth=0)
-    returns.plot(steps, mean, color=NEAR, marker="o", markersize=3)
-    returns.plot(best["timesteps"], best["return_mean"], "o", color=TRUNK, markersize=7, fillstyle="none")
+    returns.fill_between(steps, mean - sd, mean + sd, color=LEFT_COLOUR, alpha=0.2, linewidth=0)
+    returns.plot(steps, mean, color=LEFT_COLOUR, marker="o", markersize=3)
+    returns.plot(best["timesteps"], best["return_mean"], "o", color=TRUNK_COLOUR, markersize=7, fillstyle="none")
     returns.set(ylabel="return of an episode", title="Periodic evaluations: mean ± SD over episodes, ring: the best")
     fallen.plot(steps, share, color="#d55e00", marker="o", markersize=3)
     fallen.set(ylabel="episodes that fell (%)", xlabel="environment steps", ylim=(-5, 105))
@@ -100,9 +100,9 @@ def gallery_figure(policies: dict[int, Policy], total: int, biped: Biped, seed: 
         ax.axhline(0.0, color="#888888", linewidth=0.8)
         for points in figures:
             trunk, legs = points[:2], points[2:].reshape(2, -1, 2)
-            for leg, colour in zip(legs[::-1], (FAR, NEAR), strict=True):
+            for leg, colour in zip(legs[::-1], (RIGHT_COLOUR, LEFT_COLOUR), strict=True):
                 ax.plot(*leg.T, color=colour, linewidth=1.2, solid_capstyle="round")
-            ax.plot(*trunk.T, color=TRUNK, linewidth=2.4, solid_capstyle="round")
+            ax.plot(*trunk.T, color=TRUNK_COLOUR, linewidth=2.4, solid_capstyle="round")
         ax.set(xlim=(-0.6, reach + 0.3), ylim=(-0.1, top + 0.1), aspect="equal", ylabel="m")
         ax.tick_params(labelsize=8)
     return figure

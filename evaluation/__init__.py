@@ -18,7 +18,8 @@ from .stride_curves import StrideCurves
 if TYPE_CHECKING:
     from .animation import save_animation
     from .gait_figure import save_gait_figure
-    from .report import print_table, write_gait_cycle, write_report
+    from .gait_table import print_table
+    from .report import write_gait_cycle, write_report
 
 __all__ = [
     "HUMAN_LIKE",
@@ -42,7 +43,7 @@ __all__ = [
 ]
 
 _DRAWS = {
-    "print_table": "report",
+    "print_table": "gait_table",
     "save_animation": "animation",
     "save_gait_figure": "gait_figure",
     "write_gait_cycle": "report",

@@ -3,7 +3,7 @@
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -52,6 +52,9 @@ class EvaluateFlags:
     """Threads of the physics; the results are the same with any number."""
     report: bool = True
     """Write report.html, which opens in any browser, offline."""
+    film: bool = False
+    """Write walk.mp4 too, the first 10 s as MuJoCo draws them; needs OpenGL (without a screen, MUJOCO_GL=egl) and the
+    extra film."""
     json: bool = False
     """Print, in place of the tables, one JSON object: `folder`, and as `metrics` what stands in each metrics.json."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
@@ -80,6 +83,8 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     if out.exists():
         raise SpringfootError(f"{out} exists already; give --out a new folder")
     from . import (
+        film,
+        gait_table,
         metrics,
         policies,
         recording,
@@ -88,15 +93,19 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     )  # not above: Matplotlib takes a while, and bad flags need not wait for it
 
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
-    prepared = [policies.prepare(name, settings, flags.seed, flags.threads) for name in flags.policies]
+    if flags.film:
+        film.require_film()
+    prepared = []
+    for label, name in zip(labels, flags.policies, strict=True):
+        with _bar(f"{label}, copying", 0.0, delay=0.5) as bar:
+            prepared.append(policies.prepare(name, settings, flags.seed, flags.threads, _follow(bar)))
     for _, environment in prepared:
         recording.require_recordable(environment, flags.episodes)
 
     with whole_folder(out) as folder:
         walks = []
         for label, (policy, environment) in zip(labels, prepared, strict=True):
-            total = flags.episodes * environment.episode_seconds
-            with tqdm(total=total, desc=label, unit="s", unit_scale=True, leave=False, disable=None) as bar:
+            with _bar(label, flags.episodes * environment.episode_seconds) as bar:
                 episodes = recording.record(
                     policy,
                     environment,
@@ -106,11 +115,14 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                     threads=flags.threads,
                     progress=bar.update,
                 )
-                bar.set_description(f"{label}, writing")
+            own = folder if len(labels) == 1 else folder / label
+            own.mkdir(exist_ok=True)
+            with _bar(f"{label}, files", 1.0, delay=0.5) as bar:
                 gait = metrics.measure(episodes)
-                own = folder if len(labels) == 1 else folder / label
-                own.mkdir(exist_ok=True)
-                report.write_report(own, episodes, gait)
+                report.write_report(own, episodes, gait, bar.update)
+            if flags.film:
+                with _bar(f"{label}, film", film.film_seconds(episodes)) as bar:
+                    film.save_film(own / "walk.mp4", episodes, bar.update)
             walks.append((episodes, gait))
         if flags.report:
             report_page.write_page(folder / "report.html", walks, command)
@@ -118,15 +130,34 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
         print(json.dumps({"folder": str(out), "metrics": [gait.metrics for _, gait in walks]}, ensure_ascii=False))
         return
     for _, gait in walks:
-        report.print_table(gait.metrics)
+        gait_table.print_table(gait.metrics)
     for name in flags.policies:
         if has_feedback(name):
             print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{name}, with the same flags")
-    page = "report.html; " if flags.report else ""
-    print(
-        f"\nResults: {out} ({page}metrics.json, gait_cycle.csv, every_stride.csv, strides.npz,\n"
-        "gait.png, walk.gif; stiffness_schedule.csv, finite_states.json, walk.mot, walk.sto, model.xml)"
+    gait_table.print_results(out, [*["report.html"] * flags.report, *["walk.mp4"] * flags.film, *report.FILES])
+
+
+def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
+    """A bar with the time left, gone at its end, and not there for `delay` [s]; nothing where there is no terminal."""
+    return tqdm(
+        total=total,
+        desc=words,
+        bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}, {remaining} left",
+        dynamic_ncols=True,
+        leave=False,
+        delay=delay,
+        disable=None,
     )
+
+
+def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
+    """For `open_loop_copy`, which knows how long its walks are."""
+
+    def watch(seconds: float) -> Callable[[float], object]:
+        bar.total = seconds
+        return bar.update
+
+    return watch
 
 
 def _labels(names: Sequence[str]) -> list[str]:

@@ -10,6 +10,7 @@ from math import cos, radians, sin, tan
 from pathlib import Path
 
 import numpy as np
+from mujoco import MjSpec
 
 from springfoot.envs.feet import feet_of
 from springfoot.envs.physics.foot_contact import ground_name
@@ -74,16 +75,28 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
 
 def write_model(path: Path, recording: Recording) -> None:
     """Write the body as MJCF: its key `walk` is the first posture recorded, its ground has the walk's slope."""
+    spec, walk = sloping_spec(recording), postures(recording)
+    if len(walk):
+        spec.add_key(name="walk", qpos=walk[0].tolist())
+    path.write_text(model_text(spec), encoding="utf-8")
+
+
+def sloping_spec(recording: Recording) -> MjSpec:
+    """The model's specification of the recorded body and feet, its ground with the walk's slope."""
     settings = recording.settings
     spec = build_spec(body_of(settings), settings.friction, feet_of(settings.left_foot, settings.right_foot))
-    series, half = recording.shown(), radians(settings.slope_deg) / 2
+    half = radians(settings.slope_deg) / 2
     for side in SIDES:
         spec.body(ground_name(side)).quat = (cos(half), 0.0, -sin(half), 0.0)
-    if len(series["base"]):
-        x, above, pitch = series["base"][0]
-        posture = (x, above + _slope(settings) * x, pitch, *series["angle"][0].ravel())
-        spec.add_key(name="walk", qpos=[float(value) for value in posture])
-    path.write_text(model_text(spec), encoding="utf-8")
+    return spec
+
+
+def postures(recording: Recording) -> NDArray:
+    """(T, 11) positions of that model's joints at the end of each tick."""
+    series = recording.shown()
+    x, above, pitch = series["base"].T
+    place = np.stack([x, above + _slope(recording.settings) * x, pitch], axis=-1)
+    return np.concatenate([place, series["angle"].reshape(len(place), -1)], axis=-1)
 
 
 def _slope(settings: BipedSettings) -> float:

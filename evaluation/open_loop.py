@@ -4,7 +4,7 @@ A policy decides K of ankle and toe from all that it observes. Its mean K over t
 open loop at the same equilibrium; what K does besides, at equal phase, is feedback.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -34,6 +34,8 @@ UNDISTURBED: dict[str, Any] = {
     name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS if THEME_OF[name] in ("episode", "disturbance")
 } | {"unevenness_m": 0.0, "episode_seconds": COPY_SECONDS}
 """Settings of that walking; body, speed, slope, friction and all else are those asked for."""
+Watch = Callable[[float], Callable[[float], object]]
+"""How somebody follows a walk: told its length [s], it gives what is told each step's."""
 SAME_K = 1e-9
 """Variance of log K below which K is constant and has no share of anything."""
 
@@ -99,7 +101,12 @@ def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 
 def open_loop_copy(
-    policy: PolicyFunction, settings: BipedSettings, *, name: str, threads: int = 2
+    policy: PolicyFunction,
+    settings: BipedSettings,
+    *,
+    name: str,
+    threads: int = 2,
+    watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
     """A policy's mean K over the stride as a policy, and its environment: `settings` with absolute actions.
 
@@ -108,6 +115,7 @@ def open_loop_copy(
         settings: in which it walks; the mean is of its body on its ground, `UNDISTURBED`.
         name: what the policy is called in errors.
         threads: of the physics; any number gives the same bits.
+        watch: told how long the walks for it are [s], returns what is told the seconds of each step.
 
     The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`). Where other
     speeds can be commanded it is taken at each tabulated one, and linear between; for other bodies it scales. The
@@ -116,8 +124,11 @@ def open_loop_copy(
     """
     alone = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     means: dict[float, NDArray] = {}
-    for speed in tabulated_speeds(settings).tolist():
-        recording = record(policy, replace(alone, speed=speed), name=name, episodes=COPY_EPISODES, threads=threads)
+    speeds = tabulated_speeds(settings).tolist()
+    how: dict[str, Any] = {"name": name, "episodes": COPY_EPISODES, "threads": threads}
+    how["progress"] = watch(len(speeds) * COPY_EPISODES * COPY_SECONDS)
+    for speed in speeds:
+        recording = record(policy, replace(alone, speed=speed), **how)
         phase, stiffness = decided(recording)
         if len(phase):
             knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))

@@ -23,13 +23,19 @@ from springfoot.agents.schedule_files import schedule_file
 from springfoot.envs.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
 
-from .open_loop import open_loop_copy
+from .open_loop import Watch, open_loop_copy
 
 CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
 """The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
 
 
-def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> tuple[PolicyFunction, BipedSettings]:
+def prepare(
+    name: str,
+    given: dict[str, Any],
+    seed: int = 0,
+    threads: int = 2,
+    watch: Watch = lambda seconds: lambda walked: None,
+) -> tuple[PolicyFunction, BipedSettings]:
     """A policy by name and the environment it is evaluated in.
 
     Args:
@@ -39,12 +45,13 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -
         given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
         seed: of the baseline `random`.
         threads: of the physics where a copy is made; any number gives the same bits.
+        watch: as for `open_loop_copy`.
 
     Raises `SpringfootError` for an unknown name or a bad setting.
     """
     wanted, kind = CONDITIONS | given, name.partition(":")[0]
     if kind == FROZEN:
-        return _prepare_copy(name, given, threads)
+        return _prepare_copy(name, given, threads, watch)
     if kind in BASELINES:
         conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
         settings = settings_from(**(own_settings(name, conditions) | wanted))
@@ -63,7 +70,7 @@ def prepare(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -
     return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
 
 
-def _prepare_copy(name: str, given: dict[str, Any], threads: int) -> tuple[PolicyFunction, BipedSettings]:
+def _prepare_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -> tuple[PolicyFunction, BipedSettings]:
     """`frozen:POLICY`: its K is of the policy's own decisions, whenever the copy decides."""
     other = name.partition(":")[2]
     if not other:
@@ -74,5 +81,5 @@ def _prepare_copy(name: str, given: dict[str, Any], threads: int) -> tuple[Polic
         raise SpringfootError(f"{other} has no feedback to leave out, it is its own copy: give {other}, got {name!r}")
     policy, settings = prepare(other, {key: value for key, value in given.items() if key != "decisions"})
     decisions = given.get("decisions", settings.decisions)
-    copy, absolute = open_loop_copy(policy, settings, name=other, threads=threads)
+    copy, absolute = open_loop_copy(policy, settings, name=other, threads=threads, watch=watch)
     return copy, replace(absolute, decisions=decisions)

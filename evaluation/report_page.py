@@ -14,11 +14,11 @@ from springfoot.agents.source import source
 from springfoot.envs.settings import reference_gait, settings_from
 
 from .criteria import LOADS_LIKE_PEOPLE, MOVES_LIKE_PEOPLE, WORKS_LIKE_PEOPLE, Criterion, number_text, numbers
+from .gait_table import leg_rows, people_metrics, table_rows
 from .metrics import Gait
 from .page_data import policy_data
 from .page_parts import as_json, filled
 from .recording import Recording
-from .report import leg_rows, people_metrics, table_rows
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
 JUDGED_SPEED = 1.2

@@ -8,6 +8,7 @@ EXTRA_OF = {
     "axe_playwright_python": "browser",
     "cma": "train",
     "ezc3d": "c3d",
+    "imageio_ffmpeg": "film",
     "matplotlib": "evaluate",
     "mjviser": "live",
     "onnx": "onnx",

@@ -27,7 +27,7 @@ from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings, reference_gait, settings_from, settings_to_json
 from springfoot.envs.timing import ACTION_STEP
-from springfoot.evaluation.report import people_metrics
+from springfoot.evaluation.gait_table import people_metrics
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.scores import mean_sd
 from springfoot.gait.stiffness import SPRINGS, Segment, StiffnessSchedule
@@ -249,6 +249,12 @@ class Ablations(TrainingStudy):
         for name in self.only:
             if name not in ABLATIONS:
                 raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        rows = len(self.only or ABLATIONS) * self.seeds + len(INPUTS) + 1 + 1 + (self.constant is not None)
+        return 2 * rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
         """Train what is missing, and measure."""

@@ -103,16 +103,20 @@ def contenders(
     policy, settings = prepare(name, given, seed)
     found = [Contender(name, policy, settings)]
     found += [Contender(copy, *prepare(copy, given, seed, threads)) for copy in and_copy(name)[1:]]
-    names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
-    names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
-    names += ["constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]
-    for each in names:
+    for each in rivals(constant, factor):
         own = settings_to_json(settings) | own_settings(each, settings)
         found.append(Contender(each, *prepare(each, own, seed)))
         if each == "quasi_stiffness" and settings.speed == BipedSettings.speed:
             faster = prepare(each, own | {"speed": QUASI_SPEED}, seed)
             found.append(Contender(f"{each}, commanded {QUASI_SPEED:g} m/s", *faster))
     return found
+
+
+def rivals(constant: tuple[float, float] | None, factor: float | None) -> list[str]:
+    """The names of the baselines among the contenders."""
+    names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
+    names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
+    return [*names, "constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]
 
 
 def comparison_table(rows: Sequence[Row]) -> str:
@@ -169,6 +173,12 @@ class Compare(WalkingStudy):
     """What to walk in; a trained policy brings its own settings, standard conditions aside."""
 
     QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,)}
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        rows = len(and_copy(self.policy)) + len(rivals(self.constant, self.factor)) + 1  # one commanded faster
+        return len(self.pushes) * rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every row under every push."""

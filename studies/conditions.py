@@ -38,7 +38,8 @@ WORLD = (
     "--carried-ratio 0.317",
 )
 """Flags of one policy's rows. Proportions are ± 2 SD of adults; loads are 10 and 20 kg for 63 kg."""
-LONG = "--episodes 10 --seconds 600"
+LONG_EPISODES, LONG_SECONDS = 10, 600
+LONG = f"--episodes {LONG_EPISODES} --seconds {LONG_SECONDS}"
 """Flags of one more row: hours of walking in all."""
 UNTRAINED_ROWS = (
     "constant --equilibrium neutral",
@@ -85,6 +86,14 @@ class Conditions(WalkingStudy):
     """Whether ten walks of 600 s are one of the rows of `world`."""
 
     QUICK: ClassVar[dict[str, Any]] = WalkingStudy.QUICK | {"long": False}  # type: ignore[operator]
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        own, names = self.episodes * self.seconds, len(and_copy(self.policy))
+        world = names * (len(WORLD) * own + self.long * LONG_EPISODES * LONG_SECONDS)
+        springs = len(UNTRAINED_ROWS) * own
+        return (self.rows != "springs") * world + (self.rows != "world") * springs
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every row."""

@@ -243,6 +243,12 @@ class AnyStiffness(WalkingStudy):
     unevenness_m: float = 0.01
     """Unevenness of the ground [m]."""
 
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        conditions = 3  # undisturbed, pushed, on uneven ground
+        return (1 + len(self.stiffness)) * conditions * self.episodes * self.seconds
+
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every row."""
         disturbances = {

@@ -19,7 +19,9 @@ import tyro
 from springfoot.agents.baselines import has_feedback
 from springfoot.agents.files import csv_text
 from springfoot.agents.markdown import MISSING, table
+from springfoot.envs.settings import BipedSettings, reference_gait
 from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait.body import REFERENCE_HEIGHT
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
@@ -41,7 +43,7 @@ from .stiffness_responses import (
     link_rows,
     response,
 )
-from .stiffness_steps import CELLS, PHASES, SPRINGS, paired_walks
+from .stiffness_steps import CELLS, DURATIONS, PHASES, SPRINGS, paired_walks
 from .study import Answer, OnProgress, Study
 
 SECTION, FIGURE = "INFLUENCE", "influence.png"
@@ -116,6 +118,12 @@ class Influence(Study):
 
     def _under(self, condition: str) -> tuple[Any, Any, float]:
         return walk_under(condition, self.policy, self.change_percent / 100, self.unevenness_m, self.seed)
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        walks, stride = (1 + len(CELLS) * len(DURATIONS)) * self.seeds, reference_gait(BipedSettings()).stride_time
+        return len(self.conditions) * walks * (WARM_UP + (self.strides + 1) * stride)
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk under every condition."""

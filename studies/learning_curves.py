@@ -74,6 +74,11 @@ class LearningCurves(WalkingStudy):
         if not self.runs:
             raise SpringfootError("give one run folder of train.py or more")
 
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        return len(self.runs) * self.episodes * self.seconds
+
     def ask(self, progress: OnProgress) -> Answer:
         """Judge every run."""
         runs = {folder.name: _read(folder) for folder in self.runs}

@@ -65,6 +65,13 @@ class LegSets(WalkingStudy):
 
     QUICK: ClassVar[Mapping[str, Any]] = {**WalkingStudy.QUICK, "seconds": 8.0}
 
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        sets = [given for _, given, _ in _sets(read_constants(self.constants))]
+        walks = 2 * len(sets) + len(UNTUNED) * sets.count(SETTINGS[0])
+        return walks * self.episodes * self.seconds
+
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with each."""
         lines, numbers, front = [], [], {}

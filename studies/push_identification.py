@@ -203,6 +203,12 @@ class Identify(WalkingStudy):
         require_number("margin", self.margin, 0, 0.02, "of a stride")
         require_count("repeats", self.repeats, 0)
 
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        own = (self.episodes + UNDISTURBED_EPISODES) * self.seconds + self.repeats * REPEAT_EPISODES * REPEAT_SECONDS
+        return len(self.policies) * own
+
     def ask(self, progress: OnProgress) -> Answer:
         """Push every policy."""
         experiments = [self._push(name, progress) for name in self.policies]

@@ -220,6 +220,11 @@ class SeedAgreement(WalkingStudy):
         super().check()
         _require_two(len(self.policies))
 
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        return sum(len(and_copy(name)) for name in self.policies) * self.episodes * self.seconds
+
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every policy."""
         walked = [[self._walk(each, progress) for each in and_copy(name)] for name in self.policies]

@@ -51,6 +51,11 @@ class Seeds(WalkingStudy):
         if not self.policies:
             raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
 
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        return len(self.policies) * self.episodes * self.seconds
+
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every policy."""
         conditions = {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)

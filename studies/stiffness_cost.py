@@ -233,16 +233,19 @@ class StiffnessCost(TrainingStudy):
     pushes: tuple[float, ...] = PUSHES
     """Sizes of the pushes [N]."""
 
-    QUICK: ClassVar[dict[str, Any]] = {
-        **TrainingStudy.QUICK,
-        **{"runs": Path("runs/stiffness-cost-quick"), "weights": (0.02,)},
-    }
+    _QUICK_RUNS: ClassVar[Path] = Path("runs/stiffness-cost-quick")
+    QUICK: ClassVar[dict[str, Any]] = {**TrainingStudy.QUICK, "runs": _QUICK_RUNS, "weights": (0.02,)}
 
     def check(self) -> None:
         """Refuse an empty list of weights or pushes as well."""
         super().check()
         if not self.weights or not self.pushes:
             raise SpringfootError("give one weight and one push or more")
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        return len(set(self.weights)) * self.seeds * (1 + len(self.pushes)) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
         """Train what is missing, walk and be pushed."""

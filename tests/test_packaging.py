@@ -156,6 +156,7 @@ def test_each_package_of_a_users_extra_is_known_by_its_import():
         "pillow": "PIL",
         "stable-baselines3": "stable_baselines3",
         "axe-playwright-python": "axe_playwright_python",
+        "imageio-ffmpeg": "imageio_ffmpeg",
     }
     extras = PROJECT["project"]["optional-dependencies"]
     users = {extra: map(Requirement, extras[extra]) for extra in set(extras) - {"bench", "dev", "gpu", "mjx"}}

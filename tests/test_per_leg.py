@@ -8,8 +8,8 @@ from springfoot.envs.settings import settings_from
 from springfoot.evaluation import measure, prepare, record
 from springfoot.evaluation.animation import save_animation
 from springfoot.evaluation.gait_figure import save_gait_figure
+from springfoot.evaluation.gait_table import print_table
 from springfoot.evaluation.per_leg import asymmetry, leg_numbers
-from springfoot.evaluation.report import print_table
 
 
 def walked(**feet):

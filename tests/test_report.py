@@ -18,10 +18,11 @@ from springfoot.agents.policy import Policy, fingerprint, save_policy
 from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.settings import reference_gait, settings_from
 from springfoot.evaluation.evaluate_command import evaluate_main
+from springfoot.evaluation.gait_table import people_metrics, print_table
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import load_recording, record
-from springfoot.evaluation.report import people_metrics, print_table, write_report
+from springfoot.evaluation.report import write_report
 from springfoot.evaluation.stride_series import GAIT_CYCLE_COLUMNS
 from springfoot.gait import SpringfootError, human_gait
 from springfoot.studies.body_sweep import draw_pairs, walk_pairs

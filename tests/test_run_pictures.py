@@ -14,7 +14,7 @@ from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData  # typ
 from springfoot.agents import training
 from springfoot.agents.config import TrainingConfig
 from springfoot.agents.policy import read_policy
-from springfoot.agents.run_pictures import FAR, NEAR, curve_figure, gallery_figure
+from springfoot.agents.run_pictures import LEFT_COLOUR, RIGHT_COLOUR, curve_figure, gallery_figure
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings
@@ -60,7 +60,7 @@ def test_the_gallery_shows_the_first_evaluation_episode_of_each(run):
     seen = []
     biped.on_tick = lambda tick: seen.append(tick.measurement.base[0, :2].copy())
     biped.step(policies[0](biped.observe()), active=np.array([True, False]))
-    legs = [line for line in figure.axes[0].lines if to_hex(line.get_color()) in (NEAR, FAR)]
+    legs = [line for line in figure.axes[0].lines if to_hex(line.get_color()) in (LEFT_COLOUR, RIGHT_COLOUR)]
     assert len(legs) == 2 * 4  # two legs each 0.3 s of the episode of 1 s
     assert legs[0].get_xydata()[0] == pytest.approx(seen[0])  # the hip, after the first tick
     on_ground = [line.get_ydata().min() for line in legs]
