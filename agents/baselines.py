@@ -6,7 +6,7 @@ stiffness in N m/rad into an action by the inverse of the environment's log scal
 """
 
 from collections.abc import Callable
-from math import inf, nan, sqrt
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
 from springfoot.envs.control.foot_springs import action_of
-from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_phases
-from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.reference_walk import reference_walks, tabulated_speeds
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.observation_entries import OBSERVATION
@@ -73,12 +72,8 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
     if settings.schedule is not None:
         stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
         return follow(factor * stiffness[None], speeds[:1], settings, body)
-    time_scale = sqrt(body.length_scale)
-    tuned = [
-        leg_constants(settings.equilibrium, settings.cadence, speed / time_scale, settings.feedforward)
-        for speed in speeds
-    ]
-    stiffness = np.stack([fixed_stiffness(constants, body) for constants in tuned])
+    walks = reference_walks(settings)
+    stiffness = np.stack([fixed_stiffness(walk.constants[0], body, walk.human.foot.plateaus) for walk in walks])
     return follow(factor * stiffness, speeds, settings, body)
 
 

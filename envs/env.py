@@ -134,9 +134,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     steady walk between. While it stands the phase waits, and reward and observation are against people and plan there.
 
     With `height_range`, `mass_range` or `speed_range` every episode draws its own body or speed; `options` may set them
-    once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. Everything scales with the body as mechanics do, and is linear
-    between walks tabulated every 0.1 m/s. With `speed_interval` the commanded speed goes, at `speed_rate`, to a new
-    one now and then; the observation tells the speed commanded now.
+    once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. All scales with the body as mechanics do, and is linear between
+    walks tabulated every 0.1 m/s. With `speed_interval` the commanded speed, which is observed, goes to new ones.
 
     ## Episode end
     Termination: the hip is lower than 0.65 m (x height / 1.70 m), the trunk is tilted by more than 0.8 rad, or the
@@ -144,7 +143,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     follows. `gym.make(..., max_episode_steps=100)` ends episodes earlier, never later.
 
     ## Info
-    NumPy numbers, under the same keys from `reset` and `step`. Of each action's name: `stiffness/` [N m/rad], `torque/`
+    NumPy numbers, the same keys from `reset` and `step`. Of each action's name: `stiffness/` [N m/rad], `torque/`
     [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J], the work done in
     the step by changing stiffness and by moving the equilibrium; `controlled/`, 1 where the action counts and 0
     where it is read as 0. Of each reward term `reward/`. `phase/left`, `phase/right` [0, 1), `time` [s], `speed` [m/s].
@@ -165,9 +164,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | 9    | diverged: BADCTRL      | a control was                                                                  |
 
     ## MuJoCo
-    `model` and `data`, as Gymnasium's MuJoCo environments have them. The state lives in the arrays of a batch, so
-    `data` is a new copy at each access, to read and to render; writing to it changes nothing. `model` is that of the
-    present body, to be read: bodies are changed by settings and by the options of a reset.
+    `model` and `data`, as Gymnasium's MuJoCo environments have them, to be read: `data` is a new copy at each access,
+    `model` that of the present body. Bodies are changed by settings and by the options of a reset.
 
     ## Arguments
     Every field of `springfoot.envs.settings.BipedSettings`, by theme, as plain JSON values:
@@ -193,6 +191,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | **reference**             |                 |                                                                    |
     | `cadence`                 | `"people"`      | step length and time of `"people"` or of the `"thesis"`            |
     | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
+    | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
     | **springs**               |                 |                                                                    |
     | `equilibrium`             | `"planned"`     | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                   |
     | `feedforward`             | `"people"`      | moments fed forward: measured on `"people"`, or the `"plan"`'s own |

@@ -5,12 +5,14 @@ from copy import deepcopy
 from difflib import get_close_matches
 from math import isfinite
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, as_float, quoted, require_count, require_number
+from springfoot.gait.human import harmonics
 from springfoot.gait.stiffness import STIFFNESS_RANGE
 
 from .timing import CONTROL_WINDOW
@@ -34,6 +36,14 @@ CONSTRUCTOR_ARGUMENTS = ("render_mode", "num_envs", "num_threads", "autoreset_mo
 
 class UnknownSettingError(SpringfootError, TypeError):
     """A setting that does not exist; also the `TypeError` that Python raises for an unknown keyword argument."""
+
+
+def check_people_file(name: object) -> None:
+    """Refuse what is no file of people's data."""
+    if name is not None:
+        if not isinstance(name, str):
+            raise SpringfootError(f"people_file must be the name of a file, got {quoted(name)}")
+        harmonics(Path(name))
 
 
 def check_names(given: Iterable[str], names: Sequence[str]) -> None:

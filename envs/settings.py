@@ -7,11 +7,12 @@ of `SegmentedFootBiped` and what an evaluation sets anew follow from that.
 import json
 from dataclasses import asdict, dataclass, field, fields
 from math import ceil
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from springfoot.gait.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.errors import SpringfootError, require_number, require_within
-from springfoot.gait.human import HumanGait, human_gait
+from springfoot.gait.human import PEOPLE_FILE, HumanGait, human_gait
 from springfoot.gait.own_data import OwnGait
 from springfoot.gait.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
@@ -22,6 +23,7 @@ from .setting_checks import (
     check_bounds,
     check_choice,
     check_names,
+    check_people_file,
     check_range,
     check_span,
     check_start,
@@ -29,6 +31,7 @@ from .setting_checks import (
     check_windows,
     plain,
 )
+from .setting_themes import CONDITION_THEMES, THEMES
 from .timing import ACTION_STEP
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -36,19 +39,6 @@ Feedforward = Literal["people", "plan"]
 ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
-
-THEMES = {
-    "body": "Whose body walks.",
-    "feet": "What its feet are: intact, prosthetic, weak.",
-    "speed": "How fast it is commanded to walk.",
-    "reference": "Whose walk it is held to.",
-    "springs": "What its ankle and toe springs do, and which part of that the action decides.",
-    "episode": "How an episode starts and ends.",
-    "ground": "What it walks on.",
-    "disturbance": "What disturbs it: pushes, noise of the sensors, delay of the actuators.",
-    "reward": "What it is rewarded for.",
-}
-"""The themes of the settings, and what each one says."""
 
 FRICTION_RANGE = (0.4, 1.2)
 """Allowed coefficients of friction, from a wet floor to rough rubber [-]; chosen."""
@@ -114,6 +104,8 @@ class BipedSettings:
     """Rate at which the commanded speed goes to a new one [m/s^2]."""
     cadence: Cadence = field(default="people", metadata=_REFERENCE)
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
+    people_file: str | None = field(default=None, metadata=_REFERENCE)
+    """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
     """Equilibrium angle of ankle and toe: people's ankle angle with the moment of `feedforward` fed forward (planned),
     that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
@@ -197,6 +189,7 @@ class BipedSettings:
             )
         if self.human is not None:
             OwnGait.from_json(self.human)
+        check_people_file(self.people_file)
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
         if self.stop_at is not None:
@@ -258,8 +251,6 @@ THEME_OF: dict[str, str] = {item.name: item.metadata["theme"] for item in fields
 """Theme of each setting, by its name."""
 DRAWN_SETTINGS = tuple(item.name for item in fields(BipedSettings) if item.metadata.get("drawn"))
 """Names of the settings that make something differ between episodes, or change within one, by chance."""
-CONDITION_THEMES = ("body", "speed", "episode", "ground", "disturbance")
-"""Themes that say who walks where, whatever the policy was trained on."""
 CONDITION_SETTINGS = tuple(
     item.name
     for item in fields(BipedSettings)
@@ -294,7 +285,8 @@ def body_of(settings: BipedSettings) -> Body:
 
 
 def reference_gait(settings: BipedSettings) -> HumanGait:
-    """The walk that the body is held to: people's at its speed and height, or that of `settings.human`."""
+    """The walk that the body is held against: people's at its speed and height, or that of `settings.human`."""
+    people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
     if settings.human is None:
-        return human_gait(settings.speed, settings.height)
-    return OwnGait.from_json(settings.human).gait(settings.speed, settings.height)
+        return human_gait(settings.speed, settings.height, people)
+    return OwnGait.from_json(settings.human).gait(settings.speed, settings.height, people)

@@ -11,7 +11,8 @@ from .arrays import NDArray
 from .body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
 from .com_plan import Point
-from .feet import FLOOR_TOLERANCE, HEEL_STRIKE_PITCH, ROLL_PITCH, TOE_OFF_PITCH, FootPath, feet_under_zmp, pitch_at
+from .feet import FLOOR_TOLERANCE, FootPath, feet_under_zmp
+from .foot_style import HEEL_STRIKE_PITCH, ROLL_PITCH, TOE_OFF_PITCH, pitch_at
 from .plan import WalkPlan
 from .posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_angle
 
@@ -101,9 +102,7 @@ def bout_feet(plan: WalkPlan, step_lengths: NDArray, clearance: float | None) ->
             leaves,
             step_length=travel / 2,
             foot_flat=lands.foot_flat,
-            toe_off_pitch=toe_off,
-            roll_pitch=on_tip,
-            heel_strike_pitch=heel_strike,
+            style=replace(leaves.style, toe_off_pitch=toe_off, roll_pitch=on_tip, heel_strike_pitch=heel_strike),
         )
         strides.append(_out_of_ground(stride))
     landing = plan.step_time * (BEFORE + np.arange(len(strides)))

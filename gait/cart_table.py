@@ -74,6 +74,8 @@ class ComMotion:
     """Slope of the ground [rad], uphill positive: x is along it, z at right angles to it."""
     path: PPoly | HyperbolicPath = field(repr=False)
     """Forward position x [m] over time [s]; `path(time, n)` is its n-th derivative."""
+    ahead: PPoly | None = field(default=None, repr=False)
+    """Forward from the CoM to the pivot of the ground reaction force [m] over time [s] (`leg_spin`); None: 0."""
 
     def position(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """(x, z) [m]."""
@@ -87,9 +89,14 @@ class ComMotion:
         """(forward, up) [m/s^2]."""
         return self.path(time, 2), _bob(time, self.step_time, self.amplitude, self.lowest_at, 2)
 
+    def pivot(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
+        """The point (x, z) [m] through which the ground reaction force acts."""
+        x, z = self.position(time)
+        return (x if self.ahead is None else x + self.ahead(time)), z
+
     def zmp(self, time: ArrayLike) -> NDArray:
-        """ZMP [m] by equation (1)."""
-        return zmp(*self.position(time), *self.acceleration(time), self.slope)
+        """ZMP [m] by equation (1), of the pivot."""
+        return zmp(*self.pivot(time), *self.acceleration(time), self.slope)
 
 
 def periodic_com(
@@ -100,15 +107,18 @@ def periodic_com(
     amplitude: float,
     lowest_at: float,
     slope: float = 0.0,
+    ahead: PPoly | None = None,
 ) -> ComMotion:
     """The one CoM motion over a ZMP that repeats itself every step.
 
     The ZMP p [m] runs straight between `zmp_points` at `zmp_times` [s] (first 0, last the step time T). The height
     is z = height - amplitude cos(2 pi (t - lowest_at) / T) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a
     the `slope` [rad], with x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `amplitude` is 0,
-    else with an error below 1e-9 m.
+    else with an error below 1e-9 m. `ahead` [m] over time [s] is that of `ComMotion`: it stands beside x on the right.
     """
-    if amplitude == 0:
+    if ahead is not None:
+        path = _stepped(zmp_times, zmp_points, step_length, height, amplitude, lowest_at, slope, ahead)
+    elif amplitude == 0:
         lines = PPoly(np.stack([np.diff(zmp_points) / np.diff(zmp_times), zmp_points[:-1]]), zmp_times)
         path = closed_form(lines, step_length, height, slope)
     else:
@@ -120,6 +130,7 @@ def periodic_com(
         lowest_at=lowest_at,
         slope=slope,
         path=path,
+        ahead=ahead,
     )
 
 
@@ -196,6 +207,56 @@ def _integrated(
     acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
     quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
     return PPoly.from_bernstein_basis(quintics)
+
+
+def _stepped(
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    step_length: float,
+    height: float,
+    amplitude: float,
+    lowest_at: float,
+    slope: float,
+    ahead: PPoly,
+) -> PPoly:
+    """The path of `periodic_com` with a pivot `ahead` of the CoM, by Runge-Kutta steps of `STEP_SAMPLES` a step.
+
+    The equation is linear, so each step is a matrix on (x, x', 1), and the product of all has the periodic start.
+    """
+    step_time = zmp_times[-1]
+    back, down = -gravity(slope)
+    pieces = [
+        np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)[:-1]
+        for start, end in pairwise(zmp_times)
+    ]
+    t = np.append(np.concatenate(pieces), step_time)
+
+    def equation(time: NDArray) -> NDArray:
+        z = height + _bob(time, step_time, amplitude, lowest_at)
+        pull = (down + _bob(time, step_time, amplitude, lowest_at, 2)) / z
+        matrix = np.zeros((len(time), 3, 3))
+        matrix[:, 0, 1], matrix[:, 1, 0] = 1.0, pull
+        matrix[:, 1, 2] = pull * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
+        return matrix
+
+    at, lasts, unit = equation(t), np.diff(t)[:, None, None], np.eye(3)
+    middle = equation(0.5 * (t[1:] + t[:-1]))
+    first = at[:-1]
+    second = middle @ (unit + lasts / 2 * first)
+    third = middle @ (unit + lasts / 2 * second)
+    fourth = at[1:] @ (unit + lasts * third)
+    steps = unit + lasts / 6 * (first + 2 * second + 2 * third + fourth)
+    through = [unit]
+    for step in steps:
+        through.append(step @ through[-1])
+    whole = through[-1][:2]
+    start = np.linalg.solve(whole[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole[:, 2])
+    state = np.stack(through) @ np.append(start, 1.0)
+    x, v = state[:, 0], state[:, 1]
+    a, h = (at @ state[..., None])[:, 1, 0], np.diff(t)
+    bernstein = [x[:-1], x[:-1] + h * v[:-1] / 5, x[:-1] + 2 * h * v[:-1] / 5 + h**2 * a[:-1] / 20]
+    bernstein += [x[1:] - 2 * h * v[1:] / 5 + h**2 * a[1:] / 20, x[1:] - h * v[1:] / 5, x[1:]]
+    return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))
 
 
 def _bob(t: ArrayLike, step_time: float, amplitude: float, lowest_at: float, derivative: int = 0) -> NDArray:

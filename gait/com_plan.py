@@ -71,6 +71,10 @@ class ComPlan:
         """CoM acceleration (forward, up) [m/s^2], continuous through the steps."""
         return self.motion.acceleration(self._time(step_phase))
 
+    def pivot(self, step_phase: ArrayLike) -> Point:
+        """The point (x, z) [m] to which the ground reaction force points: the CoM, unless the legs' swing counts."""
+        return self.motion.pivot(self._time(step_phase))
+
     def zmp(self, step_phase: ArrayLike) -> NDArray:
         """ZMP [m] from the stance ankle, by equation (1) from the planned motion itself."""
         return self.motion.zmp(self._time(step_phase))

@@ -17,44 +17,17 @@ from scipy.interpolate import BSpline, make_interp_spline
 from .arrays import NDArray
 from .body import Body
 from .errors import SpringfootError, require_within
+from .foot_style import FootStyle, peoples_style
 
 ROCKER_MARGIN = 0.005
 """The foot comes flat, and stays flat, this far of the ZMP's way before and after it needs to [m at 1.70 m]; chosen."""
 QUICKEST_FOOT_FLAT = 0.02
 """Earliest stride phase of foot flat; chosen: in very short steps the ZMP starts ahead of the landing heel."""
-HEEL_ROCKER_RATE = 4.5
-"""Largest heel-strike pitch over duration of the heel rocker [rad/stride]; chosen: a quick foot flat needs a flat
-landing."""
 HEEL_ROCKER_POWER = 2
 """Power with which the pitch falls with what is left of the heel rocker; chosen: it ends without a jump of its rate."""
 
-# Pairs of constants: over a flat toe (roll 0), and with people's roll over the tip (roll 1); in between along the
-# straight line. Pitches of the latter are people's; the rest was found by least squares against people's thigh, knee
-# and, weighing less, ankle curves at 0.8 to 1.7 m/s; at roll 1 by `python -m springfoot.gait.fit_feet`.
-HEEL_STRIKE_PITCH = ((0.293, 2), (0.336, 1))
-"""Foot to ground at heel strike: a [rad] and n of a (step length / leg length)^n; the thesis's q_f = 0.13 at its 0.6 m,
-and people's 0.24 at 1.2 m/s."""
-TOE_OFF_PITCH = ((1.32, 1.5), (1.39, 0.5))
-"""Foot to ground at toe-off: a [rad] and n of a (step length / leg length)^n; people's is 68 deg at 1.2 m/s."""
-ROLL_PITCH = ((0.0, 0.5), (0.78, 0.5))
-"""Toe to ground at toe-off: a [rad] and n of a (step length / leg length)^n; people's is 37 deg at 1.2 m/s."""
-TOE_ROCKER_POWER = (2.12, 3.08)
-"""The heel rises with this power of the time since heel-off."""
-ROLL_POWER = 2.22
-"""The toe joint rises with this power of the time since the ZMP left the toe tip."""
-QUICKEST_ROLL = 12.0
-"""Largest toe to ground at toe-off over duration of the roll [rad/stride]; chosen, above people's 6."""
-
-# The swing passes two via points, a third and two thirds through it, and leaves and lands at the rockers' position,
-# velocity and acceleration.
 VIA = (1 / 3, 2 / 3)
-"""Parts of the swing at which the via points lie; chosen."""
-VIA_FORWARD = ((0.237, 0.693), (0.319, 0.633))
-"""Place of the ankle at the via points, as parts of its way from toe-off to heel strike."""
-VIA_UP = ((0.225, 0.104), (0.175, 0.090))
-"""Height of the ankle above the floor at the via points [m at 1.70 m]."""
-VIA_PITCH = ((-1.0, -0.183), (-0.746, -0.039))
-"""Pitch of the foot at the via points [rad]."""
+"""Parts of the swing at which its via points lie; chosen."""
 MID_SWING = (0.3, 0.7)
 """Parts of the swing between which ball and heel must clear the floor: they leave and land on either side of it."""
 FLOOR_TOLERANCE = 0.003
@@ -76,17 +49,13 @@ class FootPath:
     """Stride phase at which the toe begins to roll over its tip; `toe_off` where it does not."""
     toe_off: float
     """Stride phase at which the toe leaves the ground."""
-    heel_strike_pitch: float
-    """Foot to ground at heel strike [rad] (thesis q_f)."""
     roll: float
-    """How far the toe rolls over its tip late in stance: 0 not at all, 1 as people's; it weighs the pairs of constants.
-    """
-    toe_off_pitch: float
-    """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
-    roll_pitch: float
-    """Toe to ground at toe-off, as a positive number [rad]."""
+    """How far the toe rolls over its tip late in stance: 0 not at all, 1 as people's; it weighs their pairs of
+    constants (`foot_style`)."""
+    style: FootStyle
+    """Pitches at the events, and the shape of the path between them."""
     lift: float = 0.0
-    """The via points of the swing lie this much [m] higher than `VIA_UP`."""
+    """The via points of the swing lie this much [m] higher than those of the style."""
 
     def pitch(self, stride_phase: ArrayLike) -> NDArray:
         """Foot to ground [rad], toes up positive, 0 from foot flat to heel-off."""
@@ -121,6 +90,21 @@ class FootPath:
     def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
         """Ball of the foot above the floor [m]: the toe joint above its standing height."""
         return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
+
+    @property
+    def heel_strike_pitch(self) -> float:
+        """Foot to ground at heel strike [rad] (thesis q_f)."""
+        return self.style.heel_strike_pitch
+
+    @property
+    def toe_off_pitch(self) -> float:
+        """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
+        return self.style.toe_off_pitch
+
+    @property
+    def roll_pitch(self) -> float:
+        """Toe to ground at toe-off, as a positive number [rad]."""
+        return self.style.roll_pitch
 
     @property
     def clearance(self) -> float:
@@ -162,8 +146,7 @@ class FootPath:
 
     def _toe_rocker(self, phase: ArrayLike) -> NDArray:
         body = self.body
-        power = float(between(TOE_ROCKER_POWER, self.roll))
-        pitch = _rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, power)
+        pitch = _rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, self.style.toe_rocker_power)
         jet = _rolling(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
         about_tip = _turning(self._roll(phase), -body.toe_length, body.toe_joint_height)
         about_tip[0, 0] += body.toe_length
@@ -175,14 +158,14 @@ class FootPath:
         """(3, ...): toe to ground over its tip [rad] and two phase derivatives."""
         if self.roll_pitch == 0:
             return np.zeros((3, *np.shape(phase)))
-        return _rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, ROLL_POWER)
+        return _rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
 
     @cached_property
     def _swing(self) -> BSpline:
         """(x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously differentiable."""
         start, end = self._toe_rocker(self.toe_off), self._heel_rocker(0.0)
         end[0, 0] += 2 * self.step_length
-        way, up, pitch = (between(pair, self.roll) for pair in (VIA_FORWARD, VIA_UP, VIA_PITCH))
+        way, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
         forward = start[0, 0] + way * (end[0, 0] - start[0, 0])
         via = np.stack([forward, up * self.body.length_scale + self.lift, pitch], -1)
         knots = self.toe_off + np.array([0.0, *VIA, 1.0]) * (1 - self.toe_off)
@@ -197,12 +180,13 @@ def feet_under_zmp(
     zmp_points: NDArray,
     roll: float = 0.0,
     clearance: float | None = None,
+    style: FootStyle | None = None,
 ) -> FootPath:
     """Feet whose rockers follow the ZMP, so that it stays on what is on the ground.
 
     The ZMP runs straight between three points [m from the stance ankle] at three times [s]: heel strike, the other
-    foot's toe-off, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. Raises
-    `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
+    foot's toe-off, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style`
+    takes the place of people's. Raises `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
     """
     margin = ROCKER_MARGIN * body.length_scale
     heel, ball, toe_tip = -body.heel_to_ankle, body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
@@ -224,8 +208,12 @@ def feet_under_zmp(
     flat = max(float(flat), QUICKEST_FOOT_FLAT)
     toe_off = float(0.5 + zmp_times[1] / stride_time)
     zmp_leaves_tip = float(np.interp(toe_tip + margin - step_length, zmp_points, zmp_times))
-    tip_off = min(float(0.5 + zmp_leaves_tip / stride_time), toe_off) if roll > 0 else toe_off
-    stride = step_length / body.leg_length
+    rolls = roll > 0 if style is None else style.roll_pitch > 0
+    tip_off = min(float(0.5 + zmp_leaves_tip / stride_time), toe_off) if rolls else toe_off
+    if style is None:
+        style = peoples_style(step_length / body.leg_length, roll, flat, toe_off - tip_off)
+    elif tip_off == toe_off:
+        style = replace(style, roll_pitch=0.0)
     feet = FootPath(
         body=body,
         step_length=step_length,
@@ -233,10 +221,8 @@ def feet_under_zmp(
         heel_off=float(heel_off),
         tip_off=tip_off,
         toe_off=toe_off,
-        heel_strike_pitch=min(pitch_at(HEEL_STRIKE_PITCH, stride, roll), HEEL_ROCKER_RATE * flat),
-        toe_off_pitch=pitch_at(TOE_OFF_PITCH, stride, roll),
-        roll_pitch=min(pitch_at(ROLL_PITCH, stride, roll), QUICKEST_ROLL * (toe_off - tip_off)),
         roll=roll,
+        style=style,
     )
     if clearance is not None:
         clearance = require_within("clearance", clearance, (0.0, body.leg_length), "m")
@@ -259,16 +245,6 @@ def refuse_swing_in_ground(feet: FootPath) -> None:
             f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "
             "a longer step, a longer double support or more clearance helps"
         )
-
-
-def between(pair: tuple, roll: float) -> NDArray:
-    """A constant given at a roll of 0 and of 1."""
-    return (1 - roll) * np.array(pair[0]) + roll * np.array(pair[1])
-
-
-def pitch_at(pair: tuple, stride: float, roll: float) -> float:
-    """A pitch at an event [rad], positive, for a step length over leg length."""
-    return float(between(tuple(a * stride**n for a, n in pair), roll))
 
 
 def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:

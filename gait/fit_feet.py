@@ -1,4 +1,4 @@
-"""Fits the foot's constants at people's roll over the toe tip (`feet.py`) to people's curves, and prints them.
+"""Fits the foot's constants at people's roll over the toe tip (`foot_style.py`) to people's curves, and prints them.
 
 python -m springfoot.gait.fit_feet
 
@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from . import feet
+from . import foot_style
 from .arrays import NDArray
 from .body import Body
 from .com_plan import PEOPLES_SHARE
-from .feet import feet_under_zmp
+from .feet import VIA, feet_under_zmp
 from .human import human_gait
 from .plan import LEAST_FULL_ROLL, WalkPlan, plan_walk
 from .posture import POSTURE_SAMPLES, STRAIGHTEST_KNEE, full_reach, legs_under_com
@@ -73,16 +73,19 @@ def case(speed: float) -> Case:
 def constants() -> NDArray:
     """Those at a roll of 1, in the order of `use`."""
     return np.array(
-        [feet.TOE_ROCKER_POWER[1], feet.ROLL_POWER, *feet.VIA_FORWARD[1], *feet.VIA_UP[1], *feet.VIA_PITCH[1]]
+        [
+            *(foot_style.TOE_ROCKER_POWER[1], foot_style.ROLL_POWER),
+            *(*foot_style.VIA_FORWARD[1], *foot_style.VIA_UP[1], *foot_style.VIA_PITCH[1]),
+        ]
     )
 
 
 def use(values: NDArray) -> None:
     """Put other constants in the place of those at a roll of 1."""
     toe_power, roll_power, *via = map(float, values)
-    feet.TOE_ROCKER_POWER, feet.ROLL_POWER = (feet.TOE_ROCKER_POWER[0], toe_power), roll_power
-    for name, pair in zip(("VIA_FORWARD", "VIA_UP", "VIA_PITCH"), np.reshape(via, (3, len(feet.VIA))), strict=True):
-        setattr(feet, name, (getattr(feet, name)[0], tuple(pair.tolist())))
+    foot_style.TOE_ROCKER_POWER, foot_style.ROLL_POWER = (foot_style.TOE_ROCKER_POWER[0], toe_power), roll_power
+    for name, pair in zip(("VIA_FORWARD", "VIA_UP", "VIA_PITCH"), np.reshape(via, (3, len(VIA))), strict=True):
+        setattr(foot_style, name, (getattr(foot_style, name)[0], tuple(pair.tolist())))
 
 
 def main() -> None:
@@ -101,8 +104,8 @@ def main() -> None:
     )
     use(fit.x)
     for name in ("TOE_ROCKER_POWER", "VIA_FORWARD", "VIA_UP", "VIA_PITCH"):
-        print(name, np.round(getattr(feet, name)[1], 3).tolist())
-    print("ROLL_POWER", round(feet.ROLL_POWER, 2))
+        print(name, np.round(getattr(foot_style, name)[1], 3).tolist())
+    print("ROLL_POWER", round(foot_style.ROLL_POWER, 2))
     print(f"rms {np.sqrt(np.mean(fit.fun**2)):.3f} deg from {np.sqrt(np.mean(errors(start) ** 2)):.3f}")
 
 

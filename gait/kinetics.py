@@ -12,6 +12,7 @@ from .arrays import NDArray
 from .body import GRAVITY, Body, gravity
 from .errors import SpringfootError
 from .feet import turned
+from .fourier import PLAN_HARMONICS, fourier_jet
 from .human import ANGLES, HumanGait, human_cop
 from .leg import (
     FOOT_SEGMENT,
@@ -32,9 +33,6 @@ from .scores import correlation
 
 ZMP_TOLERANCE = 1e-6
 """A ZMP up to this far outside the two centres of pressure is due to rounding [m]; chosen."""
-PLAN_HARMONICS = 20
-"""Harmonics of the stride kept when a plan is differentiated (18 Hz at 1.2 m/s; thigh, knee and ankle within 0.05 deg
-rms). Its toe turns at a new rate from one instant to the next at heel strike and toe-off: an infinite acceleration."""
 PEOPLE_SAMPLES = 100
 """Samples of a stride for people's curves; chosen, as these have 12 harmonics."""
 
@@ -103,12 +101,12 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
     second = phase >= 0.5
     step_phase = 2 * (phase - 0.5 * second)
-    com = np.stack(plan.com(step_phase), -1)
+    pivot = np.stack(plan.pivot(step_phase), -1)
     force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
     zmp, shared = plan.zmp(step_phase), step_phase <= 2 * plan.feet.toe_off - 1
     rear, front = _double_support_cops(plan, step_phase)
     # In single support the stance foot bears all of it at the ZMP, as front foot.
-    on_rear, on_front = share_forces(force, com, np.where(shared, rear, zmp - 1.0), np.where(shared, front, zmp))
+    on_rear, on_front = share_forces(force, pivot, np.where(shared, rear, zmp - 1.0), np.where(shared, front, zmp))
     own = np.where(second[..., None], np.where(shared[..., None], on_rear, 0.0), on_front)
     tip = plan.body.ankle_to_toe_joint + plan.body.toe_length
     on_foot = np.where(shared, front, zmp)
@@ -137,7 +135,7 @@ def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, Foo
     progress = np.array([2 * plan.step_length, 0.0])
     turns = segment_turns(plan.joint_angles(grid), plan.slope)
     hip = np.stack(plan.hip_position(grid), -1) - grid[:, None] * progress
-    jet = _fourier(np.concatenate([turns, hip], -1), PLAN_HARMONICS, phase, plan.stride_time)
+    jet = fourier_jet(np.concatenate([turns, hip], -1), PLAN_HARMONICS, phase, plan.stride_time)
     jet[0][..., 4:] += phase[..., None] * progress
     force, cop = foot_force(plan, phase)
     point = np.stack([cop, np.zeros(cop.shape)], -1)
@@ -165,7 +163,7 @@ def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[Le
 
     def legs(at: NDArray) -> LegMotion:
         turns = segment_turns({name: gait.mean(name, grid) for name in ANGLES})
-        jet = _fourier(turns, PEOPLE_SAMPLES // 2 - 1, at, gait.stride_time)
+        jet = fourier_jet(turns, PEOPLE_SAMPLES // 2 - 1, at, gait.stride_time)
         still = np.zeros((*at.shape, 2))
         return LegMotion(turn=jet[0], rate=jet[1], acceleration=jet[2], hip=still, hip_acceleration=still)
 
@@ -223,13 +221,3 @@ def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float
 def _ankle_over(body: Body, pitch: NDArray, x: float, z: float) -> NDArray:
     """Ankle (..., 2) [m] of a foot at `pitch` that turns about its point (x, z) [m], x from the flat foot's ankle."""
     return np.array([x, z]) + np.stack(turned(pitch, -x, body.ankle_height - z), -1)
-
-
-def _fourier(samples: NDArray, harmonics: int, phase: NDArray, period: float) -> list[NDArray]:
-    """Value (..., columns) at `phase`, and two time derivatives, of the Fourier series of one period's samples."""
-    count = len(samples)
-    weight = np.fft.rfft(samples, axis=0)[: harmonics + 1] / count
-    weight[1:] *= 2
-    turn = 2j * np.pi * np.arange(harmonics + 1)
-    wave = np.exp(phase[..., None] * turn)
-    return [np.real((wave * (turn / period) ** derivative) @ weight) for derivative in range(3)]

@@ -131,6 +131,19 @@ def mass_acceleration(body: Body, motion: LegMotion) -> NDArray:
     return np.sum([mass * _com(body, motion, joints, i)[1] for i, (mass, _) in enumerate(_inertial(body))], axis=0)
 
 
+def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
+    """Rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive as a turn.
+
+    `centre` is the CoM of the whole body, so that its own acceleration does not count in the sum over all parts.
+    """
+    joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    rate = np.zeros(motion.hip.shape[:-1])
+    for index, (mass, inertia) in enumerate(_inertial(body)):
+        com, acceleration = _com(body, motion, joints, index)
+        rate = rate + mass * _cross(com - centre, acceleration) + inertia * motion.acceleration[..., index]
+    return rate
+
+
 def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
     """The load of one force (..., 2) [N] at `cop` (..., 2) (x, z) [m]: ahead of the toe joint (x, [m]) it is the toe's.
 

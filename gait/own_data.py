@@ -16,7 +16,7 @@ from .body import MASS_RANGE
 from .c3d_process import c3d_trial
 from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
-from .human import COLUMNS, FORCES, HumanGait, fourier_series, human_gait, stance_series
+from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
 from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
 from .plausible import require_plausible
 from .strides import MeasuredWalk, cut_strides, together
@@ -56,13 +56,13 @@ class OwnGait:
     sd: Mapping[str, NDArray]
     """As `mean`, of the standard deviation."""
 
-    def gait(self, speed: float, height: float) -> HumanGait:
-        """These curves as a `HumanGait`; what is missing is people's of `height` [m] at `speed` [m/s].
+    def gait(self, speed: float, height: float, people: str | Path = PEOPLE_FILE) -> HumanGait:
+        """These curves as a `HumanGait`; what is missing is that of `people` of `height` [m] at `speed` [m/s].
 
         They are taken as they are, whatever `height` and `speed`. An unknown step length follows from the stride time
         and the file's speed, or else `speed`. `HumanGait.borrowed` names what is taken from people.
         """
-        people = human_gait(speed, height)
+        others = human_gait(speed, height, people)
         own: dict[str, float] = {}
         for name in ("stride_time", "step_length", "toe_off"):
             if (value := getattr(self, name)) is not None:
@@ -70,15 +70,15 @@ class OwnGait:
         if "stride_time" in own:
             own.setdefault("step_length", (self.speed or speed) * own["stride_time"] / 2)
         borrowed = [name for name in ("stride_time", "step_length", "toe_off") if name not in own]
-        borrowed += [name for name in people.mean_series if name not in self.mean]
-        borrowed += [f"{name} sd" for name in people.sd_series if name not in self.sd]
+        borrowed += [name for name in others.mean_series if name not in self.mean]
+        borrowed += [f"{name} sd" for name in others.sd_series if name not in self.sd]
         return replace(
-            people,
+            others,
             speed=self.speed or speed,
             condition=self.name,
             clamped=False,
-            mean_series={**people.mean_series, **self.mean},
-            sd_series={**people.sd_series, **self.sd},
+            mean_series={**others.mean_series, **self.mean},
+            sd_series={**others.sd_series, **self.sd},
             borrowed=tuple(borrowed),
             **own,  # type: ignore[arg-type]
         )

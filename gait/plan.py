@@ -14,16 +14,19 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, PPoly
 
 from .arrays import NDArray
 from .body import GRAVITY, Body
 from .cart_table import ComMotion, periodic_com
 from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point
 from .errors import SpringfootError, require_within
-from .feet import FootPath, between, feet_under_zmp, refuse_swing_in_ground
+from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
+from .foot_style import between
 from .human import ANGLES, HumanGait, human_gait
+from .leg_spin import spinning_legs
 from .posture import POSTURE_SAMPLES, LegPostures, highest_legs, legs_under_com, refuse_impossible_legs
+from .walk_style import WalkStyle
 
 Cadence = Literal["people", "thesis"]
 
@@ -117,6 +120,7 @@ def plan_walk(
     slope: float = 0.0,
     clearance: float | None = None,
     human: HumanGait | None = None,
+    style: WalkStyle | None = None,
 ) -> WalkPlan:
     """Plans a walk of `body` at `speed` [m/s] along the ground.
 
@@ -129,7 +133,8 @@ def plan_walk(
     `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
     (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
     rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
-    `human` takes the place of people (`human_gait`): its step length and time, and its toe in swing.
+    `human` takes the place of people (`human_gait`): its step length and time, and its toe in swing. `style` takes the
+    place of all that people's curves chose here but those (`walk_style`); what else is given counts more.
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
     is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. In a longer one
     the toe rolls over its tip, the further the longer, and the default `zmp_travel` lies further forward: 0.12 s leave
@@ -148,29 +153,32 @@ def plan_walk(
         step_time = require_within("step_time", step_time, STEP_TIME_RANGE, "s")
         step_length = speed * step_time
     if double_support is None:
-        double_support = DOUBLE_SUPPORT * step_time
+        double_support = (DOUBLE_SUPPORT if style is None else style.double_support) * step_time
     double_support = require_within("double_support", double_support, (0.02, 0.4 * step_time), "s")
     # Beyond, the feet would have to pull the body down at mid-stance.
     weightless = GRAVITY * cos(slope) * (step_time / (2 * pi)) ** 2
     if com_amplitude is None:
-        com_amplitude = min(RISE * step_length**2 / (16 * body.leg_length), MOST_UNLOADING * weightless)
+        rise = RISE if style is None else style.rise
+        com_amplitude = min(rise * step_length**2 / (16 * body.leg_length), MOST_UNLOADING * weightless)
     com_amplitude = require_within("com_amplitude", com_amplitude, (0.0, 0.9 * weightless), "m")
     if com_height is not None:
         com_height = require_within("com_height", com_height, (0.5 * body.height, 0.7 * body.height), "m")
 
-    full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
-    roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
-    roll *= float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
-    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, roll)
+    roll = _roll(body, human, double_support, step_time, step_length) if style is None else 1.0
+    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, between(ZMP_TRAVEL, roll) if style is None else style.zmp_travel)
     zmp_times = np.array([0.0, double_support, step_time])
     zmp_points = np.array([zmp_to - step_length, zmp_from, zmp_to])
-    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance)
+    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance, style and style.foot)
 
-    def legs_at(height: float) -> tuple[ComMotion, LegPostures]:
-        motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, double_support / 2, slope)
+    def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
+        lowest_at = double_support / 2
+        motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, lowest_at, slope, ahead)
         return motion, legs_under_com(body, motion, feet, human)
 
-    motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
+    if style is not None:
+        motion, legs = spinning_legs(body, legs_at, step_length, style.knee, com_height)
+    else:
+        motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
     refuse_impossible_legs(body, legs)
     table = np.stack([legs.thigh, legs.knee, legs.ankle, legs.toe], -1)
     plan = WalkPlan(
@@ -200,10 +208,17 @@ def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[flo
     return human.stride_time / 2 / share, human.step_length * share
 
 
-def _zmp_travel(body: Body, given: tuple[float, float] | None, roll: float) -> tuple[float, float]:
-    """ZMP [m] from the stance ankle at the start and end of single support."""
+def _roll(body: Body, human: HumanGait, double_support: float, step_time: float, step_length: float) -> float:
+    """`FootPath.roll` of a double support [s]."""
+    full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
+    roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
+    return roll * float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
+
+
+def _zmp_travel(body: Body, given: tuple[float, float] | None, otherwise: ArrayLike) -> tuple[float, float]:
+    """ZMP [m] from the stance ankle at the start and end of single support; `otherwise` [m at 1.70 m]."""
     if given is None:
-        zmp_from, zmp_to = between(ZMP_TRAVEL, roll) * body.length_scale
+        zmp_from, zmp_to = np.asarray(otherwise) * body.length_scale
         return float(zmp_from), float(zmp_to)
     if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
         raise SpringfootError(f"zmp_travel must be 2 numbers (start, end of single support) [m], got {given!r}")

@@ -124,13 +124,16 @@ def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
 
 
 def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
-    """Toe joint [rad]: flat on the ground in stance, then on its tip; people's in swing, laid down with the foot."""
-    people = human.mean("toe", phase)
+    """Toe joint [rad]: flat on the ground in stance, then on its tip; in swing as the style has it, else people's; laid
+    down with the foot."""
+    swing = feet.style.toe_swing
+    at_toe_off = human.mean("toe", feet.toe_off) if swing is None else swing
+    people = human.mean("toe", phase) if swing is None else np.full(phase.shape, swing)
     landing = people * feet.pitch(phase) / feet.heel_strike_pitch
     rolling = feet.toe_pitch(phase) - feet.pitch(phase)
-    # The toe is back in people's posture a third of swing after toe-off.
+    # The toe is back in its posture a third of swing after toe-off.
     left = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
-    swinging = people + left**2 * (feet.toe_off_pitch - feet.roll_pitch - human.mean("toe", feet.toe_off))
+    swinging = people + left**2 * (feet.toe_off_pitch - feet.roll_pitch - at_toe_off)
     # The tip stays above the floor, under which people's posture would take it early in swing.
     lifted = feet.ball_clearance(phase) + feet.body.toe_joint_height * (1 - cos(feet.roll_pitch))
     level = np.arcsin(np.clip(lifted / feet.body.toe_length, 0.0, 1.0))

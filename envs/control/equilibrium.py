@@ -4,7 +4,7 @@ import numpy as np
 
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.body import Body
-from springfoot.gait.human import HumanGait
+from springfoot.gait.human import FootHabits, HumanGait, foot_habits
 from springfoot.gait.stiffness import StiffnessSchedule
 
 from ..physics.model import ANKLE, damping_times
@@ -14,27 +14,26 @@ from .leg_controller import knot_curve
 from .phase_table import GRID
 from .reference_walk import ReferenceWalk
 
-PLATEAUS = (0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95)
+_PEOPLES = foot_habits()
+PLATEAUS = _PEOPLES.plateaus
 """Stride phases at which loading, early stance, late stance, push-off and swing start and end. On them `plateau_curve`
-is constant, between them linear; chosen."""
-REFERENCE_STIFFNESS = (75.0, 150.0, 450.0, 200.0, 30.0)
-"""K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase (Fukuchi et al. 2018
-data, overground 1.1-1.3 m/s, rounded); in swing a powered prosthesis's (Sup et al. 2009, Table III)."""
-FOOT_FLAT, TOE_OFF = (0.06, 0.12), (0.62, 0.70)
-"""Stride phases over which the planned toe goes flat, and over which it returns to its swing posture; chosen."""
-TOE_SWING_DEG = 10.0
-"""Planned toe angle in swing [deg]; people's is 8 to 12 deg up (`human_gait(...).mean("toe", ...)`)."""
+is constant, between them linear; chosen near people's."""
+REFERENCE_STIFFNESS = _PEOPLES.ankle_quasi_stiffness
+"""K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase, of the package's own
+file (`springfoot.gait.human`)."""
+FOOT_FLAT, TOE_OFF = _PEOPLES.toe_flat, _PEOPLES.toe_off
+"""Stride phases over which people's planned toe goes flat, and over which it returns to its swing posture."""
 
 
-def plateau_curve(values: tuple[float, ...]) -> NDArray:
+def plateau_curve(values: tuple[float, ...], plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
     """(SAMPLES,) curve on `GRID` that has these five values on the plateaus; periodic, linear between them."""
-    return np.interp(GRID, PLATEAUS, np.repeat(values, 2), period=1.0)
+    return np.interp(GRID, plateaus, np.repeat(values, 2), period=1.0)
 
 
 def foot_curves(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> tuple[NDArray, NDArray]:
     """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
     if settings.schedule is None:
-        stiffness, rest = fixed_stiffness(constants, walk.body), neutral(constants)
+        stiffness, rest = fixed_stiffness(constants, walk.body, walk.human.foot.plateaus), neutral(constants)
     else:
         stiffness, rest = StiffnessSchedule.from_json(settings.schedule).at(GRID)
     match settings.equilibrium:
@@ -47,30 +46,30 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
     return rest, stiffness
 
 
-def fixed_stiffness(constants: LegConstants, body: Body) -> NDArray:
+def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
     """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the fixed schedule, which was tuned together with the legs."""
     toe = np.full(len(GRID), constants.toe_schedule)
-    return np.stack([plateau_curve(constants.ankle_schedule), toe], axis=-1) * body.stiffness_scale
+    return np.stack([plateau_curve(constants.ankle_schedule, plateaus), toe], axis=-1) * body.stiffness_scale
 
 
 def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad] that follows people's ankle and feeds a moment forward through K_ref.
+    """(SAMPLES, 2) equilibrium [rad] that follows the guide's ankle and feeds a moment forward through its K_ref.
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
     times the moment M of the walk (plantarflexion positive). The toe's equilibrium is the tuned angle from foot flat to
-    toe-off, and `TOE_SWING_DEG` otherwise.
+    toe-off, and that in swing otherwise.
     """
-    body, human = walk.body, walk.human
+    body, human, foot = walk.body, walk.human, walk.human.foot
     beta, period = damping_times(body)[ANKLE], constants.period_factor * walk.plan.stride_time
-    quasi = plateau_curve(REFERENCE_STIFFNESS) * body.stiffness_scale
+    quasi = plateau_curve(foot.ankle_quasi_stiffness, foot.plateaus) * body.stiffness_scale
     lead = beta * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
     ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
-    return np.stack([ankle, _toe(constants.toe_flat_deg)], axis=-1)
+    return np.stack([ankle, _toe(foot, constants.toe_flat_deg)], axis=-1)
 
 
 def angle(human: HumanGait) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad]: people's ankle angle alone, and the planned toe."""
-    return np.stack([human.mean("ankle", GRID), _toe(0.0)], axis=-1)
+    """(SAMPLES, 2) equilibrium [rad]: the guide's ankle angle alone, and the planned toe."""
+    return np.stack([human.mean("ankle", GRID), _toe(human.foot, 0.0)], axis=-1)
 
 
 def neutral(constants: LegConstants) -> NDArray:
@@ -78,6 +77,6 @@ def neutral(constants: LegConstants) -> NDArray:
     return np.tile(np.deg2rad(constants.neutral_deg), (len(GRID), 1))
 
 
-def _toe(flat_deg: float) -> NDArray:
-    corners = [*FOOT_FLAT, *TOE_OFF]
-    return np.deg2rad(np.interp(GRID, corners, [TOE_SWING_DEG, flat_deg, flat_deg, TOE_SWING_DEG]))
+def _toe(foot: FootHabits, flat_deg: float) -> NDArray:
+    corners, swing = [*foot.toe_flat, *foot.toe_off], foot.toe_swing_deg
+    return np.deg2rad(np.interp(GRID, corners, [swing, flat_deg, flat_deg, swing]))

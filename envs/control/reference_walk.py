@@ -85,7 +85,7 @@ def reference_walk_at(
     body = body_of(settings)
     settings = replace(settings, speed=speed)
     human = reference_gait(settings)
-    if settings.human is None:
+    if settings.human is None and settings.people_file is None:
         plan = _plan(body, speed, settings.cadence)
     else:
         plan = plan_walk(body, speed, settings.cadence, human=human)
@@ -97,12 +97,12 @@ def reference_walk_at(
         human=human,
         plan=over_peoples_zmp(plan),
         constants=tuple(legs),
-        moments=_plans_moments(plan) if settings.feedforward == "plan" else _peoples_moments(human, body),
+        moments=_plans_moments(plan) if settings.feedforward == "plan" else _moments_of(human, body),
     )
 
 
-def _peoples_moments(human: HumanGait, body: Body) -> NDArray:
-    """(SAMPLES, 3) `ReferenceWalk.moments` as they were measured on people."""
+def _moments_of(human: HumanGait, body: Body) -> NDArray:
+    """(SAMPLES, 3) `ReferenceWalk.moments` as they are in a gait."""
     moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
