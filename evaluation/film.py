@@ -39,7 +39,7 @@ def save_film(path: Path, recording: Recording, progress: Callable[[float], obje
     Raises `SpringfootError` where there is no OpenGL, no encoder, or the encoder fails.
     """
     require_film()
-    import imageio_ffmpeg
+    import imageio_ffmpeg  # pyright: ignore[reportMissingImports]  # optional
 
     model, per_second = sloping_spec(recording).compile(), round(1 / (TICK * TICKS_A_FRAME))
     data = mujoco.MjData(model)

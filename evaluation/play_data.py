@@ -110,8 +110,11 @@ def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], ND
 
 
 def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body) -> NDArray:
-    """(T, 26) columns of `BODY_PARTS`: hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP forward of the
-    hip; forces in body weights, and `up` times where it acts forward of the hip, 0 without a force."""
+    """(T, 26) columns of `BODY_PARTS`.
+
+    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP forward of the hip; forces in body weights, and
+    `up` times where it acts forward of the hip, 0 without a force.
+    """
     hip = series["base"][:, :1]
     ahead = np.array([[1.0, 0.0]]) * hip
     force = series["force"] / (body.total_mass * GRAVITY)

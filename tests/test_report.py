@@ -58,8 +58,7 @@ def recording():
 
 @pytest.fixture(scope="module")
 def folder(recording, tmp_path_factory):
-    path = tmp_path_factory.mktemp("report")
-    write_report(path, recording, measure(recording))
+    write_report(path := tmp_path_factory.mktemp("report"), recording, measure(recording))
     return path
 
 
@@ -298,4 +297,5 @@ def test_every_column_and_array_is_documented_and_nothing_else(folder):
 
 def test_every_column_of_a_pair_is_documented_and_nothing_else():
     policy, settings = prepare("schedule", {"episode_seconds": 0.1})
-    assert documented("### `pairs.csv`") == list(walk_pairs(policy, settings, draw_pairs(settings, 1), name="x")[0])
+    pairs = walk_pairs(policy, settings, draw_pairs(settings, 1), name="schedule")
+    assert documented("### `pairs.csv`") == list(pairs[0])
