@@ -21,7 +21,7 @@ from .files import write_atomically
 
 DIGEST = "sha256"
 """Name of the digest among the entries of the header."""
-MOST_BYTES, MOST_HEADER = 2**27, 2**24
+MOST_TENSOR_BYTES, MOST_HEADER = 2**27, 2**24
 """Largest file, and largest header in it, that are read or written [bytes]; chosen, hundreds of times usual ones."""
 
 
@@ -31,8 +31,8 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
     packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
     text = _text(header | {DIGEST: digest_of(header, packed)})  # one entry: safetensors has no order of several
     content = to_safetensors(packed, {key: text})
-    if len(content) > MOST_BYTES or len(text) > MOST_HEADER:
-        raise SpringfootError(f"{path} must have at most {MOST_BYTES:,} bytes, would have {len(content):,}")
+    if len(content) > MOST_TENSOR_BYTES or len(text) > MOST_HEADER:
+        raise SpringfootError(f"{path} must have at most {MOST_TENSOR_BYTES:,} bytes, would have {len(content):,}")
     write_atomically(path, content)
 
 
@@ -45,8 +45,8 @@ def read_tensors(
     without a digest, of an earlier version, is read without that check.
     """
     try:
-        if (size := path.stat().st_size) > MOST_BYTES:
-            raise SpringfootError(f"{path} must have at most {MOST_BYTES:,} bytes, has {size:,}")
+        if (size := path.stat().st_size) > MOST_TENSOR_BYTES:
+            raise SpringfootError(f"{path} must have at most {MOST_TENSOR_BYTES:,} bytes, has {size:,}")
         with path.open("rb") as opened:
             if (header_size := int.from_bytes(opened.read(8), "little")) > MOST_HEADER:
                 raise SpringfootError(

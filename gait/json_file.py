@@ -8,13 +8,13 @@ from .errors import SpringfootError, printable
 from .seal import require_whole
 from .text_table import read_bytes
 
-MOST_BYTES = 2**23
+MOST_JSON_BYTES = 2**23
 """Largest JSON file that is read; chosen, hundreds of times a usual one: an object takes twenty times its text."""
 
 
 def read_object(path: Path, what: str) -> dict[str, Any]:
     """The object in a JSON file; else `SpringfootError`, which says that the file is no `what`."""
-    content = read_bytes(path, MOST_BYTES)
+    content = read_bytes(path, MOST_JSON_BYTES)
     require_whole(path, content)
     try:
         value = json.loads(content)

@@ -14,7 +14,7 @@ from .arrays import NDArray
 from .errors import SpringfootError
 from .seal import require_whole
 
-MOST_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_000_000
+MOST_TEXT_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_000_000
 """Largest text file that is read: bytes, letters of a line, columns, cells; chosen: 25 minutes of 20 curves at 100 Hz,
 which take less than half a gigabyte."""
 
@@ -66,7 +66,7 @@ def existing(path: Path) -> Path:
     return path
 
 
-def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     """What a file holds; `SpringfootError` if there is none, or more than `most` bytes, which are then not read."""
     with existing(path).open("rb") as file:
         size = path.stat().st_size

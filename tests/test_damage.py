@@ -11,7 +11,7 @@ from safetensors.numpy import load, save
 
 from springfoot.agents.config import TrainingConfig
 from springfoot.agents.policy import ENTRIES, read_policy
-from springfoot.agents.tensor_file import DIGEST, MOST_BYTES, read_tensors, write_tensors
+from springfoot.agents.tensor_file import DIGEST, MOST_TENSOR_BYTES, read_tensors, write_tensors
 from springfoot.agents.training import STATE, STATE_KEY, resume, train
 from springfoot.envs import BipedSettings
 from springfoot.gait import SpringfootError
@@ -66,7 +66,7 @@ def test_a_file_cut_short_or_too_large_is_refused(run, tmp_path):
         with pytest.raises(SpringfootError, match=r"is not a \.safetensors file"):
             read_policy(path)
     with path.open("wb") as file:
-        file.truncate(MOST_BYTES + 1)  # sparse: it takes no room
+        file.truncate(MOST_TENSOR_BYTES + 1)  # sparse: it takes no room
     with pytest.raises(SpringfootError, match=r"must have at most 134,217,728 bytes, has 134,217,729"):
         read_policy(path)
 

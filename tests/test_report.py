@@ -42,8 +42,7 @@ FILES = {
     "walk.sto",
     "model.xml",
 }
-PARQUET = {"every_stride.parquet"}
-"""Where pyarrow is installed."""
+PARQUET = {"every_stride.parquet"}  # where pyarrow is installed
 
 
 def walked(episodes=2, name="schedule", **settings):

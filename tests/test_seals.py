@@ -16,11 +16,10 @@ from springfoot.evaluation.recording import load_recording, record
 from springfoot.evaluation.schedule_tables import write_schedules
 from springfoot.gait import SpringfootError
 from springfoot.gait.foot_file import read_foot
-from springfoot.gait.json_file import MOST_BYTES as MOST_JSON
-from springfoot.gait.json_file import read_object
+from springfoot.gait.json_file import MOST_JSON_BYTES, read_object
 from springfoot.gait.own_data import read_gait
 from springfoot.gait.seal import BLANK, require_whole, sealed
-from springfoot.gait.text_table import LONGEST_LINE, MOST_BYTES, MOST_CELLS, read_csv
+from springfoot.gait.text_table import LONGEST_LINE, MOST_CELLS, MOST_TEXT_BYTES, read_csv
 
 READERS = {
     "stiffness_schedule.csv": lambda path: schedule_file(str(path), BipedSettings()),
@@ -104,13 +103,13 @@ def sparse(path, size):
 @pytest.mark.parametrize(
     ("name", "read", "most"),
     [
-        ("a.csv", read_gait, MOST_BYTES),
-        ("a.mot", read_gait, MOST_BYTES),
-        ("a.c3d", read_gait, MOST_BYTES),
-        ("a.csv", read_foot, MOST_BYTES),
-        ("a.json", read_foot, MOST_JSON),
-        ("a.csv", READERS["stiffness_schedule.csv"], MOST_BYTES),
-        ("a.json", READERS["finite_states.json"], MOST_JSON),
+        ("a.csv", read_gait, MOST_TEXT_BYTES),
+        ("a.mot", read_gait, MOST_TEXT_BYTES),
+        ("a.c3d", read_gait, MOST_TEXT_BYTES),
+        ("a.csv", read_foot, MOST_TEXT_BYTES),
+        ("a.json", read_foot, MOST_JSON_BYTES),
+        ("a.csv", READERS["stiffness_schedule.csv"], MOST_TEXT_BYTES),
+        ("a.json", READERS["finite_states.json"], MOST_JSON_BYTES),
     ],
 )
 def test_gigabytes_are_refused_unread(tmp_path, name, read, most):
