@@ -7,7 +7,7 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help install walk test test-wheel test-sdist test-learners check format bench feet clean
+.PHONY: help install walk test test-wheel test-sdist test-learners fuzz extremes check format bench feet clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -15,6 +15,8 @@ help:
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make test-learners  train with every library of docs/learners.md, each outside $(VENV); goes on after a stop"
+	@echo "make fuzz     change files of every kind at random for ten minutes, and read them"
+	@echo "make extremes ten million extreme steps in drawn settings: is all finite, and the memory flat?"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
@@ -106,6 +108,12 @@ feet: install
 
 bench: install
 	$(BIN)/python -m benchmarks.bench
+
+fuzz: install
+	$(BIN)/python -m benchmarks.fuzz_readers --seconds 600
+
+extremes: install
+	$(BIN)/python -m benchmarks.extreme_steps --steps 10000000
 
 # What pyright and import-linter cannot see: the rooms behind an editable install's finder; and the names MuJoCo compiles in
 # (no stubs yet).

@@ -1,5 +1,6 @@
 """What every command does around its work: tell bad input in one line, return an exit code, name its results."""
 
+import errno
 import io
 import re
 import sys
@@ -15,6 +16,8 @@ from springfoot.gait.errors import SpringfootError, printable
 from .baselines import FROZEN, SCHEDULE_SUFFIXES
 
 Flags = TypeVar("Flags")
+_NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
+"""Errors of the system that end a writing: full, read-only, forbidden, broken, vanished."""
 _OURS = {
     r"^Error parsing (--\S+): ": r"\1 ",
     r"invalid literal for int\(\) with base 10: ": "must be a whole number, got ",
@@ -67,10 +70,21 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
     except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
         raise
     except (SpringfootError, OSError, MemoryError) as error:
-        print(f"{name}: error: {printable(str(error))}", file=sys.stderr)
+        print(f"{name}: error: {printable(_told(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
+
+
+def _told(error: Exception) -> str:
+    """What happened, and where files cannot be written what of them is safe."""
+    if isinstance(error, MemoryError):
+        return "not enough memory; results are written whole or not at all"
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    where = "" if error.filename is None else f": {error.filename}"
+    safe = "; results are written whole or not at all" if error.errno in _NOT_WRITTEN else ""
+    return f"{error.strerror}{where}{safe}"
 
 
 def policy_label(name: str) -> str:

@@ -107,6 +107,16 @@ def test_a_cache_cut_short_is_made_anew(tmp_path, ending, part):
     assert alone(tmp_path).stdout == "1 0\n"
 
 
+def test_a_cache_with_a_flipped_bit_does_not_run(tmp_path):
+    assert alone(tmp_path).stdout == "0 0\n"
+    (file,) = (tmp_path / "__pycache__").glob("alone.whole*.nbc")
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    assert alone(tmp_path).stdout == "0 0\n"
+    assert alone(tmp_path).stdout == "1 0\n"
+
+
 def test_a_full_disk_costs_the_cache_alone_and_says_so_once(tmp_path):
     assert alone(tmp_path, "full").stdout == "0 1\n"
     assert alone(tmp_path).stdout == "0 0\n"

@@ -10,6 +10,7 @@ own code and of all that it uses: the kernels it calls, in whatever file, and co
 what it uses.
 """
 
+import pickle
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,6 +22,7 @@ import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.serialize import dumps
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -49,6 +51,10 @@ class _KernelCache(FunctionCache):
     too, as with Python's own `__pycache__`. Nothing that a user hands over is read this way.
     """
 
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file: Any = _DigestedFile(self._cache_file)
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What is kept, or None where there is nothing or its files are damaged; those begin anew."""
         try:
@@ -64,6 +70,28 @@ class _KernelCache(FunctionCache):
             super().save_overload(sig, data)
         except Exception as error:
             _warn_of_compiling(str(error))
+
+
+class _DigestedFile:
+    """A file of numba's cache whose kernels have a digest each: machine code that is damaged must not run."""
+
+    def __init__(self, file: Any) -> None:
+        self.flush, self._file = file.flush, file
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep a kernel."""
+        content = dumps(data)
+        self._file.save(key, (sha256(content).digest(), content))
+
+    def load(self, key: Any) -> Any:
+        """What is kept, or None; raises `ValueError` for damage, and what pickle and unpacking raise."""
+        found = self._file.load(key)
+        if found is None:
+            return None
+        digest, content = found
+        if sha256(content).digest() != digest:
+            raise ValueError("damaged")
+        return pickle.loads(content)
 
 
 @cache

@@ -1,0 +1,232 @@
+"""Every reader of files, and small valid files for each to begin with."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors.numpy import save
+
+from springfoot.agents.config import TrainingConfig, config_from_json, config_to_json
+from springfoot.agents.foreign_policy import contract_path, onnx_policy
+from springfoot.agents.policy import find_policy, read_policy
+from springfoot.agents.schedule_files import schedule_file
+from springfoot.agents.tensor_file import DIGEST, read_tensors
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.evaluation.policies import prepare
+from springfoot.evaluation.recording import Recording, load_recording, record
+from springfoot.evaluation.schedule_tables import finite_states, write_schedules
+from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import SpringfootError
+from springfoot.gait.foot_file import read_foot
+from springfoot.gait.human import COLUMNS, human_gait
+from springfoot.gait.json_file import read_object
+from springfoot.gait.own_data import OwnGait, read_gait
+
+TASK = BipedSettings()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """A way to read files."""
+
+    read: Callable[[Path], Any]
+    """Reads one and uses what it read, or raises `SpringfootError`."""
+    suffix: str
+    """Ending of its files' names."""
+    bases: tuple[bytes, ...]
+    """Valid files."""
+
+
+def readers(folder: Path) -> dict[str, Reader]:
+    """Every reader by name; what it takes to make files of theirs stands in `folder`."""
+    walk = record(*prepare("schedule", {"episode_seconds": 4.0}), name="schedule", episodes=1)
+    recording = folder / "strides.npz"
+    walk.save(recording)
+    own = OwnGait.from_json(read_gait(_write(folder / "own.csv", _percent())).to_json())
+    found = {
+        "policy": Reader(
+            read=_walk_on, suffix=".safetensors", bases=(_policy(), find_policy("pretrained").read_bytes())
+        ),
+        "training state": Reader(read=_state, suffix=".safetensors", bases=(_state_file(),)),
+        "record of a run": Reader(read=_record, suffix=".json", bases=(json.dumps(_run()).encode(),)),
+        "recording": Reader(read=load_recording, suffix=".npz", bases=(recording.read_bytes(),)),
+        "schedule": Reader(read=_schedule, suffix=".csv", bases=(_schedule_table(walk, folder),)),
+        "finite states": Reader(read=_schedule, suffix=".json", bases=(json.dumps(finite_states(walk)).encode(),)),
+        "own data, mean curves": Reader(read=_own, suffix=".csv", bases=(_percent(), _percent(("knee", "ankle")))),
+        "own data over time": Reader(read=_own, suffix=".csv", bases=(_over_time(),)),
+        "own data of OpenSim": Reader(read=_own, suffix=".mot", bases=(_opensim(),)),
+        "own data, C3D": Reader(read=_own, suffix=".c3d", bases=_c3d(folder)),
+        "foot, table": Reader(read=_foot, suffix=".csv", bases=(_foot_table(),)),
+        "foot, JSON": Reader(read=_foot, suffix=".json", bases=tuple(json.dumps(foot).encode() for foot in _FEET)),
+        "settings": Reader(
+            read=lambda path: settings_from(**read_object(path, "settings")),
+            suffix=".json",
+            bases=(json.dumps(settings_to_json(TASK) | {"human": own.to_json()}).encode(),),
+        ),
+        "ONNX": Reader(read=onnx_policy, suffix=".onnx", bases=_onnx(folder)),
+        "contract of an ONNX file": Reader(
+            read=_contract(folder), suffix=".json", bases=(contract_path(folder / "walk.onnx").read_bytes(),)
+        ),
+    }
+    return {name: reader for name, reader in found.items() if reader.bases}
+
+
+def _write(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+# Policies, states, records -----------------------------------------------------------------------------------
+
+
+def _policy() -> bytes:
+    policy = read_policy("pretrained")
+    tensors = {"observation.mean": policy.observation_mean, "observation.variance": policy.observation_variance}
+    for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
+        tensors |= {f"layer.{layer}.weight": weight, f"layer.{layer}.bias": bias}
+    return save(tensors, {"springfoot": json.dumps(policy.header)})  # without a digest, as earlier versions wrote it
+
+
+def _walk_on(path: Path) -> None:
+    policy = read_policy(path)
+    policy(np.ones((3, policy.layer_sizes[0])))
+
+
+def _state_file() -> bytes:
+    tensors = {"network.bias": np.zeros(4, np.float32), "adam.0.step": np.float32(3.0), "return.var": np.float64(1.0)}
+    header = json.dumps({"timesteps": 64})
+    return save({name: np.asarray(value) for name, value in tensors.items()}, {"springfoot-training": header})
+
+
+def _state(path: Path) -> None:
+    read_tensors(path, "springfoot-training", "training state", {"timesteps", DIGEST})
+
+
+def _run() -> dict[str, Any]:
+    evaluation = {"timesteps": 64, "seconds": 1.0, "return_mean": 3.5, "falls": 0, "seconds_mean": 10.0}
+    return {"config": config_to_json(TrainingConfig()), "sessions": [{}], "evaluations": [evaluation], "seconds": 1.0}
+
+
+def _record(path: Path) -> None:
+    record = read_object(path, "record of a run")
+    try:
+        config_from_json(record["config"])
+    except SpringfootError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:  # `springfoot.agents.training` tells of them so
+        raise SpringfootError(f"{path} is not the record of a run: {error!r}") from None
+
+
+# Schedules, own data, feet -----------------------------------------------------------------------------------
+
+
+def _schedule_table(walk: Recording, folder: Path) -> bytes:
+    write_schedules(folder, walk)
+    rows = (folder / "stiffness_schedule.csv").read_text(encoding="utf-8").splitlines()
+    return "\n".join(row.rpartition(",")[0] for row in rows).encode()  # without its digest
+
+
+def _schedule(path: Path) -> None:
+    given, make = schedule_file(str(path), TASK)
+    settings = settings_from(**given)
+    make(settings)(np.zeros((2, 43), np.float32))
+
+
+def _own(path: Path) -> None:
+    read_gait(path).gait(1.2, 1.7).mean("ankle", 0.3)
+
+
+def _table(columns: dict[str, Any], head: str = "", separator: str = ",") -> bytes:
+    rows = zip(*columns.values(), strict=True)
+    lines = [separator.join(columns), *(separator.join(f"{value:.6g}" for value in row) for row in rows)]
+    return (head + "\n".join(lines) + "\n").encode()
+
+
+def _percent(names: tuple[str, ...] = tuple(COLUMNS)) -> bytes:
+    people, phase = human_gait(1.2), PERCENT / 100
+    return _table({"percent": PERCENT} | {COLUMNS[name]: _shown(name, people.mean(name, phase)) for name in names})
+
+
+def _shown(name: str, values: Any) -> Any:
+    return np.degrees(values) if COLUMNS[name].endswith("_deg") else values
+
+
+def _time() -> Any:
+    return np.arange(400) / 100
+
+
+def _over_time() -> bytes:
+    people, columns = human_gait(1.2), {"time_s": _time()}
+    for side, offset in (("left", 0.2), ("right", 0.7)):
+        phase = _time() / people.stride_time + offset
+        for name in ("thigh", "knee", "ankle", "grf_vertical", "grf_forward"):
+            columns[f"{COLUMNS[name]}_{side}"] = _shown(name, people.mean(name, phase))
+    return _table(columns)
+
+
+def _opensim() -> bytes:
+    people, columns = human_gait(1.2), {"time": _time(), "pelvis_tilt": 0 * _time(), "pelvis_tx": 1.2 * _time()}
+    for side, offset in (("l", 0.2), ("r", 0.7)):
+        phase = _time() / people.stride_time + offset
+        for name, column in {"thigh": "hip_flexion", "knee": "knee_angle", "ankle": "ankle_angle"}.items():
+            columns[f"{column}_{side}"] = np.degrees(people.mean(name, phase))
+    return _table(columns, "walk.mot\nnRows=400\ninDegrees=yes\nendheader\n", "\t")
+
+
+def _c3d(folder: Path) -> tuple[bytes, ...]:
+    try:
+        import ezc3d  # an extra
+    except ImportError:
+        return ()
+    people, points, flat = human_gait(1.2), {}, 0 * _time()
+    for side, offset in (("L", 0.2), ("R", 0.7)):
+        phase = _time() / people.stride_time + offset
+        for name, label in {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles"}.items():
+            points[side + label] = np.stack([np.degrees(people.mean(name, phase)), flat, flat])
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [100]
+    file["parameters"]["POINT"]["LABELS"]["value"] = list(points)
+    data = np.stack([*points.values()], axis=1)
+    file["data"]["points"] = np.concatenate([data, np.ones((1, *data.shape[1:]))])
+    file.write(str(folder / "walk.c3d"))
+    return ((folder / "walk.c3d").read_bytes(),)
+
+
+_FEET = (
+    {"kind": "passive", "ankle_stiffness": 600.0, "toe_stiffness": 50.0, "orthosis": {"ankle_stiffness": 100.0}},
+    {"ankle": [[0.0, 300.0, 0.0], [0.6, 50.0, 0.1]], "toe": [[0.0, 28.0, 0.0]]},
+)
+
+
+def _foot_table() -> bytes:
+    angle = np.linspace(-20, 20, 9)
+    return _table({"ankle_deg": angle, "ankle_torque_Nm": -8.0 * angle, "toe_deg": angle, "toe_torque_Nm": -angle})
+
+
+def _foot(path: Path) -> None:
+    settings_from(right_foot=read_foot(path))
+
+
+# ONNX --------------------------------------------------------------------------------------------------------
+
+
+def _onnx(folder: Path) -> tuple[bytes, ...]:
+    try:
+        import onnx  # noqa: F401  # an extra
+
+        from springfoot.agents.export import export_policy
+    except ImportError:
+        return ()
+    export_policy(read_policy("pretrained"), folder / "walk.onnx", "onnx")
+    return ((folder / "walk.onnx").read_bytes(),)
+
+
+def _contract(folder: Path) -> Callable[[Path], Any]:
+    def read(path: Path) -> None:
+        contract_path(folder / "walk.onnx").write_bytes(path.read_bytes())
+        onnx_policy(folder / "walk.onnx")
+
+    return read
