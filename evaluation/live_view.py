@@ -57,6 +57,8 @@ class LiveView:
     """
 
     def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 8080):
+        session.step()  # compiles, which takes a while
+        session.restart()
         self._session = session
         self._asked: SimpleQueue[dict[str, Any] | Callable[[], None]] = SimpleQueue()
         with redirect_stdout(StringIO()):  # viser would print a table of addresses

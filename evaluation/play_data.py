@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from springfoot.envs.physics.foot import LOCK
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings import body_of, reference_gait
 from springfoot.gait import GRAVITY, Body
@@ -27,6 +28,7 @@ MOMENTS = 51
 """Moments of a stride, every 2 %; of a fall, evenly over its time."""
 FALL_SECONDS = 1.5
 """How much of a fall is shown, its end [s]."""
+STIFFNESS_UNIT = "K, N·m/rad"
 PANELS = {
     "Thigh angle": (ANGLE_COLUMNS["thigh"], "flexion, deg", "thigh"),
     "Knee angle": (ANGLE_COLUMNS["knee"], "flexion, deg", "knee"),
@@ -35,8 +37,10 @@ PANELS = {
     "Ankle moment": (MOMENT_CURVES["ankle"], "plantarflexion, N·m/kg", "ankle_moment"),
     "Vertical force": ("grf_vertical_bw", "up, body weights", "grf_vertical"),
     "Fore-aft force": ("grf_forward_bw", "forward, body weights", "grf_forward"),
+    "Ankle stiffness": ("ankle_stiffness_Nm_per_rad", STIFFNESS_UNIT, None),
+    "Toe stiffness": ("toe_stiffness_Nm_per_rad", STIFFNESS_UNIT, None),
 }
-"""Title -> column of the curves over the stride, unit, and what of people stands behind it."""
+"""Title -> column of the curves over the stride, unit, and what of people stands behind it, if anything."""
 BODY_PARTS = {"base": 3, "angle": 8, "com": 2, "plan": 2, "zmp": 1, "forward": 2, "up": 2, "lever": 2, "stiffness": 4}
 """What the body is drawn from, and how many columns that has; see `_figure_series`."""
 PLAY_COLUMNS = (
@@ -112,8 +116,8 @@ def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], ND
 def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body) -> NDArray:
     """(T, 26) columns of `BODY_PARTS`.
 
-    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP forward of the hip; forces in body weights, and
-    `up` times where it acts forward of the hip, 0 without a force.
+    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP, forward of the hip; forces in body weights;
+    `up` times where it acts forward of the hip, 0 without a force; K.
     """
     hip = series["base"][:, :1]
     ahead = np.array([[1.0, 0.0]]) * hip
@@ -136,6 +140,7 @@ def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body)
 def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
     """All series of a page as text: `low` and `high` of each column, and whole numbers between them."""
     values = np.stack(walks)
+    values = np.where(values < LOCK.stiffness, values, 0.0)  # of a locked joint no K is drawn
     low, high = values.min(axis=(0, 1)), values.max(axis=(0, 1))
     share = (values - low) / np.where(high > low, high - low, 1.0)
     whole = np.round(share * LARGEST).astype("<u2")
@@ -153,6 +158,8 @@ def people_behind(recording: Recording) -> dict[str, Any]:
     human, phase = reference_gait(recording.settings), PERCENT / 100
     curves = {}
     for title, (_, unit, name) in PANELS.items():
+        if name is None:
+            continue
         turn = np.degrees(1.0) if unit.endswith("deg") else 1.0
         curves[title] = {
             "people": shown_numbers(turn * human.mean(name, phase)),

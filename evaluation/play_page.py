@@ -16,9 +16,9 @@ class Grid(NamedTuple):
     speed: Sequence[float]
     """Commanded [m/s]."""
     toe: Sequence[float]
-    """K of the toes [N m/rad]."""
+    """Factors on K of the toes."""
     ankle: Sequence[float]
-    """K of the ankles [N m/rad]."""
+    """Factors on K of the ankles."""
 
     @property
     def size(self) -> int:

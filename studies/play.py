@@ -10,17 +10,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from springfoot.agents.baselines import PolicyFunction
 from springfoot.agents.markdown import table
 from springfoot.agents.source import source
-from springfoot.envs.control.foot_springs import action_of, stiffness_ranges
-from springfoot.envs.settings import BipedSettings, body_of, settings_from
+from springfoot.envs.control.foot_springs import action_of, stiffness_of
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.evaluation.play_data import episodes_of
 from springfoot.evaluation.play_page import Grid, play_page
+from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import BATCH, Recording, record
 from springfoot.evaluation.report_page import PAGE_PACKAGES
 from springfoot.evaluation.stride_series import WARM_UP
 from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError, require_count, require_within
+from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.stiffness import SPRINGS
 
 from .study import Answer, OnProgress, WalkingStudy, without_places
 
@@ -29,15 +33,17 @@ PAGE_NAME = "play.html"
 
 @dataclass(frozen=True, kw_only=True)
 class Play(WalkingStudy):
-    """Record walks with constant stiffness over K of ankle and toe, speed and the right foot; write a page of them."""
+    """Record walks of a policy whose K of ankle and toe is scaled, over speed and right foot; write a page of them."""
 
-    ankle: tuple[float, ...] = (80.0, 130.0, 210.0, 340.0, 550.0)
-    """Stiffness of both ankles [N m/rad], ascending; each about 1.6 times the last."""
-    toe: tuple[float, ...] = (15.0, 40.0, 100.0)
-    """Stiffness of both toes [N m/rad], ascending."""
+    policy: str = "schedule"
+    """Whose stiffness is scaled."""
+    ankle: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4, 2.0)
+    """Factors on the stiffness of both ankles, ascending; a device keeps its own."""
+    toe: tuple[float, ...] = (0.5, 1.0, 2.0)
+    """Factors on the stiffness of both toes, ascending."""
     speed: tuple[float, ...] = (0.8, 1.0, 1.2, 1.4, 1.6)
     """Commanded speeds [m/s], ascending."""
-    feet: tuple[str, ...] = ("intact", "passive", "rigid", "rigid_toe", "no_toe", "drop")
+    feet: tuple[str, ...] = ("intact", "passive", "rigid_toe", "no_toe", "weak")
     """Kinds of the right foot; the left one is intact."""
     episodes: int = 2
     """Episodes of each point."""
@@ -49,22 +55,19 @@ class Play(WalkingStudy):
     QUICK: ClassVar[Mapping[str, Any]] = {
         "episodes": 1,
         "seconds": 6.0,
-        "ankle": (130.0, 340.0),
-        "toe": (15.0, 40.0),
+        "ankle": (0.7, 1.4),
+        "toe": (0.5, 1.0),
         "speed": (1.0, 1.2),
         "feet": ("intact", "passive"),
     }
 
     def check(self) -> None:
-        """Refuse marks of a slider that do not ascend, K that no action gives, and too many episodes of a point."""
+        """Refuse marks of a slider that do not ascend, and too many episodes of a point."""
         super().check()
         for name in ("ankle", "toe", "speed"):
             marks = getattr(self, name)
-            if len(marks) < 2 or any(after <= before for before, after in pairwise(marks)):
-                raise SpringfootError(f"{name} must be at least two ascending numbers, got {marks}")
-        for name, (low, high) in zip(("ankle", "toe"), _ranges(), strict=True):
-            for stiffness in getattr(self, name):
-                require_within(name, stiffness, (low, high), "N m/rad")
+            if len(marks) < 2 or marks[0] <= 0.0 or any(after <= before for before, after in pairwise(marks)):
+                raise SpringfootError(f"{name} must be at least two ascending positive numbers, got {marks}")
         if not self.feet:
             raise SpringfootError("feet must be at least one kind of foot")
         require_count("episodes", self.episodes, 1, BATCH)
@@ -87,8 +90,9 @@ class Play(WalkingStudy):
             walk for foot, speed in product(self.feet, self.speed) for walk in self._walks(foot, speed, progress)
         ]
         words = (
-            f"Recorded were {self.grid.size} points with constant stiffness in both legs, {self.episodes} "
-            f"episode{'s' * (self.episodes > 1)} of {self.seconds:g} s at each, on level ground, 1.70 m and 63 kg."
+            f"Recorded was {self.policy}, its K of ankles and toes times a factor, at {self.grid.size} points, "
+            f"{self.episodes} episode{'s' * (self.episodes > 1)} of {self.seconds:g} s each, on level ground, "
+            "1.70 m and 63 kg."
         )
         made = source(PAGE_PACKAGES)
         commit = f"{made['commit'] or 'none: not in a clone of the project'}{' and changes to it' * made['modified']}"
@@ -104,32 +108,40 @@ class Play(WalkingStudy):
         ]
         text = (
             f"{words}\n\n{table(['right foot', *(f'{speed:g} m/s' for speed in self.speed)], rows)}\n\n"
-            f"Of {falls.shape[-1]} pairs of stiffness: never fell / always fell."
+            f"Of {falls.shape[-1]} pairs of factors: never fell / always fell."
         )
         return Answer(text=text, files={PAGE_NAME: page.text}, sections={"PLAY": text})
 
     def _walks(self, foot: str, speed: float, progress: OnProgress) -> Iterator[Recording]:
-        """A recording of each stiffness, the ankle's changing fastest; as many side by side as a batch takes."""
-        settings = settings_from(right_foot=foot, speed=speed, episode_seconds=self.seconds)
+        """A recording of each pair of factors, the ankle's changing fastest; as many side by side as a batch takes."""
+        conditions = {"right_foot": foot, "speed": speed, "episode_seconds": self.seconds}
+        policy, settings = prepare(self.policy, conditions, self.seed, self.threads)
+        if settings.action_mode != "absolute":
+            raise SpringfootError(f"policy must set K itself (action_mode absolute), got {self.policy}")
         pairs = np.array([(ankle, toe) for toe, ankle in product(self.toe, self.ankle)])
         side_by_side = BATCH // self.episodes
         for begin in range(0, len(pairs), side_by_side):
-            actions = action_of(pairs[begin : begin + side_by_side], settings, body_of(settings))
-            each = np.repeat(np.tile(actions, 2), self.episodes, axis=0).astype(np.float32)
+            factor = np.repeat(pairs[begin : begin + side_by_side], self.episodes, axis=0)
             whole = record(
-                lambda observation, each=each: each,
+                _scaled(policy, factor, settings),
                 settings,
-                name="constant",
-                episodes=len(each),
+                name=self.policy,
+                episodes=len(factor),
                 seed=self.seed,
                 threads=self.threads,
                 progress=progress,
             )
-            for first in range(0, len(each), self.episodes):
+            for first in range(0, len(factor), self.episodes):
                 yield episodes_of(whole, np.arange(first, first + self.episodes))
 
 
-def _ranges() -> NDArray:
-    """(joint, (lowest, highest)) stiffness that actions give to the usual body [N m/rad]."""
-    settings = BipedSettings()
-    return np.stack(stiffness_ranges(settings, body_of(settings)), -1)
+def _scaled(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) -> PolicyFunction:
+    """`policy` with K of ankles and toes times `factor` (N, 2), as far as actions go."""
+    body = body_of(settings)
+
+    def scaled(observation: NDArray) -> NDArray:
+        own = policy(observation).astype(float).reshape(-1, len(SIDES), len(SPRINGS))
+        stiffness = stiffness_of(own, settings, body) * factor[:, None]
+        return action_of(stiffness, settings, body).reshape(len(factor), -1).astype(np.float32)
+
+    return scaled

@@ -19,6 +19,13 @@ def acting(session):
     return session.data().ctrl.reshape(2, 4, 2)[:, 2:, 0]
 
 
+@pytest.fixture(scope="module")
+def walking():
+    session = LiveSession("schedule")
+    walk(session, 5)
+    return session
+
+
 @pytest.fixture
 def twins():
     """Two sessions of the same walk."""
@@ -112,9 +119,8 @@ def test_speed_changes_under_way_and_slope_body_and_feet_begin_anew():
         ({"toe_stiffness": float("nan")}, "toe_stiffness must be a finite number > 0"),
     ],
 )
-def test_what_cannot_be_is_refused_and_nothing_changes(wish, said):
-    session = LiveSession("schedule")
-    walk(session, 5)
+def test_what_cannot_be_is_refused_and_nothing_changes(walking, wish, said):
+    session = walking
     wishes, place = session.wishes, session.data().qpos.copy()
     with pytest.raises(SpringfootError, match=said):
         session.ask(**wish)
