@@ -90,16 +90,12 @@ class Play(WalkingStudy):
             walk for foot, speed in product(self.feet, self.speed) for walk in self._walks(foot, speed, progress)
         ]
         words = (
-            f"Recorded was {self.policy}, its K of ankles and toes times a factor, at {self.grid.size} points, "
+            f"Recorded: the policy {self.policy}, its K of ankles and toes times a factor, at {self.grid.size} points, "
             f"{self.episodes} episode{'s' * (self.episodes > 1)} of {self.seconds:g} s each, on level ground, "
             "1.70 m and 63 kg."
         )
-        made = source(PAGE_PACKAGES)
-        commit = f"{made['commit'] or 'none: not in a clone of the project'}{' and changes to it' * made['modified']}"
-        versions = [f"{name} {number}" for name, number in made["versions"].items()]
-        how = "\n".join(
-            [f"command: {without_places(self.command)}", f"seeds from {self.seed} on", f"commit: {commit}", *versions]
-        )
+        versions = (f"{name} {number}" for name, number in source(PAGE_PACKAGES)["versions"].items())
+        how = "\n".join([f"command: {without_places(self.command)}", f"seeds from {self.seed} on", *versions])
         page = play_page(self.grid, recordings, words, how)
         falls = np.array([each["falls"] for each in page.told]).reshape(len(self.feet), len(self.speed), -1)
         rows = [
