@@ -63,4 +63,4 @@ def _array(content: bytes) -> NDArray:
     shape, _, dtype = read(file)
     if dtype.hasobject or prod(shape) * dtype.itemsize != len(content) - file.tell():
         raise ValueError("not the bytes that its shape says")
-    return np.load(io.BytesIO(content), allow_pickle=False)
+    return np.load(io.BytesIO(content))

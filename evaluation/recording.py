@@ -37,7 +37,7 @@ from .array_file import read_arrays, write_arrays
 
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
-MOST_SECONDS = 100_000
+LONGEST_RECORDING = 100_000
 """Longest recording, all episodes together [s]; chosen: its series have some 6 GB."""
 BATCH = 32
 """Episodes simulated side by side."""
@@ -148,9 +148,9 @@ def _require_whole(recording: Recording) -> None:
 
 def require_recordable(settings: BipedSettings, episodes: int) -> None:
     """Raise `SpringfootError` for episodes whose series would fill the memory."""
-    if episodes * settings.episode_seconds > MOST_SECONDS:
+    if episodes * settings.episode_seconds > LONGEST_RECORDING:
         raise SpringfootError(
-            f"a recording must be of at most {MOST_SECONDS:,} s in all, got {episodes} episodes of "
+            f"a recording must be of at most {LONGEST_RECORDING:,} s in all, got {episodes} episodes of "
             f"{settings.episode_seconds:g} s"
         )
 

@@ -45,7 +45,7 @@ def c3d_trial(path: Path) -> Trial:
         raise SpringfootError(
             f"{path.name} is damaged: ezc3d crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"
         )
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as file:
+    with np.load(io.BytesIO(done.stdout)) as file:
         arrays = dict(file)
     return _trial(json.loads(str(arrays.pop("header"))), arrays)
 
