@@ -27,8 +27,9 @@ Row = Mapping[str, Any]
 def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """What adaptive stiffness changes against the best passive spring, by place, number and search, seeds paired.
 
-    `share` is that change over the gap between the passive and the intact foot; where the interval of the gap over the
-    seeds holds 0 there is no gap to close and no share.
+    `share` is that change over the gap between the passive and the intact foot; where the intact one is not better,
+    or by no more than the interval of the gap over the seeds, there is no gap to close and no share. Of `both` searches
+    the intervals are over the means of each, as what a search finds differs more than what a seed does.
     """
     found = []
     for where in dict.fromkeys(tuple(row[name] for name in WHERE) for row in rows):
@@ -41,7 +42,12 @@ def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
             for label, of in groups:
                 pairs = _pairs(here, asked.key, of)
                 line = dict(zip(WHERE, where, strict=True)) | {"number": asked.key, "search": label}
-                found.append(line | {"pairs": len(pairs)} | _change(pairs, intact[asked.key]))
+                if label == "both":
+                    means = [own.mean(0) for each in of if len(own := _pairs(here, asked.key, [each]))]
+                    change = _change(np.array(means).reshape(-1, 2), intact[asked.key], asked.better, few=True)
+                else:
+                    change = _change(pairs, intact[asked.key], asked.better)
+                found.append(line | {"pairs": len(pairs)} | change)
     return found
 
 
@@ -56,7 +62,8 @@ def _pairs(rows: Sequence[Row], key: str, searches: Sequence[int]) -> np.ndarray
     return np.array([pair for pair in pairs if None not in pair], float).reshape(-1, 2)
 
 
-def _change(pairs: np.ndarray, intact: float | None) -> dict[str, float | None]:
+def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = False) -> dict[str, float | None]:
+    """As `share_rows` tells; of `few` pairs, the means of searches, each must have a gap, as no interval can tell."""
     names = ("passive", "adaptive", "intact", "change", "change_low", "change_high", "share", "share_low", "share_high")
     found: dict[str, float | None] = dict.fromkeys(names)
     if not len(pairs):
@@ -68,8 +75,8 @@ def _change(pairs: np.ndarray, intact: float | None) -> dict[str, float | None]:
     found |= {"change": float(change.mean()), "change_low": low, "change_high": high}
     if intact is not None:
         gap = intact - passive
-        least, most = t_interval(gap)
-        if least * most > 0 and gap.mean():
+        sure = (better * gap).min() > 0 if few else min(t_interval(better * gap)) > 0
+        if sure:
             ends = sorted(value / float(gap.mean()) for value in (low, high))
             found |= {"share": float(change.mean() / gap.mean()), "share_low": ends[0], "share_high": ends[1]}
     return found
@@ -150,8 +157,8 @@ def _shares_text(shares: Sequence[Row]) -> str:
     head = ["", "search", "pairs", "best passive", "adaptive", "intact", "change", "share of the gap closed"]
     return (
         f"{table(head, lines)}\n\nTrained policies, adaptive less best passive of the same search and seed; 95 % "
-        "intervals of the mean, Student's, over seeds (`both`: over seeds of both searches, as if they were alike). "
-        "More push-off work, and less of all else, is better. No gap: the seeds do not tell passive from intact."
+        "intervals of the mean, Student's, over seeds (`both`: over the means of the two searches). "
+        "More push-off work, and less of all else, is better. No gap: the intact foot is not better, or not told apart."
     )
 
 

@@ -112,9 +112,9 @@ class Study:
 
 
 def without_places(command: str) -> str:
-    """A command without the folder and the page it writes to, which are somebody's own."""
+    """A command without the folder, the page and the file it writes to, which are somebody's own."""
     words = shlex.split(command)
-    for flag in ("--out", "--page"):
+    for flag in ("--out", "--page", "--keep"):
         if flag in words:
             place = words.index(flag)
             del words[place : place + 2]

@@ -58,6 +58,8 @@ def test_the_best_spring_takes_least_energy_of_those_that_nobody_falls_with():
     assert best["worst_Nm_deg"] == 4.0
     assert best["worst_more_percent"] == pytest.approx(50.0)
     assert best["springs_without_falls"] == 2
+    fast = [row | {"walked_m_s": 1.0 - 0.1 * abs(row["spring_Nm_deg"] - 4.0)} for row in rows({2.0: 2.0, 4.0: 3.0})]
+    assert best_springs(fast)[0]["fastest_Nm_deg"] == 4.0
     (none,) = best_springs(rows({0.0: 1.0, 2.0: 2.0}, falls=(0.0, 2.0)))
     assert none["best_Nm_deg"] is None
 
@@ -68,7 +70,7 @@ def test_directions_have_their_sign():
         for mass in (50.0, 80.0):
             energies = {spring: abs(spring - least) + 1 for spring in (0.0, 3.0, 6.0)}
             found += rows(energies, strength=strength, mass=mass)
-    text = directions(best_springs(found))
+    text = directions(best_springs(found), "best_Nm_deg")
     assert "weakness ρ +1.00 (0.4: 0.0, 0.3: 3.0, 0.2: 6.0)" in text
     assert "mass ρ +0.00 (50: 3.0, 80: 3.0)" in text
 

@@ -96,6 +96,8 @@ def test_the_share_is_of_the_gap_between_the_best_spring_and_the_intact_foot():
     assert share["share_low"] < 0.5 < share["share_high"]
     worse = share_rows(rows_of([1.5, 1.52, 1.48], [1.6, 1.61, 1.62], 1.3))
     assert next(row["share"] for row in worse if row["number"] == "sound_peak_bw") < 0
+    better = share_rows(rows_of([1.2, 1.21, 1.19], [1.4, 1.41, 1.39], 1.3))  # than the intact foot: no gap to close
+    assert next(row["share"] for row in better if row["number"] == "sound_peak_bw") is None
     none = share_rows(rows_of([1.2, 1.4, 1.3], [1.4, 1.41, 1.39], 1.3))
     assert next(row["share"] for row in none if row["number"] == "sound_peak_bw") is None
 
