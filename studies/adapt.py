@@ -23,14 +23,17 @@ from tqdm import tqdm
 
 from springfoot.agents.files import csv_text, write_atomically
 from springfoot.agents.flags import FootFlag, foot_given
+from springfoot.agents.markdown import table, text_of
 from springfoot.envs.adapted import ADAPTED, LEGS, without_person
 from springfoot.envs.control.leg_constants import TUNED_SPEED, constants_from, leg_constants
 from springfoot.envs.feet import SPRING_NUMBERS, foot_of, foot_setting, kind_of
+from springfoot.envs.setting_checks import LONGEST_EPISODE
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
 from . import person_cost
 from .constants_file import ADAPTED_FEET, read_feet
+from .foot_walks import ASKED, PUSH_NEWTON, SCHEDULE, shown_numbers, walked
 from .person_search import Person, PersonSearch
 from .study import Answer, OnProgress, Study, without_places
 
@@ -82,21 +85,28 @@ class Adapt(Study):
     """Seed of the first search and its walks."""
     threads: int = 1
     """Threads of the physics."""
+    episodes: int = 20
+    """Episodes of the walks that are told of, undisturbed and pushed, not adapted and adapted."""
+    seconds: float = 20.0
+    """Length of each."""
     feet: Annotated[Path, tyro.conf.arg(metavar="FILE")] = ADAPTED_FEET
     """File of adapted feet to read and to write."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {"generations": 2, "population": 4, "searches": (1,)}
+    QUICK: ClassVar[Mapping[str, Any]] = {
+        **{"generations": 2, "population": 4, "searches": (1,), "episodes": 1, "seconds": 6.0}
+    }
     PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:
         """Refuse counts out of range."""
-        for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0)):
+        for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0), ("episodes", 1)):
             require_count(count, getattr(self, count), least)
         for search in self.searches:
             require_count("searches", search, 1)
         require_number("design", self.design, 0)
         require_number("sigma", self.sigma, 0, above=True)
+        require_number("seconds", self.seconds, 0, LONGEST_EPISODE, above=True, unit="s")
         require_number("push_newton", self.push_newton, 0, unit="N")
         if self.bend_deg is not None:
             require_number("bend_deg", self.bend_deg, 0, unit="deg")
@@ -114,16 +124,30 @@ class Adapt(Study):
         name = self.name or (kind_of(foot) if self.speed == TUNED_SPEED else f"{kind_of(foot)}, {self.speed:g} m/s")
         begin = self._begin(foot)
         lines, told, files = [], [], {}
+        walks = [["not adapted", *self._walked("pretrained", foot)]]
         for search in self.searches:
             label = kept_name(name, search)
             person, own = self._search(begin, search, label, progress)
             lines += [[search, *line] for line in own]
             told.append(f"`{label}`: best {own[0][1]:.2f} to {own[-1][1]:.2f}, median {own[-1][2]:.2f}")
+            walks.append([label, *self._walked(SCHEDULE[0], person.setting(self.speed))])
             files[f"foot-{search}.json"] = json.dumps(person.setting(self.speed), indent=1) + "\n"
-        text = "\n".join([*told, "", "A candidate's price, see studies/person_cost.py. Walk with what was found:", ""])
+        head = ["", "falls", "speed m/s", *(each.label for each in ASKED), "ankle °", "toe °"]
+        text = (
+            f"{table(head, walks)}\n\n{self.episodes} episodes × {self.seconds:g} s; falls as shares, the last by "
+            f"±{PUSH_NEWTON:g} N; not adapted by `pretrained`, adapted by the schedule that was found.\n\nPrices of "
+            f"candidates (studies/person_cost.py): {'; '.join(told)}.\n\nWalk with what was found:\n\n"
+        )
         text += "\n".join(f"  --right-foot {self.out or 'FOLDER'}/{file}" for file in files)
         files["generations.csv"] = csv_text(["search", "generation", "best", "median"], lines)
         return Answer(text=text, files=files)
+
+    def _walked(self, policy: str, foot: str | dict[str, Any]) -> list[str]:
+        """What a walk on the right `foot` comes to, in a table's words."""
+        given = {"right_foot": foot, "speed": self.speed, "episode_seconds": self.seconds}
+        given |= SCHEDULE[1] if policy == SCHEDULE[0] else {}
+        found = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
+        return [text_of(found[key], pattern) for key, pattern in shown_numbers()]
 
     def _begin(self, foot: str | dict[str, Any]) -> Person:
         if not self.start:

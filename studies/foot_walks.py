@@ -44,6 +44,13 @@ ASKED = (
 """What the study of prostheses compares, all of the right foot but the sound side's force."""
 
 
+def shown_numbers() -> list[tuple[str, str]]:
+    """Key and format of the numbers that tables show of a walk, in their order."""
+    patterns = {each.key: each.pattern for each in ASKED} | {"falls": ".2f", "speed_m_s": ".2f"}
+    keys = ("falls", "speed_m_s", *(each.key for each in ASKED), "ankle_range_deg", "toe_range_deg")
+    return [(key, patterns.get(key, ".1f")) for key in keys]
+
+
 def numbers_of(gait: Gait) -> dict[str, float | None]:
     """The numbers of an undisturbed walk, by their names in the CSV files; None where nothing walks."""
     metrics, tally = gait.metrics, gait.tally

@@ -12,13 +12,12 @@ from springfoot.agents.markdown import MISSING, table, text_of
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.gait.scores import mean_sd
 
-from .foot_walks import ASKED, PUSH_NEWTON, better_in
+from .foot_walks import ASKED, PUSH_NEWTON, better_in, shown_numbers
 from .intervals import t_interval
 
 NOT_ADAPTED, ADAPTED_ALONE, WITH_POLICY = "not adapted", "adapted", "adapted, trained"
 """Whose walk a row is: of legs as with sound feet, sound side by `pretrained`; of the legs found, by their own
 schedule; the same by a trained policy."""
-SHOWN = ("falls", "speed_m_s", *(each.key for each in ASKED), "ankle_range_deg", "toe_range_deg")
 WHERE = ("height_m", "mass_kg", "asked_m_s")
 COLORS = {"intact": "#555555", "rigid": "#7a5195", "passive": "#c26a1b", "adaptive": "#0b6e8f"}
 Row = Mapping[str, Any]
@@ -89,7 +88,7 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], p
     head = ["foot", "person", "search", "seeds", "falls", "speed m/s", *(each.label for each in ASKED)]
     lines = []
     for (foot, person, search), group in _groups(here).items():
-        cells = [_mean(group, key, pattern) for key, pattern in _patterns()]
+        cells = [_mean(group, key, pattern) for key, pattern in shown_numbers()]
         seeds = str(len(group)) if person == WITH_POLICY else ""
         lines.append([foot, person, str(search), seeds, *cells])
     note = (
@@ -107,11 +106,6 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], p
     if len({tuple(row[name] for name in WHERE) for row in rows}) > 1:
         text["PROSTHESIS-ELSEWHERE"] = _elsewhere(rows, ran[1])
     return {name: f"![Feet](prosthesis.png)\n\n{own}" if name == "PROSTHESIS" else own for name, own in text.items()}
-
-
-def _patterns() -> list[tuple[str, str]]:
-    patterns = {each.key: each.pattern for each in ASKED} | {"falls": ".2f", "speed_m_s": ".2f"}
-    return [(key, patterns.get(key, ".1f")) for key in SHOWN]
 
 
 def _groups(rows: Sequence[Row]) -> dict[tuple[str, str, Any], list[Row]]:

@@ -92,6 +92,7 @@ def test_a_foot_that_makes_steps_uneven_costs_and_falls_cost_most():
 def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
     feet = tmp_path / "adapted.json"
     words = ["adapt", "--generations", "1", "--population", "2", "--searches", "1", "--feet", str(feet)]
+    words += ["--episodes", "1", "--seconds", "6"]
     passive = [*words, "--foot", "passive", "--design", "1"]
     assert study_main([*passive, "--out", str(tmp_path / "one")]) == 0
     kept = json.loads(feet.read_text())
@@ -101,6 +102,9 @@ def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
     assert "--out" not in kept["found_by"]["passive"]
     assert settings_from(right_foot=foot).right_foot == foot
     assert foot[ADAPTED]["1.2"].keys() == {"sound", "other"}
+    told = capsys.readouterr().out
+    assert "| not adapted | 0.00 | " in told
+    assert "| passive | " in told
     again = [*words, "--start", "passive", "--sigma", "1e-9", "--foot", "passive", "--name", "same", "--design", "1"]
     assert study_main([*again, "--out", str(tmp_path / "two")]) == 0
     same = json.loads(feet.read_text())["feet"]["same"]
@@ -118,7 +122,15 @@ def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
 def test_the_same_seed_finds_the_same(tmp_path):
     found = []
     for index in range(2):
-        study = Adapt(generations=1, population=3, searches=(2,), feet=tmp_path / f"{index}.json", threads=index + 1)
+        study = Adapt(
+            generations=1,
+            population=3,
+            searches=(2,),
+            episodes=1,
+            seconds=6.0,
+            feet=tmp_path / f"{index}.json",
+            threads=index + 1,
+        )
         found.append(study.ask(lambda done: None).files)
     assert found[0] == found[1]
     assert "rigid, search 2" in json.loads((tmp_path / "0.json").read_text())["feet"]
