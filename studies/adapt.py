@@ -33,7 +33,7 @@ from springfoot.gait.errors import SpringfootError, require_count, require_numbe
 
 from . import person_cost
 from .constants_file import ADAPTED_FEET, read_feet
-from .foot_walks import ASKED, PUSH_NEWTON, SCHEDULE, shown_numbers, walked
+from .foot_walks import ASKED, PUSH_NEWTON, SCHEDULE, told_numbers, walked
 from .person_search import Person, PersonSearch
 from .study import Answer, OnProgress, Study, without_places
 
@@ -147,7 +147,7 @@ class Adapt(Study):
         given = {"right_foot": foot, "speed": self.speed, "episode_seconds": self.seconds}
         given |= SCHEDULE[1] if policy == SCHEDULE[0] else {}
         found = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
-        return [text_of(found[key], pattern) for key, pattern in shown_numbers()]
+        return [text_of(found[key], pattern) for key, pattern in told_numbers()]
 
     def _begin(self, foot: str | dict[str, Any]) -> Person:
         if not self.start:

@@ -44,7 +44,7 @@ ASKED = (
 """What the study of prostheses compares, all of the right foot but the sound side's force."""
 
 
-def shown_numbers() -> list[tuple[str, str]]:
+def told_numbers() -> list[tuple[str, str]]:
     """Key and format of the numbers that tables show of a walk, in their order."""
     patterns = {each.key: each.pattern for each in ASKED} | {"falls": ".2f", "speed_m_s": ".2f"}
     keys = ("falls", "speed_m_s", *(each.key for each in ASKED), "ankle_range_deg", "toe_range_deg")

@@ -12,7 +12,7 @@ from springfoot.agents.markdown import MISSING, table, text_of
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.gait.scores import mean_sd
 
-from .foot_walks import ASKED, PUSH_NEWTON, better_in, shown_numbers
+from .foot_walks import ASKED, PUSH_NEWTON, better_in, told_numbers
 from .intervals import t_interval
 
 NOT_ADAPTED, ADAPTED_ALONE, WITH_POLICY = "not adapted", "adapted", "adapted, trained"
@@ -88,7 +88,7 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], p
     head = ["foot", "person", "search", "seeds", "falls", "speed m/s", *(each.label for each in ASKED)]
     lines = []
     for (foot, person, search), group in _groups(here).items():
-        cells = [_mean(group, key, pattern) for key, pattern in shown_numbers()]
+        cells = [_mean(group, key, pattern) for key, pattern in told_numbers()]
         seeds = str(len(group)) if person == WITH_POLICY else ""
         lines.append([foot, person, str(search), seeds, *cells])
     note = (
