@@ -3,6 +3,7 @@
 import csv
 
 import pytest
+from drawn import kept_figures
 
 from springfoot.evaluation.criteria import Criterion
 from springfoot.studies.command import study_main
@@ -34,7 +35,8 @@ def test_beyond_is_the_distance_to_the_nearer_end_as_a_share_of_it(low, high, va
 def test_the_table_has_what_one_policy_misses_at_least_and_the_file_has_all(tmp_path, capsys):
     policies = ["schedule", "constant:250,30"]
     words = ["--episodes", "1", "--seconds", "6", "--out", str(tmp_path / "new")]
-    assert study_main(["front", *policies, *words]) == 0
+    with kept_figures() as figures:
+        assert study_main(["front", *policies, *words]) == 0
     head, _, *rows = capsys.readouterr().out.splitlines()[:4]
     with (tmp_path / "new" / "front.csv").open(encoding="utf-8", newline="") as file:
         lines = list(csv.DictReader(file))
@@ -46,4 +48,10 @@ def test_the_table_has_what_one_policy_misses_at_least_and_the_file_has_all(tmp_
     columns = [cell.strip() for cell in head.split("|")[4:-1]]
     either = {line["criterion"] for line in lines if line["holds"] == "False"}
     assert columns == [f"{each.label or each.name} {each.text}" for each in CRITERIA if each.name in either]
-    assert (tmp_path / "new" / "front.png").read_bytes().startswith(b"\x89PNG")
+    (ax,) = figures["front.png"].axes
+    rows = [text.get_text() for text in ax.get_yticklabels()]
+    for name in policies:
+        drawn = next(line for line in ax.lines if line.get_label() == name)
+        missed = {line["criterion"] for line in lines if line["policy"] == name and line["holds"] == "False"}
+        beyond = {rows[int(y)] for x, y in zip(*drawn.get_data(), strict=True) if x > 0}
+        assert beyond == {f"{each.label or each.name} {each.text}" for each in CRITERIA if each.name in missed}

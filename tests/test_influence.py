@@ -5,6 +5,8 @@ from math import isnan, sqrt
 
 import numpy as np
 import pytest
+from drawn import kept_figures
+from PIL import Image
 
 from springfoot.agents.files import csv_text
 from springfoot.gait import SpringfootError
@@ -15,6 +17,7 @@ from springfoot.studies.stiffness_responses import (
     IMPULSE,
     LINKS_HEAD,
     MANY_STRIDES_SPEED,
+    TORQUE,
     csv_rows,
     response,
 )
@@ -80,8 +83,12 @@ def test_a_cell_in_which_all_fall_has_no_number(tmp_path):
     assert isnan(found["as it is"].mean[MANY_STRIDES_SPEED][4]) and isnan(found["as it is"].links[FORETOLD][0])
     assert "| ankle, push-off (50–62 %) | – |" in tables(Influence(), found)
     assert ",push-off,0.5,0.62,every stride,speed_m_s,many,,,,6,0\n" in csv_text(CSV_HEAD, csv_rows(found))
-    save_influence_figure(tmp_path / "influence.png", found)
-    assert (tmp_path / "influence.png").stat().st_size > 10_000
+    with kept_figures() as figures:
+        save_influence_figure(tmp_path / "influence.png", found)
+    torque = figures["influence.png"].axes[0]
+    widths = [bar.get_width() for bar in torque.patches]
+    assert widths == pytest.approx(found["as it is"].mean[TORQUE].tolist(), nan_ok=True)
+    assert torque.get_xlabel() == "Δ torque (N·m)"
 
 
 def test_where_nothing_changes_nothing_is_claimed():
@@ -123,5 +130,6 @@ def test_the_same_seeds_give_the_same_files_with_any_number_of_threads(tmp_path,
     for name, head in (("influence.csv", CSV_HEAD), ("influence_links.csv", LINKS_HEAD)):
         one, other = ((tmp_path / threads / name).read_bytes() for threads in "12")
         assert one == other and one.decode().splitlines()[0] == ",".join(head)
-    assert (tmp_path / "1" / "influence.png").stat().st_size > 10_000
+    with Image.open(tmp_path / "1" / "influence.png") as one, Image.open(tmp_path / "2" / "influence.png") as other:
+        assert one.size == other.size and (np.asarray(one) == np.asarray(other)).all()
     assert capsys.readouterr().out.count("+10 % of stiffness in one joint and phase of every stride") == 2

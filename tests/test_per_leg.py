@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+from drawn import has_line, kept_figures
+from PIL import Image
 from rich.console import Console
 
 from springfoot.envs.settings import settings_from
 from springfoot.evaluation import measure, prepare, record
-from springfoot.evaluation.animation import save_animation
+from springfoot.evaluation.animation import FAR, NEAR, save_animation
 from springfoot.evaluation.gait_figure import save_gait_figure
 from springfoot.evaluation.gait_table import print_table
 from springfoot.evaluation.per_leg import asymmetry, leg_numbers
+from springfoot.gait.cycle import PERCENT
 
 
 def walked(**feet):
@@ -73,9 +76,15 @@ def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
     print_table(gait.metrics, console)
     text = console.export_text()
     assert "feet: left intact, right passive" in text and "right: passive" in text and "ankle range" in text
-    save_gait_figure(tmp_path / "gait.png", recording, gait)
+    with kept_figures() as figures:
+        save_gait_figure(tmp_path / "gait.png", recording, gait)
+    knee = next(ax for ax in figures["gait.png"].axes if ax.get_title(loc="left") == "Knee angle")
+    for leg in gait.feet:
+        assert has_line(knee, PERCENT, leg.mean("knee_flexion_deg"))
     save_animation(tmp_path / "walk.gif", recording)
-    assert (tmp_path / "gait.png").stat().st_size > 50_000 and (tmp_path / "walk.gif").stat().st_size > 10_000
+    with Image.open(tmp_path / "walk.gif") as clip:
+        seen = np.asarray(clip.convert("RGB")).reshape(-1, 3)
+    assert all((seen == colour).all(axis=1).sum() > 200 for colour in (NEAR, FAR))  # both legs
 
 
 def test_feedback_is_of_the_leg_that_decides(recordings):

@@ -4,6 +4,7 @@ import shlex
 
 import numpy as np
 import pytest
+from drawn import kept_figures
 
 from springfoot.evaluation.metrics import Gait
 from springfoot.gait import SpringfootError
@@ -40,13 +41,13 @@ def test_one_policy_or_one_that_walks_not_is_refused():
 def test_the_command_prints_both_tables_and_writes_picture_and_curves(capsys, tmp_path):
     words = ["schedule", "constant:250,30", "--episodes", "1", "--seconds", "6", "--threads", "1"]
     words += ["--out", str(tmp_path / "a"), "--page", str(tmp_path / "results.md")]
-    assert study_main(["agreement", *words]) == 0
+    with kept_figures() as figures:
+        assert study_main(["agreement", *words]) == 0
     out = capsys.readouterr().out
     assert "**do not agree**" in next(line for line in out.splitlines() if line.startswith("| ankle |"))
     *limits, missed = [line.split(" | ")[3:] for line in out.split("\n\n")[1].splitlines()[2:]]
     for column, count in enumerate(missed):  # in bold what the row `missed` counts
         assert sum("**" in row[column] for row in limits) == int(count.strip(" |")) > 0
-    assert (tmp_path / "a" / "agreement.png").read_bytes().startswith(b"\x89PNG")
     tables, results = out.strip().rsplit("\n\n", 1)
     assert tables in (tmp_path / "results.md").read_text()
     assert results == f"Results: {tmp_path / 'a'} (agreement.csv, policies.csv, agreement.png)"
@@ -56,4 +57,8 @@ def test_the_command_prints_both_tables_and_writes_picture_and_curves(capsys, tm
     header, *rows = (tmp_path / "a" / "agreement.csv").read_text().splitlines()
     column = header.split(",").index("ankle_stiffness_Nm_per_rad")
     values = np.array([row.split(",") for row in rows], float)
+    stiffness = figures["agreement.png"].axes[0]
+    assert stiffness.get_title(loc="left").startswith("Ankle K, worst CV under load") and len(stiffness.lines) == 2
+    drawn = np.mean([line.get_ydata() for line in stiffness.lines], axis=0)
+    assert drawn == pytest.approx(values[:, column], rel=1e-4)
     assert len(rows) == 101 and 100 < values[:, column].mean() < 300

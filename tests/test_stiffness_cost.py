@@ -1,10 +1,12 @@
 """The trade-off: the measure of stiffness is the reward's, the knee is found, finished trainings are kept."""
 
+import csv
 import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn import has_line, kept_figures
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.evaluation.policies import prepare
@@ -57,9 +59,16 @@ def test_the_command_trains_what_is_missing_draws_and_keeps_what_is_finished(mon
         return code, *capfd.readouterr()
 
     out = tmp_path / "out"
-    code, said, error = main()
+    with kept_figures() as figures:
+        code, said, error = main()
     assert code == 0 and "stiffness 0.4, seed 0: " in error
-    assert (tmp_path / "before" / "tradeoff.png").read_bytes().startswith(b"\x89PNG")
+    likeness, robustness, agreement = figures["tradeoff.png"].axes
+    with (tmp_path / "before" / "policies.csv").open(encoding="utf-8", newline="") as file:
+        rows = sorted(csv.DictReader(file), key=lambda row: float(row["stiffness_cost"]))
+    cost = [float(row["stiffness_cost"]) for row in rows]
+    assert has_line(likeness, cost, [float(row["rmse_deg"]) for row in rows], rel=1e-3)
+    assert has_line(robustness, cost, [100 * float(row["falls_150_N"]) for row in rows], rel=1e-3)
+    assert agreement.get_ylabel().startswith("CV of K")
     best = folder_of(tmp_path / "runs", "stiffness", 0.4, 0) / "best.safetensors"
     written = best.stat().st_mtime_ns
     assert main()[:2] == (0, said) and best.stat().st_mtime_ns == written
