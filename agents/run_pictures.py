@@ -4,7 +4,7 @@
 stand in `gallery/`, named by theirs; `gallery.png` has the first seconds of the same episode walked by each.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ def draw_run(out: Path, record: dict[str, Any], biped: Biped, seed: int) -> None
     Args:
         out: the run's folder.
         record: what its run.json holds.
-        biped: in which the kept policies walk, its first environment.
+        biped: in which the kept policies walk, side by side.
         seed: of the episode they walk.
     """
     figures = {}
@@ -61,7 +61,7 @@ def draw_run(out: Path, record: dict[str, Any], biped: Biped, seed: int) -> None
         figures["gallery.png"] = gallery_figure(policies, record["config"]["timesteps"], biped, seed)
     for name, figure in figures.items():
         picture = BytesIO()
-        figure.savefig(picture, format="png", dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+        figure.savefig(picture, format="png", dpi=100, facecolor="white", metadata={"Software": "springfoot"})
         write_atomically(out / name, picture.getvalue())
 
 
@@ -91,62 +91,79 @@ def gallery_figure(policies: dict[int, Policy], total: int, biped: Biped, seed: 
     """A Matplotlib figure of the same episode walked by each of the `policies`, by timesteps; `total` are all."""
     from matplotlib.figure import Figure
 
-    walks, total = [_walked(biped, policy, seed) for policy in policies.values()], max(total, *policies)
+    walks, total = _walked(biped, [*policies.values()], seed), max(total, *policies)
     reach, top = np.max([figures.max(axis=(0, 1)) for figures, _ in walks], axis=0)
     figure = Figure(figsize=(10.0, 2.2 * len(policies)), layout="constrained")
     axes = np.atleast_1d(figure.subplots(len(policies), 1))
     for ax, steps, (figures, said) in zip(axes, policies, walks, strict=True):
         ax.set_title(f"after {steps:,} steps ({100 * steps / total:.0f} %): {said}", loc="left", fontsize=9)
         ax.axhline(0.0, color="#888888", linewidth=0.8)
-        for points in figures:
-            trunk, legs = points[:2], points[2:].reshape(2, -1, 2)
-            for leg, colour in zip(legs[::-1], (RIGHT_COLOUR, LEFT_COLOUR), strict=True):
-                ax.plot(*leg.T, color=colour, linewidth=1.2, solid_capstyle="round")
-            ax.plot(*trunk.T, color=TRUNK_COLOUR, linewidth=2.4, solid_capstyle="round")
+        legs = figures[:, 2:].reshape(len(figures), 2, -1, 2)
+        for points, colour, width in (
+            (legs[:, 1], RIGHT_COLOUR, 1.2),
+            (legs[:, 0], LEFT_COLOUR, 1.2),
+            (figures[:, :2], TRUNK_COLOUR, 2.4),
+        ):
+            gaps = np.full((len(points), 1, 2), np.nan)  # from one figure to the next no line
+            ax.plot(*np.concatenate([points, gaps], 1).reshape(-1, 2).T, color=colour, linewidth=width)
         ax.set(xlim=(-0.6, reach + 0.3), ylim=(-0.1, top + 0.1), aspect="equal", ylabel="m")
         ax.tick_params(labelsize=8)
     return figure
 
 
-def _walked(biped: Biped, policy: Policy, seed: int) -> tuple[NDArray, str]:
-    """Points (figures, 18, 2) [m] of the body as it walks, and in words how far it came."""
-    active, every, count = np.arange(biped.num_envs) == 0, round(SECONDS_BETWEEN / Biped.tick_dt), 0
-    figures: list[NDArray] = []
-    biped.reset(np.flatnonzero(active), [seed])
-    body = biped.subjects.bodies[0]
+def _walked(biped: Biped, policies: Sequence[Policy], seed: int) -> list[tuple[NDArray, str]]:
+    """Of each policy, points (figures, 18, 2) [m] of the body as it walks, and in words how far it came.
+
+    Side by side, in environments that all begin with the `seed`; more policies than environments take turns.
+    """
+    if len(policies) > biped.num_envs:
+        return [
+            *_walked(biped, policies[: biped.num_envs], seed),
+            *_walked(biped, policies[biped.num_envs :], seed),
+        ]
+    own, every, count = np.arange(len(policies)), round(SECONDS_BETWEEN / Biped.tick_dt), 0
+    figures: list[list[NDArray]] = [[] for _ in policies]
+    active = np.arange(biped.num_envs) < len(policies)
+    biped.reset(own, [seed] * len(policies))
+    bodies, seconds, why = biped.subjects.bodies, np.zeros(len(policies)), [""] * len(policies)
 
     def see(tick: Tick) -> None:
         nonlocal count
-        if count % every == 0:
-            figures.append(_points(tick, body))
+        for index in own[tick.active[own]] if count % every == 0 else ():
+            figures[index].append(_points(tick, index, bodies[index]))
+        seconds[tick.active[own]] += Biped.tick_dt
         count += 1
 
     biped.on_tick = see
     try:
-        observation, gone, why = biped.observe(), False, ""
-        while not gone and count * Biped.tick_dt < SECONDS_SHOWN:
-            result = biped.step(policy(observation), active=active)
-            observation, gone, why = result.observation, bool(result.terminated[0]), result.reasons[0]
-            if result.truncated[0]:
-                break
+        observation = biped.observe()
+        while active.any() and count * Biped.tick_dt < SECONDS_SHOWN:
+            action = np.zeros((biped.num_envs, len(biped.action_names)), np.float32)
+            for index, policy in enumerate(policies):
+                action[index] = policy(observation[[index]])[0]
+            result = biped.step(action, active=active)
+            observation = result.observation
+            for index in np.flatnonzero(active & result.terminated):
+                why[index] = str(result.reasons[index])
+            active &= ~(result.terminated | result.truncated)
     finally:
         biped.on_tick = None
-    seconds = count * Biped.tick_dt
-    return np.stack(figures), f"{why} after {seconds:.1f} s" if gone else f"walks {seconds:.1f} s"
+    said = [f"{end} after {far:.1f} s" if end else f"walks {far:.1f} s" for end, far in zip(why, seconds, strict=True)]
+    return [(np.stack(each), words) for each, words in zip(figures, said, strict=True)]
 
 
-def _points(tick: Tick, body: Body) -> NDArray:
+def _points(tick: Tick, index: int, body: Body) -> NDArray:
     """Hip and shoulder; then of either leg hip, knee, ankle, heel, ball, ankle, ball, toe tip."""
     m = tick.measurement
-    x, z, pitch = m.base[0]
+    x, z, pitch = m.base[index]
     hip = np.array([x, z])
     points = [hip, hip + body.trunk_length * np.array([np.sin(pitch), np.cos(pitch)])]
     for side in range(2):
-        thigh = m.angle[0, side, HIP] - pitch
+        thigh = m.angle[index, side, HIP] - pitch
         knee = hip + body.thigh_length * np.array([np.sin(thigh), -np.cos(thigh)])
         ankle = knee + body.shank_length * np.array(
-            [np.sin(thigh - m.angle[0, side, KNEE]), -np.cos(thigh - m.angle[0, side, KNEE])]
+            [np.sin(thigh - m.angle[index, side, KNEE]), -np.cos(thigh - m.angle[index, side, KNEE])]
         )
-        heel, ball, toe = m.contact[0, side, : len(CONTACTS)]
+        heel, ball, toe = m.contact[index, side, : len(CONTACTS)]
         points += [hip, knee, ankle, heel, ball, ankle, ball, toe]
     return np.stack(points).copy()
