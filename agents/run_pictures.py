@@ -13,8 +13,8 @@ import numpy as np
 
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.foot_contact import CONTACTS
+from springfoot.envs.physics.measurement import Measurement
 from springfoot.envs.physics.model import HIP, KNEE
-from springfoot.envs.step_result import Tick
 from springfoot.gait import Body
 from springfoot.gait.arrays import NDArray
 
@@ -121,40 +121,30 @@ def _walked(biped: Biped, policies: Sequence[Policy], seed: int) -> list[tuple[N
             *_walked(biped, policies[: biped.num_envs], seed),
             *_walked(biped, policies[biped.num_envs :], seed),
         ]
-    own, every, count = np.arange(len(policies)), round(SECONDS_BETWEEN / Biped.tick_dt), 0
-    figures: list[list[NDArray]] = [[] for _ in policies]
+    every, figures = max(1, round(SECONDS_BETWEEN / biped.dt)), [[] for _ in policies]
     active = np.arange(biped.num_envs) < len(policies)
-    biped.reset(own, [seed] * len(policies))
-    bodies, seconds, why = biped.subjects.bodies, np.zeros(len(policies)), [""] * len(policies)
-
-    def see(tick: Tick) -> None:
-        nonlocal count
-        for index in own[tick.active[own]] if count % every == 0 else ():
-            figures[index].append(_points(tick, index, bodies[index]))
-        seconds[tick.active[own]] += Biped.tick_dt
-        count += 1
-
-    biped.on_tick = see
-    try:
-        observation = biped.observe()
-        while active.any() and count * Biped.tick_dt < SECONDS_SHOWN:
-            action = np.zeros((biped.num_envs, len(biped.action_names)), np.float32)
-            for index, policy in enumerate(policies):
-                action[index] = policy(observation[[index]])[0]
-            result = biped.step(action, active=active)
-            observation = result.observation
-            for index in np.flatnonzero(active & result.terminated):
-                why[index] = str(result.reasons[index])
-            active &= ~(result.terminated | result.truncated)
-    finally:
-        biped.on_tick = None
+    biped.reset(np.flatnonzero(active), [seed] * len(policies))
+    steps, why = np.zeros(biped.num_envs, int), [""] * len(policies)
+    observation = biped.observe()
+    while active.any() and steps.max() * biped.dt < SECONDS_SHOWN:
+        action = np.zeros((biped.num_envs, len(biped.action_names)), np.float32)
+        for index, policy in enumerate(policies):
+            action[index] = policy(observation[[index]])[0]
+            if active[index] and steps[index] % every == 0:
+                figures[index].append(_points(biped.measurement, index, biped.subjects.bodies[index]))
+        result = biped.step(action, active=active)
+        observation = result.observation
+        steps += active
+        for index in np.flatnonzero(active & result.terminated):
+            why[index] = str(result.reasons[index])
+        active &= ~(result.terminated | result.truncated)
+    seconds = (steps * biped.dt)[: len(policies)]
     said = [f"{end} after {far:.1f} s" if end else f"walks {far:.1f} s" for end, far in zip(why, seconds, strict=True)]
     return [(np.stack(each), words) for each, words in zip(figures, said, strict=True)]
 
 
-def _points(tick: Tick, index: int, body: Body) -> NDArray:
+def _points(m: Measurement, index: int, body: Body) -> NDArray:
     """Hip and shoulder; then of either leg hip, knee, ankle, heel, ball, ankle, ball, toe tip."""
-    m = tick.measurement
     x, z, pitch = m.base[index]
     hip = np.array([x, z])
     points = [hip, hip + body.trunk_length * np.array([np.sin(pitch), np.cos(pitch)])]
