@@ -6,7 +6,6 @@ what is needed to repeat the run, and its results; beside them are TensorBoard's
 """
 
 import dataclasses
-import json
 import os
 import signal
 import threading
@@ -23,6 +22,7 @@ from stable_baselines3.common.logger import configure
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import settings_to_json
 from springfoot.gait.errors import SpringfootError, require_number
+from springfoot.gait.json_file import read_object, sealed_object
 
 from .config import TrainingConfig, config_from_json, config_to_json
 from .files import make_folder, require_new, write_atomically
@@ -75,8 +75,8 @@ def resume(out: str | Path, timesteps: int | None = None, callbacks: Sequence[On
     for name in (RUN, STATE, LAST):
         if not (out / name).is_file():
             raise SpringfootError(f"{out} holds no run to continue: no {name} in it")
+    record = read_object(out / RUN, "record of a run")
     try:
-        record = json.loads((out / RUN).read_text(encoding="utf-8"))
         config = config_from_json(record["config"])
         for name in ("sessions", "evaluations"):
             if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
@@ -84,7 +84,7 @@ def resume(out: str | Path, timesteps: int | None = None, callbacks: Sequence[On
         if not isinstance(record["config"], dict):
             raise ValueError("config must be an object")
         require_number("seconds", record.get("seconds", 0.0), 0.0, unit="s")
-    except (OSError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
     header, arrays = read_tensors(out / STATE, STATE_KEY, "training state", {"timesteps"})
     done = header.get("timesteps")
@@ -264,7 +264,7 @@ class _Run(BaseCallback):
         if policies:
             save_policy(self._out / LAST, self._policy())
             write_tensors(self._out / STATE, STATE_KEY, {"timesteps": self._trained}, self.learner.state())
-        write_atomically(self._out / RUN, (json.dumps(self._record, indent=2) + "\n").encode())
+        write_atomically(self._out / RUN, sealed_object(self._record))
 
 
 def processors() -> int:

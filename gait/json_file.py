@@ -1,19 +1,25 @@
 """JSON files: of a size that fits into memory, whole if they are sealed, an object in braces."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .errors import SpringfootError, printable
-from .seal import require_whole
+from .seal import BLANK, SEAL, require_whole, sealed
 from .text_table import read_bytes
 
 MOST_JSON_BYTES = 2**23
 """Largest JSON file that is read; chosen, hundreds of times a usual one: an object takes twenty times its text."""
 
 
+def sealed_object(values: Mapping[str, Any]) -> bytes:
+    """The values as a JSON file's content, with a digest (`seal`)."""
+    return sealed(json.dumps({**values, SEAL: BLANK}, indent=2) + "\n").encode()
+
+
 def read_object(path: Path, what: str) -> dict[str, Any]:
-    """The object in a JSON file; else `SpringfootError`, which says that the file is no `what`."""
+    """The object in a JSON file, without its digest; else `SpringfootError`, which says that the file is no `what`."""
     content = read_bytes(path, MOST_JSON_BYTES)
     require_whole(path, content)
     try:
@@ -22,7 +28,7 @@ def read_object(path: Path, what: str) -> dict[str, Any]:
         raise SpringfootError(f"{path} is no {what}: it is not JSON, {json_fault(error)}") from None
     if not isinstance(value, dict):
         raise SpringfootError(f"{path} is no {what}: it must be an object in braces")
-    return value
+    return {name: each for name, each in value.items() if name != SEAL}
 
 
 def json_fault(error: Exception) -> str:

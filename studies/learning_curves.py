@@ -3,7 +3,6 @@
 springfoot study learning-curves runs/seed-0 runs/seed-1 runs/seed-2 --page docs/learning.md
 """
 
-import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +22,7 @@ from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 from springfoot.gait.errors import SpringfootError
+from springfoot.gait.json_file import read_object
 
 from .quantities import walks_csv
 from .study import Answer, OnProgress, WalkingStudy
@@ -107,11 +107,11 @@ class LearningCurves(WalkingStudy):
 
 def _read(folder: Path) -> dict[str, Any]:
     """The record of a finished run, with the time of every evaluation."""
+    record_of_run = read_object(folder / RUN, "record of a run") if (folder / RUN).is_file() else {}
     try:
-        record_of_run = json.loads((folder / RUN).read_text(encoding="utf-8"))
         numbers = [entry[key] for entry in record_of_run["evaluations"] for key in KEYS]
         float(sum(numbers) + record_of_run["seconds"] + record_of_run["timesteps"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         raise SpringfootError(
             f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"
         ) from None

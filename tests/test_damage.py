@@ -15,6 +15,7 @@ from springfoot.agents.tensor_file import DIGEST, MOST_TENSOR_BYTES, read_tensor
 from springfoot.agents.training import STATE, STATE_KEY, resume, train
 from springfoot.envs import BipedSettings
 from springfoot.gait import SpringfootError
+from springfoot.gait.json_file import read_object
 
 TINY = TrainingConfig(
     timesteps=64,
@@ -154,6 +155,18 @@ def test_a_policy_of_an_earlier_version_has_no_digest_and_is_read(run, tmp_path)
     assert read_policy(tmp_path / "old.safetensors").header == read_policy(run / "best.safetensors").header
 
 
+def test_any_flipped_bit_of_a_record_is_refused(run, tmp_path):
+    content, damaged = (run / "run.json").read_bytes(), tmp_path / "run.json"
+    read_object(run / "run.json", "record of a run")
+    random = np.random.default_rng(0)
+    for place, bit in zip(random.integers(0, len(content), 500), random.integers(0, 8, 500), strict=True):
+        flipped = bytearray(content)
+        flipped[place] ^= 1 << int(bit)
+        damaged.write_bytes(flipped)
+        with pytest.raises(SpringfootError, match="is damaged or was changed"):
+            read_object(damaged, "record of a run")
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -166,7 +179,7 @@ def test_a_policy_of_an_earlier_version_has_no_digest_and_is_read(run, tmp_path)
 def test_a_record_that_is_none_is_refused(run, tmp_path, change, words):
     folder = tmp_path / "run"
     shutil.copytree(run, folder)
-    record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    record = read_object(folder / "run.json", "record of a run")  # and written without its digest
     (folder / "run.json").write_text(json.dumps(record | change), encoding="utf-8")
     with pytest.raises(SpringfootError, match=words):
         resume(folder, 64)

@@ -18,6 +18,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.policies import prepare
 from springfoot.gait.errors import SpringfootError
+from springfoot.gait.json_file import read_object
 
 SHORT = TrainingConfig(
     timesteps=3_000,
@@ -149,7 +150,7 @@ def test_state_of_another_shape_is_refused(learner):
 
 def test_a_run_folder_holds_what_it_says(run):
     folder, record = run
-    assert json.loads((folder / "run.json").read_text()) == record
+    assert read_object(folder / "run.json", "record of a run") == record
     assert config_from_json(record["config"]) == SHORT
     assert record["status"] == "finished"
     assert record["timesteps"] == 3072  # whole updates
