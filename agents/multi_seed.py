@@ -141,6 +141,10 @@ class _Trainings:
                 print(f"{name}: {line}", end="", file=sys.stderr, flush=True)
         with self._lock:
             self._running.remove(process)
+        if process.returncode < 0 and not self.stopping:
+            ended = signal.Signals(-process.returncode).name
+            said = f"{name}: its process was ended by {ended}; what it has saved is whole, in {folder}"
+            print(said, file=sys.stderr, flush=True)
         return _row(config, folder, "interrupted" if self.stopping else "failed")
 
     def _stop(self, number: int, _frame: Any) -> None:

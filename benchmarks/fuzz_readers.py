@@ -11,6 +11,7 @@ import re
 import sys
 import tempfile
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -147,6 +148,7 @@ def run(flags: Flags, say: Callable[[str], Any] = print) -> int:
     """Fuzz, say what was found; 1 for a crash, a hang, a message that is no line, or too much memory."""
     require_number("seconds", flags.seconds, 0.0, above=True, unit="s")
     failed = False
+    warnings.simplefilter("error", RuntimeWarning)  # a second line, beside the message
     with tempfile.TemporaryDirectory() as made:
         folder = Path(flags.keep or made)
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,7 @@
 """Several seeds at once: the same bits as one by one, one report, and an end in good order."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -95,6 +96,24 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
     assert record["seeds"][0]["status"] == "interrupted" and record["seeds"][0]["timesteps"] >= 1024
     assert record["seeds"][1]["status"] in ("interrupted", "not begun")
     assert read_policy(folder / "seed-0").observation_mean.shape
+
+
+def test_a_process_that_is_killed_is_told_and_the_others_go_on(tmp_path):
+    folder = tmp_path / "several"
+    words = ["--out", str(folder), "--seeds", "2", "--timesteps", "8192", "--num-envs", "4", "--update-steps", "512"]
+    process = subprocess.Popen([sys.executable, str(SCRIPT), *words], stderr=subprocess.PIPE, text=True)
+    while not (folder / "seed-0" / RUN).exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    children = [path.read_text() for path in Path(f"/proc/{process.pid}/task").glob("*/children")]
+    for child in map(int, " ".join(children).split()):
+        if str(folder / "seed-0") in Path(f"/proc/{child}/cmdline").read_text():
+            os.kill(child, signal.SIGKILL)
+    _, error = process.communicate()
+    assert process.returncode == 1 and "Traceback" not in error
+    assert f"seed 0: its process was ended by SIGKILL; what it has saved is whole, in {folder / 'seed-0'}" in error
+    rows = json.loads((folder / seeds.SEEDS).read_text())["seeds"]
+    assert [row["status"] for row in rows] == ["failed", "finished"]
 
 
 def test_ctrl_c_before_anything_runs_is_no_failure(tmp_path):

@@ -103,6 +103,8 @@ WRONG = {
         lambda curves: curves | {"ankle_moment": late(25)(curves)["ankle_moment"]},
         "body weights: moment and force of one foot?",
     ),
+    "powers of nobody": (times(0, *POWERS), "hip_power_W_per_kg is 0 throughout the stride: was it measured?"),
+    "moments beyond all bodies": (times(1e9, *MOMENTS), "_Nm_per_kg goes from"),
     "no force": (times(0, "grf_vertical"), "grf_vertical_bw is 0 throughout the stride: was it measured?"),
 }
 
