@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.envs.biped_batch import Biped
-from springfoot.envs.control.equilibrium import foot_curves
+from springfoot.envs.control.equilibrium import foot_curves, foot_feed
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.leg_controller import leg_curves
 from springfoot.envs.control.reference_walk import rows
@@ -32,6 +32,8 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
         curves = (leg_curves(legs, walk), *foot_curves(biped.settings, legs, walk))
         numbers += [*asdict(legs).values(), *(curve[::50] for curve in curves)]
+        if (feed := foot_feed(biped.settings, legs, walk)) is not None:
+            numbers.append(feed[::50])
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),

@@ -13,7 +13,7 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .control.decisions import DecisionTimes
-from .control.equilibrium import foot_curves
+from .control.equilibrium import foot_tables
 from .control.foot_springs import FootSprings, draw_delay
 from .control.leg_constants import LegConstants, SlopeConstants, slope_constants
 from .control.leg_controller import LegController, slope_table
@@ -89,8 +89,7 @@ class Biped(ExactState):
         feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * num_envs
         incline = slope_table(slope or slope_constants())
         self._legs = LegController(table, self.subjects, right)
-        curves = [foot_curves(settings, c, w) for c, w in (*table, *right)]
-        planned, stiffness = map(np.stack, zip(*curves, strict=True))
+        planned, stiffness = foot_tables(settings, (*table, *right))
         rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
         self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)

@@ -190,8 +190,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `speed_rate`              | `0.25`          | rate at which it goes to a new one [m/s^2]                         |
     | **reference**             |                 |                                                                    |
     | `cadence`                 | `"people"`      | step length and time of `"people"` or of the `"thesis"`            |
-    | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
+    | `guide`                   | `"people"`      | whose walk it follows: that of `"people"` or of its `"plan"`       |
     | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
+    | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
     | **springs**               |                 |                                                                    |
     | `equilibrium`             | `"planned"`     | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                   |
     | `feedforward`             | `"people"`      | moments fed forward: measured on `"people"`, or the `"plan"`'s own |

@@ -36,6 +36,7 @@ from .timing import ACTION_STEP
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 Feedforward = Literal["people", "plan"]
+Guide = Literal["people", "plan"]
 ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
@@ -104,6 +105,9 @@ class BipedSettings:
     """Rate at which the commanded speed goes to a new one [m/s^2]."""
     cadence: Cadence = field(default="people", metadata=_REFERENCE)
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
+    guide: Guide = field(default="people", metadata=_REFERENCE)
+    """What the controller follows, what is fed forward, what starts an episode and what the reward holds against:
+    people's walk; or the plan's own (plan), of people the step length and time alone (`docs/prediction.md`)."""
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
@@ -170,6 +174,7 @@ class BipedSettings:
         self._check_draws()
         for name, choices in (
             ("cadence", Cadence),
+            ("guide", Guide),
             ("equilibrium", Equilibrium),
             ("feedforward", Feedforward),
             ("action_mode", ActionMode),
@@ -190,6 +195,8 @@ class BipedSettings:
         if self.human is not None:
             OwnGait.from_json(self.human)
         check_people_file(self.people_file)
+        if self.guide == "plan" and self.human is not None:
+            raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
         if self.stop_at is not None:

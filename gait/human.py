@@ -62,8 +62,8 @@ class FootHabits:
 
     plateaus: tuple[float, ...]
     """(10,) at which loading, early stance, late stance, push-off and swing start and end."""
-    ankle_quasi_stiffness: tuple[float, ...]
-    """(5,) K_ref of the ankle in them [N m/rad] for 1.70 m and 63 kg."""
+    ankle_quasi_stiffness: tuple[float, ...] | None
+    """(5,) K_ref of the ankle in them [N m/rad] for 1.70 m and 63 kg; None for a gait whose moment needs none."""
     toe_flat: tuple[float, float]
     """Over which the toe goes flat."""
     toe_off: tuple[float, float]

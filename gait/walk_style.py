@@ -1,8 +1,16 @@
 """What a plan may choose of a walk whose steps are given: where and when the ZMP passes, how the CoM bobs, how feet
-roll and swing. People's choice is the default of `plan_walk`.
+roll and swing. People's choice is the default of `plan_walk`; `least_work.json` has the choices of least effort, which
+know no curve of people's (`springfoot study plan-tuning`).
 """
 
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
 
 from .foot_style import FootStyle
 
@@ -21,3 +29,39 @@ class WalkStyle:
     """Least knee flexion of the stride [rad], which sets the height of the CoM."""
     foot: FootStyle
     """How the feet roll and swing."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values; `style_from` is the inverse."""
+        return json.loads(json.dumps(asdict(self)))
+
+
+def style_from(values: Mapping[str, Any]) -> WalkStyle:
+    """The style of JSON values (lists for tuples)."""
+    own = dict(values)
+    return WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
+
+
+def least_work(speed: float) -> WalkStyle:
+    """The committed style of least cost at `speed` [m/s at 1.70 m]: linear between the speeds it was searched at, and
+    beyond them that of the nearest."""
+    table = _committed()
+    speeds = sorted(table)
+    place = float(np.interp(speed, speeds, np.arange(len(speeds))))
+    low, high = table[speeds[int(place)]], table[speeds[min(int(place) + 1, len(speeds) - 1)]]
+    return style_from(_mixed(low.to_json(), high.to_json(), place - int(place)))
+
+
+def _mixed(low: Any, high: Any, weight: float) -> Any:
+    if isinstance(low, dict):
+        return {name: _mixed(low[name], high[name], weight) for name in low}
+    return (np.array(low) + weight * (np.array(high) - np.array(low))).tolist()
+
+
+def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+
+
+@cache
+def _committed() -> dict[float, WalkStyle]:
+    text = resources.files("springfoot.gait").joinpath("least_work.json").read_text(encoding="utf-8")
+    return {float(speed): style_from(values) for speed, values in json.loads(text)["styles"].items()}

@@ -42,6 +42,7 @@ STUDIES = {
     "influence": ("influence.Influence", "Does stiffness change torque, the CoM's acceleration and the walk?"),
     "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
     "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
+    "plan-tuning": ("plan_tuning.PlanTuning", "Which plan of a walk costs least effort? (searches)"),
     "leg-sets": ("leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
     "adapt": ("adapt.Adapt", "How does a person walk who has adapted to a foot? (searches for minutes)"),
     "adapt-all": (

@@ -26,7 +26,7 @@ from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, 
 from springfoot.gait.human import HumanGait
 from springfoot.gait.scores import force_features, stride_work, travel
 
-from .leg_walks import FOREIGN, PUSHED_FOREIGN, SETTLED, series, speed_of, walk
+from .leg_walks import FOREIGN, SETTLED, foreign_springs, series, speed_of, walk
 
 SCHEDULED, PUSHED, SET_OFF = 2, 3, 4
 """Walks of each candidate with the schedule: undisturbed, pushed, starting to walk."""
@@ -92,11 +92,12 @@ def cost(
 ) -> NDArray:
     """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks with
     springs that nobody tuned."""
-    walks = SCHEDULED + len(FOREIGN)
+    springs, pushed_springs = foreign_springs(settings)
+    walks = SCHEDULED + len(springs)
     settings = replace(settings, unevenness_m=UNEVENNESS)
     total = np.zeros(len(candidates))
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
-    missing, biped, ticks = walk(settings, candidates, seeds, threads, ease)
+    missing, biped, ticks = walk(settings, candidates, seeds, threads, ease, springs)
     records = series(biped, ticks)
     scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
     speed = speed_of(records)
@@ -109,7 +110,7 @@ def cost(
         else:
             missed = misses(records, index, biped, SETTLED)
             total[candidate] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / SCHEDULED
-    if settings.equilibrium == "planned":
+    if settings.equilibrium == "planned" and settings.guide == "people":
         lines = replace(settings, **own_settings("thesis", settings))
         missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
         speed = speed_of(series(biped, ticks))
@@ -119,9 +120,11 @@ def cost(
         standing = replace(settings, start="standing")
         missing = walk(standing, candidates, seeds, threads, foreign=(), watched=False)[0]
         total += FALL_COST * missing.reshape(len(candidates), SET_OFF).mean(1)
-    pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(PUSHED_FOREIGN)
+    if push == 0:
+        return total
+    pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(pushed_springs)
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
-    missing = walk(pushed, candidates, seeds, threads, ease, foreign=PUSHED_FOREIGN, watched=False)[0]
+    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs, watched=False)[0]
     missing = missing.reshape(len(candidates), walks)
     fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
     return total + FALL_COST * fallen

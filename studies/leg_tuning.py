@@ -21,14 +21,16 @@ from tqdm import tqdm
 from springfoot.agents.files import csv_text
 from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name
 from springfoot.envs.control.leg_controller import KNOTS
-from springfoot.envs.settings import BipedSettings, Feedforward
+from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.settings import BipedSettings, Feedforward, Guide
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, require_count, require_number
-from springfoot.gait.human import human_gait
+from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.plan import Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS
 
 from .constants_file import CONSTANTS, read_constants, write_constants
+from .generic_constants import GENERIC, generic_constants
 from .leg_cost import REFINED_SECONDS, all_misses, cost
 from .study import Answer, OnProgress, Study
 
@@ -64,9 +66,9 @@ KEPT = 0.17
 class Search:
     """Constants as a vector of unit steps from where the search began; the last three are leads of whole targets."""
 
-    def __init__(self, start: LegConstants, speed: float = TUNED_SPEED):
+    def __init__(self, start: LegConstants, speed: float = TUNED_SPEED, human: HumanGait | None = None):
         self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in asdict(start).items()}
-        human = human_gait(speed)
+        human = human or human_gait(speed)
         self._led = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
         self.size = sum(value.size for value in self._start.values()) + len(LED)
 
@@ -101,6 +103,8 @@ class LegTuning(Study):
     """Which cadence they are for."""
     speed: float = TUNED_SPEED
     """Which speed they are for [m/s]."""
+    guide: Guide = "people"
+    """What they follow: people, or the plan alone, which is also what they then pay for."""
     feedforward: Feedforward = "people"
     """Whose moments are fed forward with them."""
     start: str = ""
@@ -154,8 +158,10 @@ class LegTuning(Study):
         Raises `SpringfootError`, with nothing written, for a file of another kind, and for constants to start from that
         are not in it.
         """
-        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward)
+        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward, self.guide)
         known = read_constants(self.constants)["constants"]
+        if self.start == GENERIC:
+            known = known | {GENERIC: asdict(generic_constants())}
         if (start := self.start or name) not in known:
             raise SpringfootError(
                 f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
@@ -166,13 +172,15 @@ class LegTuning(Study):
             cadence=self.cadence,
             speed=self.speed,
             feedforward=self.feedforward,
+            guide=self.guide,
             episode_seconds=REFINED_SECONDS + 1,
         )
+        human = reference_walk_at(settings, self.speed, [begin]).human
         told = ""
         if self.refinements:
             begin, misses = self._refined(begin, settings, lambda better: self._keep(name, better), progress)
             told = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
-        search = Search(begin, self.speed)
+        search = Search(begin, self.speed, human)
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
@@ -204,7 +212,7 @@ class LegTuning(Study):
         Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
         the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
         """
-        search = Search(start, settings.speed)
+        search = Search(start, settings.speed, reference_walk_at(settings, settings.speed, [start]).human)
 
         def missed(vectors: NDArray) -> list[NDArray | None]:
             found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)

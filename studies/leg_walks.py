@@ -36,6 +36,12 @@ FOREIGN, PUSHED_FOREIGN = (UNCHANGING, QUASI, MID_RANGE), (UNCHANGING, QUASI)
 """Springs that nobody tuned for it, with which each candidate walks undisturbed, and pushed."""
 
 
+def foreign_springs(settings: BipedSettings) -> tuple[Sequence[NDArray], Sequence[NDArray]]:
+    """Springs that nobody tuned, undisturbed and pushed; none where the body follows its plan: they are people's, or
+    chosen on people's walk."""
+    return ((), ()) if settings.guide == "plan" else (FOREIGN, PUSHED_FOREIGN)
+
+
 def walk(
     settings: BipedSettings,
     candidates: Sequence[LegConstants],

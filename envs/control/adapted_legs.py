@@ -39,14 +39,15 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
         return None
     if len(found) > 1:
         raise SpringfootError("left_foot and right_foot: a person adapts to one foot, the other one sound; got both")
-    if (kind := constants_name(settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward)) != "planned":
+    asked = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.guide
+    if (kind := constants_name(*asked)) != "planned":
         raise SpringfootError(f"{FOOT_SETTINGS[found[0][0]]}: adapted legs are of 'planned' constants, got {kind!r}")
     return found[0]
 
 
 def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
     """The constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
-    tuned = leg_constants(settings.equilibrium, settings.cadence, speed, settings.feedforward)
+    tuned = leg_constants(settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.guide)
     adapted = adapted_foot(settings)
     if adapted is None:
         return tuned

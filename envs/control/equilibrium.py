@@ -1,5 +1,7 @@
 """Equilibrium angles of ankle and toe springs, and their stiffness where no action sets it: curves over the stride."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from springfoot.gait.arrays import NDArray
@@ -7,7 +9,7 @@ from springfoot.gait.body import Body
 from springfoot.gait.human import FootHabits, HumanGait, foot_habits
 from springfoot.gait.stiffness import StiffnessSchedule
 
-from ..physics.model import ANKLE, damping_times
+from ..physics.model import ANKLE, TOE, damping_times
 from ..settings import BipedSettings
 from .leg_constants import LegConstants
 from .leg_controller import knot_curve
@@ -18,7 +20,7 @@ _PEOPLES = foot_habits()
 PLATEAUS = _PEOPLES.plateaus
 """Stride phases at which loading, early stance, late stance, push-off and swing start and end. On them `plateau_curve`
 is constant, between them linear; chosen near people's."""
-REFERENCE_STIFFNESS = _PEOPLES.ankle_quasi_stiffness
+REFERENCE_STIFFNESS = _PEOPLES.ankle_quasi_stiffness or ()
 """K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase, of the package's own
 file (`springfoot.gait.human`)."""
 FOOT_FLAT, TOE_OFF = _PEOPLES.toe_flat, _PEOPLES.toe_off
@@ -46,6 +48,18 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
     return rest, stiffness
 
 
+def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> tuple[NDArray, NDArray]:
+    """(R, SAMPLES, 2 or 4) equilibrium and, where fed, torques behind it (`foot_feed`), and (R, SAMPLES, 2) scheduled
+    stiffness, for each row of the tables."""
+    rests, stiffnesses = [], []
+    for constants, walk in rows:
+        rest, stiffness = foot_curves(settings, constants, walk)
+        feed = foot_feed(settings, constants, walk)
+        rests.append(rest if feed is None else np.concatenate([rest, feed], axis=-1))
+        stiffnesses.append(stiffness)
+    return np.stack(rests), np.stack(stiffnesses)
+
+
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
     """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the fixed schedule, which was tuned together with the legs."""
     toe = np.full(len(GRID), constants.toe_schedule)
@@ -57,14 +71,30 @@ def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
     times the moment M of the walk (plantarflexion positive). The toe's equilibrium is the tuned angle from foot flat to
-    toe-off, and that in swing otherwise.
+    toe-off, and that in swing otherwise. A plan has no K_ref: theta_eq is its ankle and toe alone, each ahead by beta,
+    and its moments are fed forward beside the spring (`foot_feed`).
     """
     body, human, foot = walk.body, walk.human, walk.human.foot
-    beta, period = damping_times(body)[ANKLE], constants.period_factor * walk.plan.stride_time
-    quasi = plateau_curve(foot.ankle_quasi_stiffness, foot.plateaus) * body.stiffness_scale
-    lead = beta * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
+    beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
+    if foot.ankle_quasi_stiffness is None:
+        flat = np.interp(GRID, [*foot.toe_flat, *foot.toe_off], [0.0, 1.0, 1.0, 0.0])
+        shifts = knot_curve(constants.ankle_knots_deg), flat * np.deg2rad(constants.toe_flat_deg)
+        named = zip(("ankle", "toe"), (beta[ANKLE], beta[TOE]), shifts, strict=True)
+        return np.stack([human.mean(n, GRID) + b * human.rate(n, GRID) / period + own for n, b, own in named], axis=-1)
+    quasi = plateau_curve(foot.ankle_quasi_stiffness or (), foot.plateaus) * body.stiffness_scale
+    lead = beta[ANKLE] * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
     ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
     return np.stack([ankle, _toe(foot, constants.toe_flat_deg)], axis=-1)
+
+
+def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> NDArray | None:
+    """(SAMPLES, 2) torque [N m], dorsiflexion positive, that acts beside the springs of ankle and toe whatever their K;
+    None where none is asked for."""
+    if settings.equilibrium != "planned" or walk.human.foot.ankle_quasi_stiffness is not None:
+        return None
+    unit = walk.body.total_mass * walk.body.length_scale
+    moments = [walk.human.mean(f"{joint}_moment", GRID) for joint in ("ankle", "toe")]
+    return -constants.feedforward[ANKLE] * unit * np.stack(moments, axis=-1)
 
 
 def angle(human: HumanGait) -> NDArray:

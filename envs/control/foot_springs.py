@@ -158,13 +158,15 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
         state: (N, numbers) MuJoCo's, whose `control` is filled.
-        rest: (R, SAMPLES, 2, 2) rest angles of ankle and toe [rad], of a `PhaseTable`.
+        rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; behind them, if so asked,
+            torques that act beside the springs, whatever their K [N m]: as shifts of the rest angle by torque / K.
         incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.leg_controller.slope_table`).
         feet: `envs.control.foot_rows.FootLines`, as a plain tuple.
         options: (1,) of `SPRING_OPTIONS`.
         walking: (N,) bool; the springs of the others do not change.
     """
-    wanted, inclined, option = np.empty(2), np.empty(4), options[0]
+    wanted, inclined, option = np.empty(rest.shape[-1]), np.empty(4), options[0]
+    feeds = rest.shape[-1] > 2
     level = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
         own, foot, subject = rows[i].springs, rows[i].feet, rows[i].subject
@@ -186,6 +188,8 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
                         acts = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
                         own.acts[side, joint] = acts
                     aim = foot.rest[side, joint] if foot.rests[side, joint] else wanted[joint]
+                    if feeds and foot.muscles[side, joint] and not foot.rests[side, joint]:
+                        aim += subject.scale.torque * wanted[2 + joint] / k
                     before, after = own.equilibrium[side, joint] - theta, aim - theta
                     own.equilibrium[side, joint] = aim
                     if not own.fresh:
@@ -232,7 +236,8 @@ class FootSprings:
     Args:
         settings: ranges of stiffness and action mode.
         body: the body that the tables are for.
-        equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables.
+        equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables; or (R, SAMPLES,
+            4), torques beside the springs [N m] behind them.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
         subjects: bodies and requested speeds.
         feet: N pairs in place of the settings' feet.

@@ -74,23 +74,30 @@ class SlopeConstants:
     """Added to the held trunk pitch."""
 
 
-def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people") -> str:
-    """Name of the committed constants for a setting; "angle" and "phase" share those of "planned"."""
-    name = "neutral" if equilibrium == "neutral" else "planned"
+def constants_name(
+    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", guide: str = "people"
+) -> str:
+    """Name of the committed constants for a setting; "angle" and "phase" share those of "planned", and with the guide
+    "plan" all equilibria share one set."""
+    name = "predicted" if guide == "plan" else "neutral" if equilibrium == "neutral" else "planned"
     name = name if cadence == "people" else f"{name}, {cadence} cadence"
+    if guide == "plan":
+        feedforward = "people"  # its own moments are fed forward in any case
     name = name if feedforward == "people" else f"{name}, {feedforward}'s moments"
     return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
 
 
 def leg_constants(
-    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people"
+    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", guide: str = "people"
 ) -> LegConstants:
     """The committed constants for a setting at `speed` [m/s at 1.70 m].
 
     They are linear between the speeds of the committed sets; beyond those speeds the nearest set holds. Raises
     `SpringfootError` for a setting without a committed set.
     """
-    name, table = constants_name(equilibrium, cadence, feedforward=feedforward), _committed()
+    name, table = constants_name(equilibrium, cadence, feedforward=feedforward, guide=guide), _committed()
+    if guide == "plan" and name not in table:
+        raise SpringfootError(f"no leg constants walk with guide 'plan' at cadence {cadence!r}; it must be 'people'")
     if name not in table:
         raise SpringfootError(
             f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s "

@@ -19,6 +19,8 @@ from springfoot.gait.com_plan import ComPlan, over_peoples_zmp
 from springfoot.gait.human import HumanGait
 from springfoot.gait.kinetics import planned_moments
 from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
+from springfoot.gait.plan_gait import gait_of
+from springfoot.gait.walk_style import least_work
 
 from ..physics.model import LEFT, RIGHT
 from ..settings import BipedSettings, body_of, reference_gait
@@ -47,9 +49,9 @@ class ReferenceWalk:
     speed: float
     """Walking speed [m/s]."""
     human: HumanGait
-    """The gait that the body is held to."""
+    """The gait that the body follows: people's, or the plan's own."""
     plan: ComPlan
-    """The planned motion of the CoM over people's ZMP, and the time of a stride."""
+    """The planned motion of the CoM, over people's ZMP where the body follows people, and the time of a stride."""
     constants: tuple[LegConstants, ...]
     """Leg constants: one set, or several variants."""
     moments: NDArray
@@ -85,12 +87,17 @@ def reference_walk_at(
     body = body_of(settings)
     settings = replace(settings, speed=speed)
     human = reference_gait(settings)
+    equal_speed = speed / sqrt(body.length_scale)
+    legs = legs or [person_constants(settings, equal_speed, side)]
+    if settings.guide == "plan":
+        plan = plan_walk(body, speed, settings.cadence, human=human, style=least_work(equal_speed))
+        guide = gait_of(plan)
+        moments = _moments_of(guide, body)
+        return ReferenceWalk(body=body, speed=speed, human=guide, plan=plan, constants=tuple(legs), moments=moments)
     if settings.human is None and settings.people_file is None:
         plan = _plan(body, speed, settings.cadence)
     else:
         plan = plan_walk(body, speed, settings.cadence, human=human)
-    equal_speed = speed / sqrt(body.length_scale)
-    legs = legs or [person_constants(settings, equal_speed, side)]
     return ReferenceWalk(
         body=body,
         speed=speed,

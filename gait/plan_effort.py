@@ -1,0 +1,88 @@
+"""What a plan costs a body: work and muscle excitation of its own inverse dynamics. It knows no walk of people's.
+
+All terms are dimensionless, so that they keep their weights with body and speed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import NDArray
+from .body import GRAVITY, Body
+from .kinetics import planned_leg
+from .leg import JOINTS, inverse_dynamics
+from .plan import WalkPlan
+
+EFFORT_SAMPLES = 200
+"""Samples of the stride; chosen."""
+EFFICIENCY = (0.25, 1.2)
+"""Joint work over metabolic energy of muscles that shorten and that are stretched (Margaria 1968)."""
+STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "toe": (0.015, 0.015)}
+"""Largest moment in extension and flexion, plantarflexion and dorsiflexion, over body weight times height [-]; chosen,
+rounded: the order of the maximal voluntary moments of young adults on dynamometers; of the toe a guess."""
+ACTIVATION_TIME = 0.05
+"""Time in which a muscle's activation follows its excitation [s]; chosen, as models of muscles have it."""
+TOE_TISSUE = 28.0
+"""Passive stiffness of a toe that is bent up [N m/rad] for 1.70 m and 63 kg: `stiffness.TOE_STIFFNESS`."""
+MOTION_RANGE_DEG = {"knee": (0.0, 135.0), "ankle": (-48.0, 18.0), "toe": (-30.0, 70.0)}
+"""Least and largest angle [deg], dorsiflexion and toe up positive: ranges of motion of the American Academy of
+Orthopaedic Surgeons (1965)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanEffort:
+    """The terms of one plan, both legs together."""
+
+    work: float
+    """Metabolic energy of the work of hips, knees and ankles over body weight times distance [-]."""
+    activation: float
+    """Sum over joints of the mean squared activation, moment over `STRENGTH`; the toe's without its tissue [-]."""
+    rate: float
+    """Sum over joints of the mean squared `ACTIVATION_TIME` times rate of the activation [-]. A first-order muscle's
+    mean squared excitation is the sum of this and `activation`."""
+    beyond_range: float
+    """Sum over joints of the largest angle beyond `MOTION_RANGE_DEG` [deg]."""
+
+    @property
+    def total(self) -> float:
+        """What a search pays: energy and squared excitation, which weigh alike; chosen."""
+        return self.work + self.activation + self.rate
+
+
+def effort_of(plan: WalkPlan) -> PlanEffort:
+    """The effort of a plan."""
+    body, phase = plan.body, np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
+    motion, load = planned_leg(plan, phase)
+    dynamics = inverse_dynamics(body, motion, load, plan.slope)
+    moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
+    angle, rate = (_joints(turns) for turns in (motion.turn, motion.rate))
+    toe = JOINTS.index("toe")
+    power = (-moment * rate)[:, :toe]
+    tick, distance = plan.stride_time / EFFORT_SAMPLES, 2 * plan.step_length
+    spent = (np.maximum(power, 0.0).sum() / EFFICIENCY[0] + np.maximum(-power, 0.0).sum() / EFFICIENCY[1]) * tick
+    moment[:, toe] -= TOE_TISSUE * body.stiffness_scale * np.maximum(angle[:, toe], 0.0)
+    activation = moment / _strength(body, moment)
+    change = (np.roll(activation, -1, 0) - np.roll(activation, 1, 0)) / (2 * tick)
+    bent = np.degrees(angle)
+    beyond = 0.0
+    for joint, (least, most) in MOTION_RANGE_DEG.items():
+        own = bent[:, JOINTS.index(joint)]
+        beyond += max(0.0, float(own.max()) - most) + max(0.0, least - float(own.min()))
+    return PlanEffort(
+        work=float(2 * spent / (body.total_mass * GRAVITY * distance)),
+        activation=float(2 * np.mean(activation**2, 0).sum()),
+        rate=float(2 * ACTIVATION_TIME**2 * np.mean(change**2, 0).sum()),
+        beyond_range=beyond,
+    )
+
+
+def _joints(turns: NDArray) -> NDArray:
+    """(..., 4) hip, knee, ankle and toe, flexion and dorsiflexion positive, from turns of thigh, shank, foot, toe."""
+    thigh, shank, foot, toe = np.moveaxis(turns, -1, 0)
+    return np.stack([thigh, thigh - shank, foot - shank, toe - foot], -1)
+
+
+def _strength(body: Body, moment: NDArray) -> NDArray:
+    """The strength [N m] against which each of the moments (..., 4) counts."""
+    extending, flexing = np.array([STRENGTH[joint] for joint in JOINTS]).T
+    return body.mass * GRAVITY * body.height * np.where(moment > 0.0, extending, flexing)
