@@ -15,7 +15,7 @@ from .plan import WalkPlan
 
 EFFORT_SAMPLES = 200
 """Samples of the stride; chosen."""
-EFFICIENCY = (0.25, 1.2)
+MUSCLE_EFFICIENCY = (0.25, 1.2)
 """Joint work over metabolic energy of muscles that shorten and that are stretched (Margaria 1968)."""
 STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "toe": (0.015, 0.015)}
 """Largest moment in extension and flexion, plantarflexion and dorsiflexion, over body weight times height [-]; chosen,
@@ -59,7 +59,9 @@ def effort_of(plan: WalkPlan) -> PlanEffort:
     toe = JOINTS.index("toe")
     power = (-moment * rate)[:, :toe]
     tick, distance = plan.stride_time / EFFORT_SAMPLES, 2 * plan.step_length
-    spent = (np.maximum(power, 0.0).sum() / EFFICIENCY[0] + np.maximum(-power, 0.0).sum() / EFFICIENCY[1]) * tick
+    spent = (
+        np.maximum(power, 0.0).sum() / MUSCLE_EFFICIENCY[0] + np.maximum(-power, 0.0).sum() / MUSCLE_EFFICIENCY[1]
+    ) * tick
     moment[:, toe] -= TOE_TISSUE * body.stiffness_scale * np.maximum(angle[:, toe], 0.0)
     activation = moment / _strength(body, moment)
     change = (np.roll(activation, -1, 0) - np.roll(activation, 1, 0)) / (2 * tick)
