@@ -7,7 +7,7 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: help install walk test test-wheel test-sdist test-learners fuzz extremes check format bench feet clean
+.PHONY: help install walk test test-wheel test-sdist test-learners test-kills fuzz extremes check format bench feet clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -15,6 +15,7 @@ help:
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make test-learners  train with every library of docs/learners.md, each outside $(VENV); goes on after a stop"
+	@echo "make test-kills   end 20 trainings several times each, resume them, and compare them with uninterrupted ones"
 	@echo "make fuzz     change files of every kind at random for ten minutes, and read them"
 	@echo "make extremes ten million extreme steps in drawn settings: is all finite, and the memory flat?"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
@@ -33,7 +34,8 @@ $(VENV)/installed: pyproject.toml constraints.txt
 
 # runs/walk is the first, runs/walk-2 the next: train.py refuses a folder that already holds a run.
 walk: install
-	@out=runs/walk; n=2; while [ -e "$$out" ]; do out=runs/walk-$$n; n=$$((n + 1)); done; set -e; \
+	@mkdir -p runs; out=runs/walk; n=2; set -e; \
+	until mkdir "$$out" 2> /dev/null; do [ -e "$$out" ] || exit 1; out=runs/walk-$$n; n=$$((n + 1)); done; \
 	$(BIN)/python train.py --out "$$out"; \
 	$(BIN)/python evaluate.py "$$out" --out "$$out/evaluation"; \
 	printf '%s\n' "" "Policy:   $$out/best.safetensors" "Numbers:  $$out/evaluation/metrics.json" \
@@ -78,6 +80,9 @@ test-sdist: install
 
 test-learners: install build/learners/many/installed build/learners/rllib/installed
 	$(BIN)/python -m benchmarks.learners
+
+test-kills: install
+	$(BIN)/python -m benchmarks.kills
 
 # All of constraints.txt but filelock, of which Tianshou wants an older one, and Gymnasium, which RLlib pins.
 build/learners/%/installed: examples/learners/requirements-%.txt constraints.txt pyproject.toml

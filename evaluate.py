@@ -2,8 +2,15 @@
 
 import sys
 
-from springfoot.evaluation.evaluate_command import evaluate_main
 from springfoot.terminal import at_terminal
 
+
+def main() -> int:
+    """Evaluate; its imports take a while, in which Ctrl-C ends it all the same."""
+    from springfoot.evaluation.evaluate_command import evaluate_main
+
+    return evaluate_main()
+
+
 if __name__ == "__main__":
-    sys.exit(at_terminal(evaluate_main))
+    sys.exit(at_terminal(main))

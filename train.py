@@ -2,8 +2,15 @@
 
 import sys
 
-from springfoot.agents.train_command import train_main
 from springfoot.terminal import at_terminal
 
+
+def main() -> int:
+    """Train; its imports take a while, in which Ctrl-C ends it all the same."""
+    from springfoot.agents.train_command import train_main
+
+    return train_main()
+
+
 if __name__ == "__main__":
-    sys.exit(at_terminal(train_main))
+    sys.exit(at_terminal(main))

@@ -3,19 +3,24 @@
 import errno
 import io
 import re
+import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 
 from springfoot.gait.errors import SpringfootError, printable
+from springfoot.terminal import INTERRUPTED
 
 from .baselines import FROZEN, SCHEDULE_SUFFIXES
 
 Flags = TypeVar("Flags")
+TERMINATED = 128 + 15
+"""Exit code after SIGTERM, as a shell gives it."""
 _NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
 """Errors of the system that end a writing: full, read-only, forbidden, broken, vanished."""
 _OURS = {
@@ -61,10 +66,12 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
     """Run the `work` of the command `name` and return its exit code.
 
     That is what `work` returns (0 for None); 2 after one line on standard error for bad input, a file that cannot be
-    read or written, or too little memory; 130 after Ctrl-C.
+    read or written, or too little memory; 130 after Ctrl-C, 143 after SIGTERM, which says so in a line as well.
     """
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
+    in_main = threading.current_thread() is threading.main_thread()
+    before = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)] if in_main else []
     try:
         return work() or 0
     except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
@@ -73,7 +80,37 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
         print(f"{name}: error: {printable(_told(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        return 130
+        print(f"{name}: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except _Terminated:
+        print(f"{name}: ended by SIGTERM", file=sys.stderr)
+        return TERMINATED
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
+
+
+def end_in_order() -> None:
+    """From here on SIGINT and SIGTERM raise, so that what is being written is cleared up on the way out.
+
+    A command calls it after its imports, and before it writes anything.
+    """
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, _terminate)
+
+
+class _Terminated(BaseException):
+    pass
+
+
+def _terminate(_number: int, _frame: object) -> None:
+    raise _Terminated
+
+
+def stopped_by(record: dict[str, Any]) -> int:
+    """The exit code of a training that a signal ended in good order."""
+    return TERMINATED if record.get("signal") == "SIGTERM" else INTERRUPTED
 
 
 def _told(error: Exception) -> str:

@@ -10,7 +10,7 @@ import tyro
 from springfoot.gait.errors import SpringfootError
 
 from .baselines import has_feedback
-from .command_line import exit_code, parse
+from .command_line import end_in_order, exit_code, parse
 from .foreign_policy import is_function
 
 
@@ -43,6 +43,7 @@ def run_export(flags: ExportFlags) -> None:
     from .export import export_policy, planned_files
     from .policy import read_policy
 
+    end_in_order()
     planned_files(flags.out, flags.to)  # raises before the policy is read
     if not has_feedback(flags.policy) or flags.policy.endswith(".onnx") or is_function(flags.policy):
         raise SpringfootError(

@@ -5,7 +5,6 @@ Seed k is trained in the folder `seed-k`, by the same bits as `train.py --seed k
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,11 +20,15 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.gait.errors import SpringfootError, require_count
 from springfoot.gait.scores import mean_sd
 
-from .command_line import exit_code
+from .command_line import end_in_order, exit_code, stopped_by
 from .config import TrainingConfig, config_from_json, config_to_json
-from .files import make_folder, require_new, write_atomically
+from .files import require_new, write_atomically
 from .markdown import MISSING, plus_minus, table, text_of
-from .training import RUN, processors, train
+from .ownership import owned
+from .policy import RUN
+from .run_record import read_record
+from .session import processors
+from .training import resume, train
 
 SEEDS = "seeds.json"
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -44,43 +47,49 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
     require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)
     out = require_new(out)
     Biped(config.environment, 1)  # raises for settings that nobody can walk in, before anything is written
-    make_folder(out)
     configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
-    rows, status = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
-    record = {"config": config_to_json(config), "status": status, "seeds": rows, "spread": spread(rows)}
-    write_atomically(out / SEEDS, (json.dumps(record, indent=2) + "\n").encode())
+    with owned(out):
+        require_new(out)
+        rows, signalled = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
+        record = {"config": config_to_json(config), "status": _status(rows, signalled), "seeds": rows}
+        record |= {"spread": spread(rows)} | ({"signal": signalled.name} if signalled else {})
+        write_atomically(out / SEEDS, (json.dumps(record, indent=2) + "\n").encode())
     return record
 
 
-def train_all(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> tuple[list[dict[str, Any]], str]:
-    """Train each configuration into its new folder, as `train_seeds` does; its messages begin with its name.
+def train_all(
+    jobs: Sequence[tuple[TrainingConfig, Path, str]],
+) -> tuple[list[dict[str, Any]], signal.Signals | None]:
+    """Train each configuration into its folder, as `train_seeds` does; its messages begin with its name.
 
-    Returns a row of results for each, and `finished`, `failed` or `interrupted` for all together.
+    A folder that holds a run is gone on with. Returns a row of results for each, and the signal that stopped them.
     """
     at_once = min(max(len(jobs), 1), processors())
     with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
         print(f"{len(jobs)} seeds, {at_once} at a time, one thread each", file=sys.stderr, flush=True)
         rows = list(pool.map(lambda job: trainings.run(*job), jobs))
-    status = "interrupted" if trainings.stopping else "finished"
-    return rows, "failed" if any(row["status"] == "failed" for row in rows) else status
+    return rows, trainings.stopping
+
+
+def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) -> str:
+    """`finished`, `failed` or `interrupted`, for all together."""
+    status = "interrupted" if signalled else "finished"
+    return "failed" if any(row["status"] == "failed" for row in rows) else status
 
 
 def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
     """Train the configurations whose folders hold no finished run, as `train_all` does.
 
-    A run that was started and not finished is deleted and started again. Returns `finished`, `failed` or
-    `interrupted`. Raises `SpringfootError`, with nothing changed, for a finished run of another configuration.
+    A run that was started and not finished is gone on with. Returns `finished`, `failed` or `interrupted`. Raises
+    `SpringfootError`, with nothing changed, for a run of another configuration.
     """
-    missing = [job for job in jobs if not is_finished(job[1])]
     for config, folder, _ in jobs:
-        if is_finished(folder):
-            done = config_from_json(json.loads((folder / RUN).read_text(encoding="utf-8"))["config"])
+        if (folder / RUN).is_file():
+            done = config_from_json(read_record(folder)["config"])
             if replace(done, threads=config.threads) != config:
                 raise SpringfootError(f"{folder} was trained with other settings; choose another folder")
-    for _, folder, _ in missing:
-        if (folder / RUN).is_file():
-            shutil.rmtree(folder)
-    return train_all(missing)[1] if missing else "finished"
+    missing = [job for job in jobs if not is_finished(job[1])]
+    return _status(*train_all(missing)) if missing else "finished"
 
 
 def is_finished(folder: Path) -> bool:
@@ -112,7 +121,7 @@ class _Trainings:
     """Training processes, and the signals that end them; a context manager."""
 
     def __init__(self) -> None:
-        self.stopping = False
+        self.stopping: signal.Signals | None = None
         self._lock = threading.RLock()  # a second signal may interrupt the passing on of the first
         self._running: list[subprocess.Popen[str]] = []
         self._before: dict[int, Any] = {}
@@ -149,7 +158,7 @@ class _Trainings:
 
     def _stop(self, number: int, _frame: Any) -> None:
         with self._lock:
-            self.stopping = True
+            self.stopping = signal.Signals(number)
             for process in self._running:
                 process.send_signal(number)
 
@@ -201,7 +210,9 @@ def _main() -> int:
 
 def _train(config: TrainingConfig, folder: str) -> int:
     _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
-    return 130 if train(config, folder)["status"] == "interrupted" else 0
+    end_in_order()
+    record = resume(folder, threads=config.threads) if (Path(folder) / RUN).is_file() else train(config, folder)
+    return stopped_by(record) if record["status"] == "interrupted" else 0
 
 
 if __name__ == "__main__":

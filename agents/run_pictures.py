@@ -25,7 +25,8 @@ GALLERY_SHARES = (0.0, 0.25, 0.5, 1.0)
 """Of the timesteps, after which a policy is kept; chosen."""
 SECONDS_SHOWN, SECONDS_BETWEEN = 6.0, 0.3
 """How long each of the gallery walks at most, and the time between two of its figures [s]; chosen."""
-GALLERY, LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR = "gallery", "#0b6e8f", "#9ec4d1", "#404e5c"
+CURVE, GALLERY = "learning_curve.png", "gallery"
+LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR = "#0b6e8f", "#9ec4d1", "#404e5c"
 
 
 class Gallery:
@@ -42,6 +43,12 @@ class Gallery:
             self._folder.mkdir(exist_ok=True)
             save_policy(self._folder / f"{timesteps}.safetensors", policy())
 
+    def forget(self, done: int) -> None:
+        """Remove policies of after `done` timesteps, which a session that was killed kept."""
+        for path in self._folder.glob("*.safetensors"):
+            if path.stem.isdecimal() and int(path.stem) > done:
+                path.unlink()
+
 
 def draw_run(out: Path, record: dict[str, Any], biped: Biped, seed: int) -> None:
     """Write `learning_curve.png` and `gallery.png` of the run in `out`.
@@ -54,7 +61,7 @@ def draw_run(out: Path, record: dict[str, Any], biped: Biped, seed: int) -> None
     """
     figures = {}
     if record["evaluations"]:
-        figures["learning_curve.png"] = curve_figure(record)
+        figures[CURVE] = curve_figure(record)
     kept = {int(path.stem): path for path in (out / GALLERY).glob("*.safetensors")}
     if kept:
         policies = {steps: read_policy(kept[steps]) for steps in sorted(kept)}

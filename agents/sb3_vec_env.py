@@ -1,6 +1,6 @@
 """The batched environment for stable-baselines3: the same bits as the Gymnasium VectorEnv under it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,20 @@ class SegmentedFootBipedVecEnv(VecEnv):
                 }
             self._returns[done], self._lengths[done] = 0.0, 0
         return observation, reward.copy(), done, infos  # PPO adds bootstrapped values to the rewards in place
+
+    def state(self) -> dict[str, Any]:
+        """The exact state between two steps: that of the batch (see `Biped.state`), and of the running episodes."""
+        episodes = {"episode.return": self._returns.copy(), "episode.length": self._lengths.copy()}
+        return self.env.biped.state() | episodes
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `state` gave; raises `SpringfootError` for that of other settings."""
+        for name, own in (("episode.return", self._returns), ("episode.length", self._lengths)):
+            if np.shape(state.get(name, ())) != own.shape:
+                raise SpringfootError(f"the state does not fit: {name!r} must be {own.shape}")
+        self.reset()  # so that an episode is running everywhere; nothing of it is left
+        self.env.biped.restore({name: values for name, values in state.items() if not name.startswith("episode.")})
+        self._returns[:], self._lengths[:] = state["episode.return"], state["episode.length"]
 
     def close(self) -> None:
         """Free the simulation and any window."""

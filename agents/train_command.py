@@ -11,7 +11,7 @@ import tyro
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError, require_count
 
-from .command_line import exit_code, parse
+from .command_line import end_in_order, exit_code, parse, stopped_by
 from .config import PRESETS, TrainingConfig
 from .files import require_new
 from .flags import given, optional_flags
@@ -26,14 +26,16 @@ EnvironmentFlags = optional_flags("EnvironmentFlags", BipedSettings, PRESET.envi
 class TrainFlags:
     """Train a policy that sets the stiffness of ankles and toes, by PPO.
 
-    The first Ctrl-C ends it in good order with a usable policy (exit code 130). Defaults shown are those of
+    The first Ctrl-C ends it in good order with a usable policy (exit code 130), the second at once; SIGTERM likewise
+    (exit code 143). Defaults shown are those of
     the preset walk.
     """
 
     out: Annotated[Path | None, FOLDER] = None
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
-    """Folder of a run to continue, with its saved settings; --timesteps is then how many more."""
+    """Folder of a run to continue, with its saved settings, by the bits of one that nothing interrupted; --timesteps
+    is then how many more, and --threads may be others."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""
@@ -47,7 +49,8 @@ class TrainFlags:
 
 
 def train_main(arguments: Sequence[str] | None = None, program: str = "train.py") -> int:
-    """Run the command line; returns its exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 Ctrl-C.
+    """Run the command line; returns its exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 Ctrl-C,
+    143 SIGTERM.
 
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
@@ -71,12 +74,13 @@ def run_training(flags: TrainFlags) -> int:
         if "threads" in settings:
             raise SpringfootError("--seeds gives each seed one thread; drop --threads")
         require_count("seeds", flags.seeds)
-    if flags.resume and (fixed := sorted(set(settings) - {"timesteps"})):
+    if flags.resume and (fixed := sorted(set(settings) - {"timesteps", "threads"})):
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
         from . import training  # not above: torch takes seconds, and bad flags need not wait for it
 
-        folder, record = flags.resume, training.resume(flags.resume, settings.get("timesteps"))
+        end_in_order()
+        folder, record = flags.resume, training.resume(flags.resume, settings.get("timesteps"), settings.get("threads"))
     else:
         assert flags.out is not None
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
@@ -84,6 +88,7 @@ def run_training(flags: TrainFlags) -> int:
             return run_seeds(config, flags.out, flags.seeds)
         from . import training
 
+        end_in_order()
         folder, record = flags.out, training.train(config, flags.out)
     interrupted, best = record["status"] == "interrupted", record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
@@ -97,13 +102,14 @@ def run_training(flags: TrainFlags) -> int:
     print(f"Next:    springfoot evaluate {folder}")
     if interrupted:
         print(f"Or:      springfoot train --resume {folder}")
-    return 130 if interrupted else 0
+    return stopped_by(record) if interrupted else 0
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     """Train from several seeds, then print how far they agree and where the results are."""
     from . import multi_seed
 
+    end_in_order()
     record = multi_seed.train_seeds(config, out, count)
     print(f"\n{multi_seed.training_table(record)}\n")
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
@@ -111,7 +117,7 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     print(f"Next:    springfoot study seeds {out}/seed-*")
     if record["status"] == "interrupted":
         print(f"Or:      springfoot train --resume {out}/seed-N, for each N that was interrupted")
-    return {"finished": 0, "interrupted": 130}.get(record["status"], 1)
+    return {"finished": 0, "interrupted": stopped_by(record)}.get(record["status"], 1)
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:

@@ -28,7 +28,7 @@ from springfoot.agents import PolicyFunction, baseline, load_policy
 from springfoot.agents.command_line import exit_code
 from springfoot.agents.fingerprint import fingerprint
 from springfoot.agents.markdown import table, write_section
-from springfoot.agents.training import evaluate_returns
+from springfoot.agents.returns import evaluate_returns
 from springfoot.envs import Biped, BipedSettings
 from springfoot.gait.errors import SpringfootError
 

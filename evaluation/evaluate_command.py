@@ -12,8 +12,8 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.agents.baselines import FROZEN, has_feedback
-from springfoot.agents.command_line import exit_code, parse, policy_label
-from springfoot.agents.files import next_free, whole_folder
+from springfoot.agents.command_line import end_in_order, exit_code, parse, policy_label
+from springfoot.agents.files import whole_folder
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.envs.physics.simulation import MOST_THREADS
 from springfoot.gait.errors import MOST_COUNT, SpringfootError, require_count
@@ -63,7 +63,7 @@ class EvaluateFlags:
 
 
 def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evaluate.py") -> int:
-    """Run the command line; returns its exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C.
+    """Run the command line; returns its exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C, 143 by SIGTERM.
 
     `arguments` are those of the process unless given; `program` is what messages call it.
     """
@@ -79,9 +79,8 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     if not flags.policies:
         raise SpringfootError("give a policy, say pretrained; --help lists them")
     labels = _labels(flags.policies)
-    out = flags.out or next_free(Path("runs"), f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
-    if out.exists():
-        raise SpringfootError(f"{out} exists already; give --out a new folder")
+    if flags.out is not None and flags.out.exists():
+        raise SpringfootError(f"{flags.out} exists already; give --out a new folder")
     from . import (
         film,
         gait_table,
@@ -92,6 +91,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
         report_page,
     )  # not above: Matplotlib takes a while, and bad flags need not wait for it
 
+    end_in_order()
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     if flags.film:
         film.require_film()
@@ -102,7 +102,8 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     for _, environment in prepared:
         recording.require_recordable(environment, flags.episodes)
 
-    with whole_folder(out) as folder:
+    free = Path("runs", f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
+    with whole_folder(flags.out, free) as (folder, out):
         walks = []
         for label, (policy, environment) in zip(labels, prepared, strict=True):
             with _bar(label, flags.episodes * environment.episode_seconds) as bar:

@@ -111,7 +111,7 @@ def _run(words: list[str]) -> int:
 
 
 def study_main(arguments: Sequence[str]) -> int:
-    """Run the study whose name comes first: 0 done, 1 a training failed, 2 bad input, 130 ended by Ctrl-C."""
+    """Run the study whose name comes first: 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143 SIGTERM."""
     name, *words = arguments or ["--help"]
     if name in ("-h", "--help"):
         print(study_help())
@@ -119,12 +119,17 @@ def study_main(arguments: Sequence[str]) -> int:
     if name not in STUDIES:
         print(f"springfoot study: error: no study {name!r:.60}; there are {', '.join(STUDIES)}", file=sys.stderr)
         return 2
-    from springfoot.agents.command_line import exit_code, parse
+    from springfoot.agents.command_line import end_in_order, exit_code, parse
 
     program = f"springfoot study {name}"
     study = parse(study_class(name), words, program)
     study = replace(study, command=shlex.join([*program.split(), *words]))
-    return exit_code(program, lambda: study.run(name))
+
+    def run() -> int:
+        end_in_order()
+        return study.run(name)
+
+    return exit_code(program, run)
 
 
 def study_class(name: str) -> "type[Study]":

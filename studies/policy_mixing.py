@@ -21,7 +21,7 @@ from tqdm import tqdm
 from springfoot.agents.files import csv_text
 from springfoot.agents.markdown import table, text_of
 from springfoot.agents.policy import Policy, read_policy, save_policy
-from springfoot.agents.training import evaluate_returns
+from springfoot.agents.returns import evaluate_returns
 from springfoot.envs.biped_batch import Biped
 from springfoot.evaluation.criteria import Criterion, numbers, unmet
 from springfoot.evaluation.metrics import measure

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 from tqdm import tqdm
 
-from springfoot.agents.files import next_free, whole_folder
+from springfoot.agents.files import whole_folder
 from springfoot.agents.markdown import write_section
 from springfoot.envs.physics.simulation import MOST_THREADS
 from springfoot.envs.setting_checks import LONGEST_EPISODE
@@ -84,22 +84,21 @@ class Study:
         """
         study = replace(self, **self.QUICK) if self.quick else self
         study.check()
-        out = study.out or next_free(Path("runs"), name)
-        if out.exists():
-            raise SpringfootError(f"{out} exists already: out must be a new folder")
+        if study.out is not None and study.out.exists():
+            raise SpringfootError(f"{study.out} exists already: out must be a new folder")
         if study.page is not None and not study.PAGED:
             raise SpringfootError(f"page: {name} has no section to write")
         if study.page is not None and not study.page.parent.is_dir():
             raise SpringfootError(f"there is no folder {study.page.parent} for the page {study.page.name}")
-        with tqdm(
-            total=study.total, desc=name, unit=study.UNIT, unit_scale=True, leave=False, disable=None, delay=0.5
-        ) as bar:
-            answer = study.ask(bar.update)
-        if study.quick and study.QUICK:
-            sections = {section: f"{QUICK_NOTE}\n\n{text}" for section, text in answer.sections.items()}
-            answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}", sections=sections)
-        print(answer.text)
-        with whole_folder(out) as folder:
+        with whole_folder(study.out, Path("runs", name)) as (folder, out):
+            with tqdm(
+                total=study.total, desc=name, unit=study.UNIT, unit_scale=True, leave=False, disable=None, delay=0.5
+            ) as bar:
+                answer = study.ask(bar.update)
+            if study.quick and study.QUICK:
+                sections = {section: f"{QUICK_NOTE}\n\n{text}" for section, text in answer.sections.items()}
+                answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}", sections=sections)
+            print(answer.text)
             for file, content in answer.files.items():
                 _write(folder / file, content)
         if study.page is not None:

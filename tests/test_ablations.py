@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.agents.baselines import schedule
 from springfoot.agents.config import PRESETS, TrainingConfig
-from springfoot.agents.training import RUN
+from springfoot.agents.policy import RUN
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.envs.timing import ACTION_STEP
 from springfoot.evaluation.recording import record

@@ -9,10 +9,11 @@ import pytest
 from safetensors import safe_open
 from safetensors.numpy import load, save
 
+from springfoot.agents.checkpoint import STATE_KEY, read_checkpoint
 from springfoot.agents.config import TrainingConfig
 from springfoot.agents.policy import ENTRIES, read_policy
 from springfoot.agents.tensor_file import DIGEST, MOST_TENSOR_BYTES, read_tensors, write_tensors
-from springfoot.agents.training import STATE, STATE_KEY, resume, train
+from springfoot.agents.training import resume, train
 from springfoot.envs import BipedSettings
 from springfoot.gait import SpringfootError
 from springfoot.gait.json_file import read_object
@@ -28,9 +29,10 @@ TINY = TrainingConfig(
     threads=1,
     environment=BipedSettings(episode_seconds=0.2),
 )
+STATE = "state-64.safetensors"
 READERS = {
     "best.safetensors": read_policy,
-    STATE: lambda path: read_tensors(path, STATE_KEY, "training state", {"timesteps"}),
+    STATE: read_checkpoint,
 }
 
 
@@ -123,7 +125,7 @@ STATES = [
 
 @pytest.mark.parametrize(("name", "value", "said"), STATES)
 def test_numbers_that_no_training_makes_are_refused_in_a_state(run, tmp_path, name, value, said):
-    header, tensors = read_tensors(run / STATE, STATE_KEY, "training state", {"timesteps"})
+    header, tensors = read_checkpoint(run / STATE)
     folder = tmp_path / "run"
     shutil.copytree(run, folder)
     _forged(folder / STATE, STATE_KEY, header, tensors, name, value)

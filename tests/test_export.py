@@ -20,7 +20,7 @@ from springfoot.agents.contract import contract_of
 from springfoot.agents.export import FORMATS
 from springfoot.agents.numpy_player import ACTIVATIONS
 from springfoot.agents.policy import Output
-from springfoot.agents.training import evaluate_returns
+from springfoot.agents.returns import evaluate_returns
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import settings_from, settings_to_json

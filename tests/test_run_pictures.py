@@ -15,6 +15,7 @@ from springfoot.agents import training
 from springfoot.agents.config import TrainingConfig
 from springfoot.agents.policy import read_policy
 from springfoot.agents.run_pictures import LEFT_COLOUR, RIGHT_COLOUR, curve_figure, gallery_figure
+from springfoot.agents.session import EVALUATION_SEED
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings
@@ -49,15 +50,17 @@ def test_the_gallery_shows_the_first_evaluation_episode_of_each(run):
     kept = [0, 1024, 2048, 4096]
     policies = {steps: read_policy(run[0] / "gallery" / f"{steps}.safetensors") for steps in kept}
     biped = Biped(SHORT.environment, 3)  # the fourth policy walks after the others
-    figure = gallery_figure(policies, 4000, biped, training.EVALUATION_SEED)
+    figure = gallery_figure(policies, 4000, biped, EVALUATION_SEED)
+from springfoot.agents.session import EVALUATION_SEED
     assert [ax.get_title(loc="left").partition(":")[0] for ax in figure.axes] == [
         "after 0 steps (0 %)",
         "after 1,024 steps (25 %)",
         "after 2,048 steps (50 %)",
         "after 4,096 steps (100 %)",
     ]
-    biped.reset(np.arange(1), [training.EVALUATION_SEED])
+    biped.reset(np.arange(1), [EVALUATION_SEED])
     hip = biped.measurement.base[0, :2]
+from springfoot.agents.session import EVALUATION_SEED
     legs = [line for line in figure.axes[0].lines if to_hex(line.get_color()) in (LEFT_COLOUR, RIGHT_COLOUR)]
     assert len(legs) == 2
     for line in legs:

@@ -77,7 +77,7 @@ def test_a_folder_is_there_whole_or_not_at_all(tmp_path):
         (folder / "half").touch()
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), whole_folder(tmp_path / "new") as folder:
+    with pytest.raises(KeyboardInterrupt), whole_folder(tmp_path / "new", tmp_path / "free") as (folder, _):
         write_and_fail(folder)
     assert not list(tmp_path.iterdir())
 

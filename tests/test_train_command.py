@@ -158,11 +158,11 @@ def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number)
             out, error = process.communicate(timeout=60)
         finally:
             process.kill()
-    assert process.returncode == 130, error
+    assert process.returncode == 128 + number, error
     assert "Traceback" not in error
     assert f"springfoot train --resume {folder}" in out
     record = json.loads((folder / RUN).read_text())
-    assert record["status"] == "interrupted"
+    assert (record["status"], record["signal"]) == ("interrupted", number.name)
     policy = read_policy(folder)
     action = policy(policy.observation_mean)
     assert action.shape == (4,) and (abs(action) <= 1).all()

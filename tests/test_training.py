@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from safetensors.numpy import load, save
 from springfoot.agents import training
 from springfoot.agents.baselines import baseline
 from springfoot.agents.config import PRESETS, TrainingConfig, config_from_json, config_to_json
-from springfoot.agents.policy import load_policy
+from springfoot.agents.policy import LAST, load_policy
 from springfoot.agents.ppo import Learner
+from springfoot.agents.returns import evaluate_returns
 from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.agents.session import EVALUATION_SEED
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.policies import prepare
@@ -46,7 +49,7 @@ def learner():
 
 
 def test_a_policy_does_not_read_what_never_varied_in_its_training(run):
-    policy = load_policy(run[0] / training.LAST)  # the best may be the one before any training
+    policy = load_policy(run[0] / LAST)  # the best may be the one before any training
     biped = Biped(policy.settings, 1)
     biped.reset(np.arange(1), [0])
     seen = biped.observe()
@@ -158,7 +161,7 @@ def test_a_run_folder_holds_what_it_says(run):
     assert record["best"] == max(record["evaluations"], key=lambda entry: entry["return_mean"])
     assert {"python", "mujoco", "scipy", "torch"} <= set(record["sessions"][0]["versions"])
     names = {path.name for path in folder.iterdir() if not path.name.startswith("events.out.tfevents")}
-    assert names == {"best.safetensors", "last.safetensors", "state.safetensors", "run.json"}
+    assert names == {"best.safetensors", "last.safetensors", "state-3072.safetensors", "run.json"}
     assert any(path.name.startswith("events.out.tfevents") for path in folder.iterdir())
 
 
@@ -167,7 +170,7 @@ def test_the_best_policy_returns_what_its_evaluation_said(run):
     policy = load_policy(folder)
     assert policy.settings == SHORT.environment
     biped = Biped(policy.settings, SHORT.eval_episodes)
-    returns, seconds, fell = training.evaluate_returns(biped, policy, training.EVALUATION_SEED)
+    returns, seconds, fell = evaluate_returns(biped, policy, EVALUATION_SEED)
     assert returns.mean() == pytest.approx(record["best"]["return_mean"], rel=1e-9)
     assert fell.sum() == record["best"]["falls"]
     assert seconds.mean() == pytest.approx(record["best"]["seconds_mean"])
@@ -194,14 +197,14 @@ def test_a_finished_run_goes_on_where_it_was(tmp_path):
     first = training.train(dataclasses.replace(SHORT, timesteps=1024), folder)
     with pytest.raises(SpringfootError, match=r"has done its 1,024 timesteps"):
         training.resume(folder)
-    count = load((folder / "state.safetensors").read_bytes())["observation.count"]
+    count = load((folder / "state-1024.safetensors").read_bytes())["observation.count"]
     record = training.resume(folder, 1000)
     assert record["timesteps"] == 2048
     assert record["evaluations"][: len(first["evaluations"])] == first["evaluations"]
     assert [session["from_timesteps"] for session in record["sessions"]] == [0, 1024]
     assert record["config"] == first["config"] | {"timesteps": 2024}
-    state = load((folder / "state.safetensors").read_bytes())
-    assert state["observation.count"] - count == pytest.approx(1024 + SHORT.num_envs)  # and its first observations
+    state = load((folder / "state-2048.safetensors").read_bytes())
+    assert state["observation.count"] - count == pytest.approx(1024)
     assert state["adam.0.step"] == 2 * SHORT.minibatches * SHORT.epochs
 
 
@@ -209,17 +212,18 @@ def test_what_cannot_be_gone_on_with_is_refused(run, tmp_path):
     with pytest.raises(SpringfootError, match=r"no run.json"):
         training.resume(tmp_path)
     folder, _ = run
-    for name in ("run.json", "state.safetensors", "last.safetensors"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    shutil.copyfile(folder / "run.json", tmp_path / "run.json")
+    with pytest.raises(SpringfootError, match=r"no state-3072.safetensors in it"):
+        training.resume(tmp_path, 1000)
     (tmp_path / "run.json").write_text("{}")
     with pytest.raises(SpringfootError, match=r"not the record of a run"):
         training.resume(tmp_path, 1000)
-    (tmp_path / "run.json").write_bytes((folder / "run.json").read_bytes())
-    arrays = load((folder / "state.safetensors").read_bytes())
-    (tmp_path / "state.safetensors").write_bytes(save(arrays, {"springfoot-training": "{}"}))
-    with pytest.raises(SpringfootError, match=r"does not say how many timesteps"):
+    shutil.copyfile(folder / "run.json", tmp_path / "run.json")
+    arrays = load((folder / "state-3072.safetensors").read_bytes())
+    (tmp_path / "state-3072.safetensors").write_bytes(save(arrays, {"springfoot-training": "{}"}))
+    with pytest.raises(SpringfootError, match=r"is of another version of springfoot: it has no timesteps"):
         training.resume(tmp_path, 1000)
-    (tmp_path / "state.safetensors").write_bytes((folder / "last.safetensors").read_bytes())
+    shutil.copyfile(folder / "last.safetensors", tmp_path / "state-3072.safetensors")
     with pytest.raises(SpringfootError, match=r"no springfoot training state"):
         training.resume(tmp_path, 1000)
 
@@ -235,8 +239,8 @@ def test_it_learns(tmp_path):
     )
     training.train(config, tmp_path / "run")
     biped = Biped(config.environment, 32)
-    learned, _, _ = training.evaluate_returns(biped, load_policy(tmp_path / "run" / "last.safetensors"), 0)
-    untrained, _, _ = training.evaluate_returns(biped, baseline("untrained", config.environment), 0)
+    learned, _, _ = evaluate_returns(biped, load_policy(tmp_path / "run" / "last.safetensors"), 0)
+    untrained, _, _ = evaluate_returns(biped, baseline("untrained", config.environment), 0)
     gain = learned - untrained
     assert gain.mean() > 10 * gain.std() / np.sqrt(len(gain))
     assert gain.mean() > 0.25 * untrained.mean()

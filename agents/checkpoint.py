@@ -1,0 +1,75 @@
+"""Checkpoints of a run: the newest few, each a file that is whole; one that is damaged is passed over."""
+
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.gait.errors import SpringfootError, require_count
+
+from .tensor_file import read_tensors, write_tensors
+
+Checkpoint = tuple[dict[str, Any], dict[str, np.ndarray]]
+"""Header, of `PARTS`, and arrays by name."""
+STATE_KEY = "springfoot-training"
+"""Name of the entry of a checkpoint's header."""
+KEPT = 3
+"""Checkpoints that a run keeps; chosen."""
+PARTS = ("timesteps", "config", "fingerprint", "record", "seconds", "events", "learning")
+"""What the header of a checkpoint holds: see `training`."""
+_NAME = re.compile(r"state-(\d{1,15})\.safetensors")
+
+
+def checkpoints(out: Path) -> list[Path]:
+    """The checkpoints in a folder, the newest, that of the most timesteps, first."""
+    found = {path: _NAME.fullmatch(path.name) for path in out.iterdir()}
+    return sorted((path for path, match in found.items() if match), key=_timesteps, reverse=True)
+
+
+def write_checkpoint(out: Path, header: dict[str, Any], arrays: Mapping[str, np.ndarray], kept: int = KEPT) -> None:
+    """Write the checkpoint of `header["timesteps"]`, then remove all but the newest `kept`."""
+    write_tensors(out / f"state-{header['timesteps']}.safetensors", STATE_KEY, header, arrays)
+    for path in checkpoints(out)[kept:]:
+        path.unlink(missing_ok=True)
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Header and arrays of a checkpoint; raises `SpringfootError` for a file that is none or is damaged."""
+    header, arrays = read_tensors(path, STATE_KEY, "training state", set(PARTS), finite=False)
+    if missing := [name for name in PARTS if name not in header]:
+        raise SpringfootError(f"{path} is of another version of springfoot: it has no {missing[0]}")
+    require_count(f"timesteps of {path}", header["timesteps"], 0)
+    return header, arrays
+
+
+def newest_checkpoint(out: Path) -> Checkpoint | None:
+    """Header and arrays of the newest checkpoint that is whole, None where there is none at all.
+
+    Those passed over get the ending `.damaged`, with a warning on standard error. Raises `SpringfootError`, with
+    nothing changed, where none is whole.
+    """
+    passed: list[tuple[Path, SpringfootError]] = []
+    for path in checkpoints(out):
+        try:
+            found = read_checkpoint(path)
+        except SpringfootError as error:
+            passed.append((path, error))
+            continue
+        for damaged, why in passed:
+            damaged.replace(damaged.with_name(f"{damaged.name}.damaged"))
+            print(f"Warning: {why}; going on from {path.name}", file=sys.stderr, flush=True)
+        return found
+    if passed:
+        raise SpringfootError(
+            f"{passed[0][1]}, and so are all other checkpoints in {out}" if passed[1:] else passed[0][1]
+        )
+    return None
+
+
+def _timesteps(path: Path) -> int:
+    match = _NAME.fullmatch(path.name)
+    assert match is not None
+    return int(match[1])

@@ -1,0 +1,44 @@
+"""Stopping in good order: the first SIGINT or SIGTERM asks for it, the second ends at once what is being done."""
+
+import signal
+import threading
+from types import TracebackType
+from typing import Any
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Stopping:
+    """Whether somebody has asked to stop, and the signal that did; a context manager, of effect in the main thread."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.signal: signal.Signals | None = None
+        self._before: dict[int, Any] = {}
+
+    def _stop(self, number: int, _frame: Any) -> None:
+        first, self.signal, self.asked = self.signal is None, signal.Signals(number), True
+        if not first:
+            self._restore()  # the third is as if nobody handled it
+            raise KeyboardInterrupt
+
+    def ask(self) -> None:
+        """Ask to stop, without a signal."""
+        self.asked = True
+
+    def _restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def __enter__(self) -> "Stopping":
+        """Handle the signals, which Python allows in the main thread only."""
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                self._before[number] = signal.signal(number, self._stop)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Let them be handled as before."""
+        self._restore()
