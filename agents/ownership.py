@@ -46,25 +46,24 @@ def owned(folder: Path) -> Iterator[None]:
     made: list[Path] = []
     try:
         handle, locked = _locked(path, made)
+        mine, over = True, threading.Event()
         try:
             former = _read(path)
             elsewhere = former and not (locked and former.get("host") == socket.gethostname())
             if elsewhere and (silent := max(time.time() - path.stat().st_mtime, 0.0)) < DEAD:
+                mine = False
                 raise TakenError(_taken(folder, former, f", last heard of {_span(silent)} ago"))
             if former:
                 print(f"{folder}: taken over from {_named(former)}, which has ended", file=sys.stderr, flush=True)
             me = {"pid": os.getpid(), "host": socket.gethostname(), "began": datetime.now(UTC).isoformat()}
             os.ftruncate(handle, 0)
             os.pwrite(handle, json.dumps(me).encode(), 0)
-            over = threading.Event()
             threading.Thread(target=_live, args=(path, over), daemon=True).start()
-            try:
-                yield
-            finally:
-                over.set()
-                if _same(handle, path):  # it is another's, or nobody's, where the folder was moved
-                    path.unlink()
+            yield
         finally:
+            over.set()
+            if mine and _same(handle, path):  # it is another's, or nobody's, where the folder was moved
+                path.unlink()
             os.close(handle)
     finally:
         with suppress(OSError):

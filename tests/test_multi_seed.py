@@ -89,7 +89,7 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
             out, error = process.communicate(timeout=60)
         finally:
             process.kill()
-    assert process.returncode == 130, error
+    assert process.returncode == 128 + number, error
     assert "Traceback" not in error and f"springfoot train --resume {folder}/seed-N" in out
     record = json.loads((folder / seeds.SEEDS).read_text())
     assert record["status"] == "interrupted"
