@@ -72,6 +72,7 @@ class Session(BaseCallback):
         self._onlookers, self._gallery = callbacks, Gallery(out, self._first, config.timesteps)
         self._sums: dict[str, np.ndarray] = {}
         self._ended: list[dict[str, Any]] = []
+        self._whole = True
 
     def learn(self) -> dict[str, Any]:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
@@ -145,7 +146,7 @@ class Session(BaseCallback):
         return bool(past) and past[-1]["timesteps"] == self._trained >= self._config.timesteps
 
     def _on_rollout_start(self) -> None:
-        self._sums, self._ended = {}, []
+        self._sums, self._ended, self._whole = {}, [], False
         self._keep()
         past = self._record["evaluations"]
         due = not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval
@@ -163,6 +164,7 @@ class Session(BaseCallback):
         return not self._stopping.asked
 
     def _on_rollout_end(self) -> None:
+        self._whole = True
         for name, sums in self._sums.items():
             self.logger.record(name, float(np.mean(sums)) / self.learner.rollout_steps)
         if self._ended:
@@ -173,8 +175,8 @@ class Session(BaseCallback):
             self.logger.record("episode/falls_share", np.mean(falls))
 
     def _on_training_end(self) -> None:
-        if self.learner.ppo.num_timesteps < self._config.timesteps:
-            return  # a signal ended it within a rollout, and what is kept is from before
+        if not self._whole:
+            return  # it was ended within a rollout, and what is kept is from before
         self._keep()
         if not self._stopping.asked and not self._finished:
             self._evaluate()

@@ -160,11 +160,11 @@ def main() -> int:
                 number = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)[random.integers(4)]
                 written, delay = random.uniform(-0.1, 1.0) * size, random.uniform(0.0, 0.3)
                 ends[number.name] += killed(words, war, written, delay, number)
-            if not (war / "run.json").exists() or _record(war)["status"] != "finished":
-                words = _resume(war, random) if (war / "run.json").exists() else [*first, str(war)]
-                codes.append(ended(begun(words, war.with_suffix(".log"))))
-            codes.append(ended(begun(["--resume", str(war)], war.with_suffix(".log"))))  # a finished run is refused
-            found = differences(peace, war) + ([f"exit codes {codes}"] if codes not in ([0, 0, 2], [0, 2]) else [])
+            words = _resume(war, random) if (war / "run.json").exists() else [*first, str(war)]
+            codes += [ended(begun(words, war.with_suffix(".log"))) for words in (words, ["--resume", str(war)])]
+            found = differences(peace, war)
+            if codes not in ([0, 0, 2], [0, 2, 2]):  # finished, or finished already; and then refused
+                found.append(f"exit codes {codes}")
             different += bool(found)
             print(f"{preset}, seed {index}: {', '.join(found[:8]) or 'the same'}", flush=True)
     told = ", ".join(f"{count} {name}" for name, count in ends.items())

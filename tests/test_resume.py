@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -41,19 +42,26 @@ def whole(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def interrupted(tmp_path_factory):
-    """The same run, ended within its sixth update as by Ctrl-C."""
-    folder = tmp_path_factory.mktemp("resume") / "half"
+@contextmanager
+def ctrl_c_after(timesteps):
+    """SIGINT once a training has done so many timesteps."""
     on_step = session.Session._on_step
 
     def step(self):
-        if self.learner.ppo.num_timesteps >= 1400 and self._stopping.signal is None:
+        if self.learner.ppo.num_timesteps >= timesteps and not self._stopping.asked:
             os.kill(os.getpid(), signal.SIGINT)
         return on_step(self)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(session.Session, "_on_step", step)
+        yield
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """The same run, ended within its sixth update as by Ctrl-C."""
+    folder = tmp_path_factory.mktemp("resume") / "half"
+    with ctrl_c_after(1400):
         train(CONFIG, folder)
     return folder
 
@@ -92,13 +100,16 @@ def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeyp
     assert checkpoints(half)[0].name == "state-1280.safetensors"
     assert len(checkpoints(half)) <= KEPT
 
+    with ctrl_c_after(2504):  # beyond the 2,500 that are asked for, but within the last update
+        assert resume(half)["timesteps"] == 2304
+
     def in_the_middle(*_):
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGINT)
 
     with monkeypatch.context() as patch:
         evaluate = session.evaluate_returns
-        calls = iter([evaluate, evaluate, in_the_middle])  # of the best, at 2048, and at the end
+        calls = iter([evaluate, in_the_middle])  # of the best, and at the end
         patch.setattr(session, "evaluate_returns", lambda *given: next(calls)(*given))
         record = resume(half)
     assert (record["status"], record["timesteps"]) == ("interrupted", 2560)

@@ -161,7 +161,8 @@ def test_a_run_folder_holds_what_it_says(run):
     assert record["best"] == max(record["evaluations"], key=lambda entry: entry["return_mean"])
     assert {"python", "mujoco", "scipy", "torch"} <= set(record["sessions"][0]["versions"])
     names = {path.name for path in folder.iterdir() if not path.name.startswith("events.out.tfevents")}
-    assert names == {"best.safetensors", "last.safetensors", "state-3072.safetensors", "run.json"}
+    pictures = {"gallery", "gallery.png", "learning_curve.png"}
+    assert names == {"best.safetensors", "last.safetensors", "state-3072.safetensors", "run.json"} | pictures
     assert any(path.name.startswith("events.out.tfevents") for path in folder.iterdir())
 
 
@@ -186,10 +187,10 @@ def test_same_seed_same_policy_with_any_number_of_threads(run, tmp_path):
 
 def test_an_existing_run_is_refused_and_untouched(run):
     folder, _ = run
-    before = {path: path.read_bytes() for path in folder.iterdir()}
+    before = {path: path.read_bytes() for path in folder.rglob("*.*")}
     with pytest.raises(SpringfootError, match=r"already exists; out must be a new or an empty folder"):
         training.train(SHORT, folder)
-    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+    assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before
 
 
 def test_a_finished_run_goes_on_where_it_was(tmp_path):
