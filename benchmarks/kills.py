@@ -6,7 +6,6 @@ what differs, which should be nothing, and ends with 1 if something does.
 """
 
 import argparse
-import json
 import os
 import signal
 import sys
@@ -23,7 +22,7 @@ from tensorboard.backend.event_processing.event_file_loader import LegacyEventFi
 
 from springfoot.agents import training  # noqa: F401 - here once, not in each process
 from springfoot.agents.checkpoint import newest_checkpoint
-from springfoot.agents.run_record import EVENTS
+from springfoot.agents.run_record import EVENTS, read_record
 from springfoot.agents.train_command import train_main
 from springfoot.terminal import at_terminal
 
@@ -90,7 +89,7 @@ def differences(one: Path, other: Path) -> list[str]:
         if not (folder / "run.json").is_file():
             return [f"no run in {folder}: {folder.with_suffix('.log').read_text(encoding='utf-8')[-500:]}"]
     found = [name for name in ("best.safetensors", "last.safetensors") if _bytes(one / name) != _bytes(other / name)]
-    if _without_clocks(_record(one)) != _without_clocks(_record(other)):
+    if _without_clocks(read_record(one)) != _without_clocks(read_record(other)):
         found.append("run.json")
     told, others_told = (Counter(map(repr, scalars(each))) for each in (one, other))
     found += [f"scalar {each}" for each in (told - others_told) + (others_told - told)]
@@ -119,10 +118,6 @@ def scalars(folder: Path) -> list[tuple[str, int, float]]:
 
 def _bytes(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None
-
-
-def _record(folder: Path) -> Any:
-    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
 
 
 def _checkpoint(folder: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

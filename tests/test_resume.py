@@ -19,6 +19,7 @@ from springfoot.agents import session
 from springfoot.agents.checkpoint import KEPT, checkpoints, newest_checkpoint
 from springfoot.agents.config import PRESETS, config_from_json
 from springfoot.agents.ownership import OWNER
+from springfoot.agents.run_record import read_record
 from springfoot.agents.training import resume, train
 from springfoot.gait.errors import SpringfootError
 
@@ -84,7 +85,7 @@ def test_three_kills_at_random_moments_change_nothing(whole, tmp_path):
                 time.sleep(0.005)
             time.sleep(random.uniform(0.0, 0.1))
             process.kill()
-    record = json.loads((folder / "run.json").read_text())
+    record = read_record(folder)
     assert record["status"] == "running" and (folder / OWNER).exists()
     assert config_from_json(record["config"]) == CONFIG
     resume(folder, threads=3)
@@ -95,7 +96,7 @@ def test_three_kills_at_random_moments_change_nothing(whole, tmp_path):
 
 
 def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeypatch):
-    record = json.loads((half / "run.json").read_text())
+    record = read_record(half)
     assert (record["status"], record["signal"], record["timesteps"]) == ("interrupted", "SIGINT", 1280)
     assert checkpoints(half)[0].name == "state-1280.safetensors"
     assert len(checkpoints(half)) <= KEPT
@@ -140,7 +141,7 @@ def test_what_disagrees_with_the_last_checkpoint_is_made_again(whole, tmp_path, 
     with pytest.raises(SpringfootError, match=r"has done its 2,560 timesteps"):
         resume(folder)
     if lost == "run.json":  # killed in the last save
-        record = json.loads((folder / lost).read_text()) | {"status": "running"}
+        record = read_record(folder) | {"status": "running"}
         (folder / lost).write_text(json.dumps(record | {"evaluations": record["evaluations"][:-1]}))
     else:
         (folder / lost).unlink()
@@ -153,7 +154,7 @@ def test_what_disagrees_with_the_last_checkpoint_is_made_again(whole, tmp_path, 
 def test_killed_before_the_first_checkpoint_it_begins_again(whole, tmp_path):
     folder = tmp_path / "run"
     folder.mkdir()
-    record = json.loads((whole / "run.json").read_text())
+    record = read_record(whole)
     (folder / "run.json").write_text(
         json.dumps(record | {"status": "running", "sessions": [], "evaluations": [], "timesteps": 0, "seconds": 0})
     )
@@ -171,7 +172,7 @@ def test_killed_before_its_record_a_folder_is_still_new(tmp_path):
 
 
 def test_the_best_is_measured_anew_where_the_reward_has_changed(half, capsys):
-    record = json.loads((half / "run.json").read_text())
+    record = read_record(half)
     record["config"]["environment"]["reward_weights"] = {"grf": 0.0, "pose": 0.0}
     (half / "run.json").write_text(json.dumps(record))
     after = resume(half)

@@ -51,7 +51,6 @@ def test_the_gallery_shows_the_first_evaluation_episode_of_each(run):
     policies = {steps: read_policy(run[0] / "gallery" / f"{steps}.safetensors") for steps in kept}
     biped = Biped(SHORT.environment, 3)  # the fourth policy walks after the others
     figure = gallery_figure(policies, 4000, biped, EVALUATION_SEED)
-from springfoot.agents.session import EVALUATION_SEED
     assert [ax.get_title(loc="left").partition(":")[0] for ax in figure.axes] == [
         "after 0 steps (0 %)",
         "after 1,024 steps (25 %)",
@@ -60,7 +59,6 @@ from springfoot.agents.session import EVALUATION_SEED
     ]
     biped.reset(np.arange(1), [EVALUATION_SEED])
     hip = biped.measurement.base[0, :2]
-from springfoot.agents.session import EVALUATION_SEED
     legs = [line for line in figure.axes[0].lines if to_hex(line.get_color()) in (LEFT_COLOUR, RIGHT_COLOUR)]
     assert len(legs) == 2
     for line in legs:
