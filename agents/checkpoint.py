@@ -13,12 +13,12 @@ from springfoot.gait.errors import SpringfootError, require_count
 from .tensor_file import read_tensors, write_tensors
 
 Checkpoint = tuple[dict[str, Any], dict[str, np.ndarray]]
-"""Header, of `PARTS`, and arrays by name."""
+"""Header, of `CHECKPOINT_KEYS`, and arrays by name."""
 STATE_KEY = "springfoot-training"
 """Name of the entry of a checkpoint's header."""
-KEPT = 3
+KEPT_CHECKPOINTS = 3
 """Checkpoints that a run keeps; chosen."""
-PARTS = ("timesteps", "config", "fingerprint", "record", "seconds", "events", "learning")
+CHECKPOINT_KEYS = ("timesteps", "config", "fingerprint", "record", "seconds", "events", "learning")
 """What the header of a checkpoint holds: see `training`."""
 _NAME = re.compile(r"state-(\d{1,15})\.safetensors")
 
@@ -29,7 +29,9 @@ def checkpoints(out: Path) -> list[Path]:
     return sorted((path for path, match in found.items() if match), key=_timesteps, reverse=True)
 
 
-def write_checkpoint(out: Path, header: dict[str, Any], arrays: Mapping[str, np.ndarray], kept: int = KEPT) -> None:
+def write_checkpoint(
+    out: Path, header: dict[str, Any], arrays: Mapping[str, np.ndarray], kept: int = KEPT_CHECKPOINTS
+) -> None:
     """Write the checkpoint of `header["timesteps"]`, then remove all but the newest `kept`."""
     write_tensors(out / f"state-{header['timesteps']}.safetensors", STATE_KEY, header, arrays)
     for path in checkpoints(out)[kept:]:
@@ -38,8 +40,8 @@ def write_checkpoint(out: Path, header: dict[str, Any], arrays: Mapping[str, np.
 
 def read_checkpoint(path: Path) -> Checkpoint:
     """Header and arrays of a checkpoint; raises `SpringfootError` for a file that is none or is damaged."""
-    header, arrays = read_tensors(path, STATE_KEY, "training state", set(PARTS), finite=False)
-    if missing := [name for name in PARTS if name not in header]:
+    header, arrays = read_tensors(path, STATE_KEY, "training state", set(CHECKPOINT_KEYS), finite=False)
+    if missing := [name for name in CHECKPOINT_KEYS if name not in header]:
         raise SpringfootError(f"{path} is of another version of springfoot: it has no {missing[0]}")
     require_count(f"timesteps of {path}", header["timesteps"], 0)
     return header, arrays

@@ -17,7 +17,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import settings_to_json
 from springfoot.gait.errors import SpringfootError
 
-from .checkpoint import KEPT, Checkpoint, write_checkpoint
+from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, write_checkpoint
 from .config import TrainingConfig, config_to_json
 from .files import write_atomically
 from .fingerprint import fingerprint, require_same
@@ -237,12 +237,12 @@ class Session(BaseCallback):
 
     def _save(self, status: str) -> None:
         """Write the checkpoint that is kept, the newest policy and the record."""
-        self._write_checkpoint(1 if status == "finished" else KEPT)
+        self._write_checkpoint(1 if status == "finished" else KEPT_CHECKPOINTS)
         if self._policy is not None:
             save_policy(self._out / LAST, self._policy)
         self._write_record(status)
 
-    def _write_checkpoint(self, kept: int = KEPT) -> None:
+    def _write_checkpoint(self, kept: int = KEPT_CHECKPOINTS) -> None:
         began = monotonic()
         if self._kept is not None:
             write_checkpoint(self._out, *self._kept, kept)

@@ -17,7 +17,7 @@ from .seal import require_whole
 MOST_TEXT_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_000_000
 """Largest text file that is read: bytes, letters of a line, columns, cells; chosen: 25 minutes of 20 curves at 100 Hz,
 which take less than half a gigabyte."""
-LARGEST = 1e12
+LARGEST_VALUE = 1e12
 """Largest magnitude of a number in a cell; chosen: means and squares of such are numbers."""
 
 
@@ -58,8 +58,8 @@ class Table:
             raise self.error(line, column, f"must be a number, got {cell.strip()!r:.40}") from None
         if not isfinite(value):
             raise self.error(line, column, f"must be a finite number, got {cell.strip()}")
-        if abs(value) > LARGEST:
-            raise self.error(line, column, f"must be within ±{LARGEST:g}, got {value:.4g}")
+        if abs(value) > LARGEST_VALUE:
+            raise self.error(line, column, f"must be within ±{LARGEST_VALUE:g}, got {value:.4g}")
         return value
 
 

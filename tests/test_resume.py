@@ -16,7 +16,7 @@ import pytest
 import train as train_script
 from benchmarks.kills import EVENTS, differences, scalars
 from springfoot.agents import session
-from springfoot.agents.checkpoint import KEPT, checkpoints, newest_checkpoint
+from springfoot.agents.checkpoint import KEPT_CHECKPOINTS, checkpoints, newest_checkpoint
 from springfoot.agents.config import PRESETS, config_from_json
 from springfoot.agents.ownership import OWNER
 from springfoot.agents.run_record import read_record
@@ -99,7 +99,7 @@ def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeyp
     record = read_record(half)
     assert (record["status"], record["signal"], record["timesteps"]) == ("interrupted", "SIGINT", 1280)
     assert checkpoints(half)[0].name == "state-1280.safetensors"
-    assert len(checkpoints(half)) <= KEPT
+    assert len(checkpoints(half)) <= KEPT_CHECKPOINTS
 
     with ctrl_c_after(2504):  # beyond the 2,500 that are asked for, but within the last update
         assert resume(half)["timesteps"] == 2304
