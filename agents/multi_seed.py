@@ -94,8 +94,7 @@ def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
 
 def is_finished(folder: Path) -> bool:
     """Whether the folder holds a training that ran to its end."""
-    run = folder / RUN
-    return run.is_file() and json.loads(run.read_text(encoding="utf-8")).get("status") == "finished"
+    return (folder / RUN).is_file() and read_record(folder).get("status") == "finished"
 
 
 def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
@@ -188,7 +187,7 @@ def _block(blocked: bool) -> None:
 def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
     """The row of results of one seed, from its run.json; its status is `without` where that file is not complete."""
     row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
-    record = json.loads((folder / RUN).read_text(encoding="utf-8")) if (folder / RUN).is_file() else {}
+    record = read_record(folder) if (folder / RUN).is_file() else {}
     best = record.get("best") or {}
     if record.get("status", "running") != "running":
         row["status"] = record["status"]

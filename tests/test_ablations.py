@@ -4,10 +4,12 @@ import json
 from dataclasses import replace
 
 import pytest
+from stable_baselines3.common.callbacks import BaseCallback
 
 from springfoot.agents.baselines import schedule
 from springfoot.agents.config import PRESETS, TrainingConfig
 from springfoot.agents.policy import RUN
+from springfoot.agents.training import train
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.envs.timing import ACTION_STEP
 from springfoot.evaluation.recording import record
@@ -45,19 +47,23 @@ def test_the_phase_equilibrium_of_the_ablation_is_one_that_can_be_walked():
     assert not record(schedule(settings), settings, name="", episodes=3).fall_reason.any()
 
 
-def test_what_is_finished_is_kept_what_is_not_begins_anew_and_the_page_is_made_of_it(monkeypatch, capsys, tmp_path):
+class Stop(BaseCallback):
+    """Ends a training within its first update."""
+
+    def _on_step(self) -> bool:
+        return self.n_calls < 3
+
+
+def test_what_is_finished_is_kept_what_is_not_is_gone_on_with_and_the_page_is_made_of_it(monkeypatch, capsys, tmp_path):
     quick = TrainingConfig(
         num_envs=8, update_steps=512, eval_interval=512, eval_episodes=2, environment=BipedSettings(episode_seconds=0.5)
     )
     monkeypatch.setitem(ablations.PRESETS, "walk", quick)
     runs, page = tmp_path / "runs", tmp_path / "page.md"
-    folder = runs / "25hz" / "seed-0"
-    folder.mkdir(parents=True)
-    (folder / RUN).write_text(json.dumps({"status": "running"}))
-    (folder / "half").touch()
+    [(config, folder, _)] = ablations.jobs(runs, ["25hz"], 1, 512)
+    assert train(config, folder, callbacks=[Stop()])["status"] == "interrupted"
     words = ["--runs", runs, "--seeds", 1, "--only", "25hz", "--timesteps", 512, *SHORT]
     assert main(*words, "--page", page, "--out", tmp_path / "one") == 0
-    assert not (folder / "half").exists()
     done = json.loads((folder / RUN).read_text())
     assert done["status"] == "finished" and done["timesteps"] == 256  # as long a walk, in steps twice as long
     written = page.read_text().replace("/one", ""), (tmp_path / "one" / "ablations.csv").read_bytes()
