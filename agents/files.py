@@ -47,13 +47,13 @@ def _sync_folder(folder: Path) -> None:
 
 def remove_temporary(folder: Path) -> None:
     """Remove what a process that was killed in `write_atomically` left in a folder that nobody else writes into."""
-    for path in folder.iterdir():
+    for path in folder.glob(".*"):
         if _is_temporary(path):
             path.unlink(missing_ok=True)
 
 
 def _is_temporary(path: Path) -> bool:
-    return re.fullmatch(r"\..+\.(safetensors|json)\.[a-z0-9_]{8}", path.name) is not None
+    return re.fullmatch(r"\..+\.(safetensors|json|png)\.[a-z0-9_]{8}", path.name) is not None
 
 
 def write_new(contents: Mapping[Path, bytes]) -> None:

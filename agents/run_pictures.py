@@ -4,6 +4,7 @@
 stand in `gallery/`, named by theirs; `gallery.png` has the first seconds of the same episode walked by each.
 """
 
+import sys
 from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -17,6 +18,7 @@ from springfoot.envs.physics.measurement import Measurement
 from springfoot.envs.physics.model import HIP, KNEE
 from springfoot.gait import Body
 from springfoot.gait.arrays import NDArray
+from springfoot.gait.errors import SpringfootError
 
 from .files import write_atomically
 from .policy import Policy, read_policy, save_policy
@@ -25,7 +27,7 @@ GALLERY_SHARES = (0.0, 0.25, 0.5, 1.0)
 """Of the timesteps, after which a policy is kept; chosen."""
 SECONDS_SHOWN, SECONDS_BETWEEN = 6.0, 0.3
 """How long each of the gallery walks at most, and the time between two of its figures [s]; chosen."""
-CURVE, GALLERY = "learning_curve.png", "gallery"
+CURVE, GALLERY_PICTURE, GALLERY = "learning_curve.png", "gallery.png", "gallery"
 LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR = "#0b6e8f", "#9ec4d1", "#404e5c"
 
 
@@ -62,14 +64,28 @@ def draw_run(out: Path, record: dict[str, Any], biped: Biped, seed: int) -> None
     figures = {}
     if record["evaluations"]:
         figures[CURVE] = curve_figure(record)
-    kept = {int(path.stem): path for path in (out / GALLERY).glob("*.safetensors")}
-    if kept:
-        policies = {steps: read_policy(kept[steps]) for steps in sorted(kept)}
-        figures["gallery.png"] = gallery_figure(policies, record["config"]["timesteps"], biped, seed)
+    policies = {}
+    for steps, path in sorted(_kept(out).items()):
+        try:
+            policies[steps] = read_policy(path)
+        except SpringfootError as error:
+            print(f"{GALLERY_PICTURE} is without {path.name}: {error}", file=sys.stderr)
+    if policies:
+        figures[GALLERY_PICTURE] = gallery_figure(policies, record["config"]["timesteps"], biped, seed)
     for name, figure in figures.items():
         picture = BytesIO()
         figure.savefig(picture, format="png", dpi=100, facecolor="white", metadata={"Software": "springfoot"})
         write_atomically(out / name, picture.getvalue())
+
+
+def pictures_of(out: Path) -> tuple[str, ...]:
+    """Names of the pictures that a finished run in `out` has."""
+    return (CURVE, GALLERY_PICTURE) if _kept(out) else (CURVE,)
+
+
+def _kept(out: Path) -> dict[int, Path]:
+    """The policies of the gallery, by their timesteps."""
+    return {int(path.stem): path for path in (out / GALLERY).glob("*.safetensors") if path.stem.isdecimal()}
 
 
 def curve_figure(record: dict[str, Any]) -> Any:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ def read_record(out: Path) -> dict[str, Any]:
         for name in ("sessions", "evaluations"):
             if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
                 raise ValueError(f"{name} must be a list of objects")
+        for entry in record["evaluations"]:
+            for name in ("timesteps", "return_mean", "return_sd", "falls", "episodes"):
+                require_number(name, entry[name], -inf)
         if not isinstance(record["config"], dict):
             raise ValueError("config must be an object")
         require_number("seconds", record.get("seconds", 0.0), 0.0, unit="s")

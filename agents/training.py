@@ -18,7 +18,7 @@ from .config import TrainingConfig, config_from_json
 from .files import remove_temporary, require_new
 from .ownership import owned
 from .policy import BEST, LAST, RUN
-from .run_pictures import CURVE
+from .run_pictures import GALLERY, pictures_of
 from .run_record import read_record
 from .session import BEST_FILE, Session
 from .training_callbacks import Onlooker
@@ -63,7 +63,8 @@ def resume(
     if not (out / RUN).is_file():
         raise SpringfootError(f"{out} holds no run to continue: no {RUN} in it")
     with owned(out):
-        remove_temporary(out)
+        for folder in (out, out / GALLERY):
+            remove_temporary(folder)
         record = read_record(out)
         found = newest_checkpoint(out)
         if found is None and record.get("timesteps"):
@@ -87,6 +88,6 @@ def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:
         told
         and evaluated
         and best
-        and all((out / name).is_file() for name in (LAST, CURVE))
+        and all((out / name).is_file() for name in (LAST, *pictures_of(out)))
         and record.get("status") == "finished"
     )
