@@ -7,6 +7,9 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
+# On every core, a file of tests on one: what its tests share is made once.
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
 .PHONY: help install walk test test-wheel test-sdist test-learners test-kills fuzz extremes check format bench feet clean
 
 help:
@@ -42,7 +45,7 @@ walk: install
 	  "Pictures: $$out/evaluation/gait.png, $$out/evaluation/walk.gif"
 
 test: install
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 # A folder with the source distribution of what git knows, and an empty one.
 define PACK
@@ -97,7 +100,7 @@ check: install build/typing/made
 	$(BIN)/ruff check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	PYTHONPATH=build/typing $(BIN)/lint-imports
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 format: install
 	$(BIN)/ruff check --fix .
