@@ -1,26 +1,40 @@
 """Checkpoints of a run: the newest few, each a file that is whole; one that is damaged is passed over."""
 
+import json
 import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
+from typeguard import CollectionCheckStrategy, TypeCheckError, check_type
 
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.gait.errors import SpringfootError, require_count, require_number
 
+from .learning_state import Learning
+from .run_record import require_past
 from .tensor_file import read_tensors, write_tensors
 
 Checkpoint = tuple[dict[str, Any], dict[str, np.ndarray]]
-"""Header, of `CHECKPOINT_KEYS`, and arrays by name."""
+"""Header, as `Header` says, and arrays by name."""
 STATE_KEY = "springfoot-training"
 """Name of the entry of a checkpoint's header."""
 KEPT_CHECKPOINTS = 3
 """Checkpoints that a run keeps; chosen."""
-CHECKPOINT_KEYS = ("timesteps", "config", "fingerprint", "record", "seconds", "events", "learning")
-"""What the header of a checkpoint holds: see `training`."""
 _NAME = re.compile(r"state-(\d{1,15})\.safetensors")
+
+
+class Header(TypedDict):
+    """What the header of a checkpoint holds: see `session`."""
+
+    timesteps: int
+    config: dict[str, Any]
+    fingerprint: dict[str, str]
+    record: dict[str, list[dict[str, Any]]]
+    seconds: float
+    events: dict[str, int]
+    learning: Learning
 
 
 def checkpoints(out: Path) -> list[Path]:
@@ -40,11 +54,32 @@ def write_checkpoint(
 
 def read_checkpoint(path: Path) -> Checkpoint:
     """Header and arrays of a checkpoint; raises `SpringfootError` for a file that is none or is damaged."""
-    header, arrays = read_tensors(path, STATE_KEY, "training state", set(CHECKPOINT_KEYS), finite=False)
-    if missing := [name for name in CHECKPOINT_KEYS if name not in header]:
+    names = Header.__annotations__
+    header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, sealed=True)
+    if missing := [name for name in names if name not in header]:
         raise SpringfootError(f"{path} is of another version of springfoot: it has no {missing[0]}")
-    require_count(f"timesteps of {path}", header["timesteps"], 0)
+    try:
+        _require_header(header)
+    except (KeyError, TypeError, ValueError) as error:
+        what = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise SpringfootError(f"{path} is damaged: {what}") from None
     return header, arrays
+
+
+def _require_header(header: dict[str, Any]) -> None:
+    """Raise `SpringfootError`, KeyError, TypeError or ValueError where a header is not as a training writes it."""
+    json.dumps(header, allow_nan=False)  # raises for what is not finite
+    try:
+        check_type(header, Header, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
+    except TypeCheckError as error:
+        raise SpringfootError(f"in its header, {error}") from None
+    require_count("timesteps", header["timesteps"], 0)
+    require_number("seconds", header["seconds"], 0.0, unit="s")
+    require_past(header["record"])
+    if not header["record"]["sessions"]:
+        raise SpringfootError("sessions must be one or more")
+    for name, size in header["events"].items():
+        require_count(f"size of {name}", size, 0)
 
 
 def newest_checkpoint(out: Path) -> Checkpoint | None:

@@ -6,18 +6,43 @@ Learner, environments with their simulations, every random generator, and what t
 import random
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
+from math import isfinite
+from typing import Any, TypedDict
 
 import numpy as np
 import torch
 
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 
 from .ppo import Learner
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 
 _LEARNER = ("network.", "adam.", "observation.", "return.")
 _SIMULATION = "simulation."
+
+
+class Episode(TypedDict):
+    """An episode that ended: its return and its length in steps, by the names of stable-baselines3."""
+
+    r: float
+    l: int  # noqa: E741
+
+
+class Learning(TypedDict):
+    """What JSON holds of a learning."""
+
+    generators: list[dict[str, Any]]
+    """Of each environment."""
+    actions: dict[str, Any]
+    """Generator of the action space."""
+    numpy: list[float]
+    """Position, whether a normal number is kept, and that number."""
+    python_gauss: float | None
+    updates: int
+    episodes: list[Episode]
+    """The latest, from which rollout/ep_rew_mean is."""
+    logged: dict[str, list[Any]]
+    """Value and excluded formats of what is yet to be logged."""
 
 
 def learning_state(
@@ -63,7 +88,7 @@ def restore_learning(
 ) -> None:
     """Go on from what `learning_state` gave, but for `logged`; to be called last, as nothing may draw from then on.
 
-    Raises `SpringfootError` if it does not fit this learner.
+    Raises `SpringfootError` if it does not fit this learner. `logged` is checked, and left to the caller.
     """
     ppo, normalized = learner.ppo, learner.normalized
     learner.restore({name: array for name, array in arrays.items() if name.startswith(_LEARNER)})
@@ -71,27 +96,34 @@ def restore_learning(
         simulation = {name: array for name, array in arrays.items() if name.startswith(_SIMULATION)}
         simulation = {name.removeprefix(_SIMULATION): array for name, array in simulation.items()}
         environments.restore(simulation | {"generators": values["generators"]})
-        normalized.returns = _shaped(arrays, "rollout.returns", normalized.returns.shape)
-        ppo._last_obs = _shaped(
-            arrays, "rollout.observation", (ppo.n_envs, len(environments.env.biped.observation_names))
-        )
-        ppo._last_episode_starts = _shaped(arrays, "rollout.episode_starts", (ppo.n_envs,))
-        ppo._n_updates = int(values["updates"])
-        ppo.ep_info_buffer = deque((dict(each) for each in values["episodes"]), maxlen=ppo._stats_window_size)
+        width = len(environments.env.biped.observation_names)
+        normalized.returns = _fitting(arrays, "rollout.returns", (ppo.n_envs,), np.float64)
+        ppo._last_obs = _fitting(arrays, "rollout.observation", (ppo.n_envs, width), np.float32)
+        ppo._last_episode_starts = _fitting(arrays, "rollout.episode_starts", (ppo.n_envs,), np.bool_)
+        ppo._n_updates = require_count("updates", values["updates"], 0)
+        episodes = ({"r": float(each["r"]), "l": int(each["l"])} for each in values["episodes"])
+        ppo.ep_info_buffer = deque(episodes, maxlen=ppo._stats_window_size)
         ppo.ep_success_buffer = deque(maxlen=ppo._stats_window_size)  # these environments tell of no success
+        if not all(
+            len(told) == 2 and isinstance(told[1], list) and isfinite(told[0]) for told in values["logged"].values()
+        ):
+            raise ValueError("logged must be values, each with the formats that leave it out")
         position, has_gauss, gauss = values["numpy"]
         ppo.action_space.np_random.bit_generator.state = values["actions"]
         random.setstate((3, tuple(map(int, arrays["random.python"])), values["python_gauss"]))
-        np.random.set_state(("MT19937", arrays["random.numpy"], position, has_gauss, gauss))  # noqa: NPY002
+        np.random.set_state(("MT19937", arrays["random.numpy"], int(position), int(has_gauss), gauss))  # noqa: NPY002
         torch.set_rng_state(torch.from_numpy(arrays["random.torch"]))
     except SpringfootError:
         raise
-    except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RuntimeError, OverflowError) as error:
         what = " ".join(str(error).split())
         raise SpringfootError(f"the training state does not fit its configuration: {what}") from None
 
 
-def _shaped(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    if arrays[name].shape != shape:
-        raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
-    return arrays[name]
+def _fitting(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
+    values = arrays[name]
+    if values.shape != shape or values.dtype != kind:
+        raise ValueError(f"{name} is {values.dtype} {values.shape}, not {kind.__name__} {shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} must be finite")
+    return values

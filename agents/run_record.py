@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from springfoot.gait.errors import SpringfootError, require_number
+from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.json_file import read_object, sealed_object
 
 from .config import config_from_json
@@ -20,19 +20,32 @@ def read_record(out: Path) -> dict[str, Any]:
     """The record in a run's folder; raises `SpringfootError` where it is none."""
     record = read_object(out / RUN, "record of a run")
     try:
-        config_from_json(record["config"])
-        for name in ("sessions", "evaluations"):
-            if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
-                raise ValueError(f"{name} must be a list of objects")
-        for entry in record["evaluations"]:
-            for name in ("timesteps", "return_mean", "return_sd", "falls", "episodes"):
-                require_number(name, entry[name], -inf)
         if not isinstance(record["config"], dict):
             raise ValueError("config must be an object")
+        config_from_json(record["config"])
+        require_past(record)
+        require_count("timesteps", record.get("timesteps", 0), 0)
         require_number("seconds", record.get("seconds", 0.0), 0.0, unit="s")
+        if not isinstance(record.get("best", {}), dict | None):
+            raise ValueError("best must be an object or null")
     except (KeyError, TypeError, ValueError) as error:
         raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
     return record
+
+
+def require_past(record: Mapping[str, Any]) -> None:
+    """Raise KeyError or ValueError where `sessions` or `evaluations` of a record are none."""
+    for name in ("sessions", "evaluations"):
+        if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
+            raise ValueError(f"{name} must be a list of objects")
+    measured = [session["best"] for session in record["sessions"] if "best" in session]
+    if not all(isinstance(best, dict) for best in measured):
+        raise ValueError("best must be an object")
+    for entry in (*record["evaluations"], *measured):
+        for name in ("timesteps", "return_mean", "return_sd", "falls", "episodes"):
+            require_number(name, entry[name], -inf)
+    for session in record["sessions"]:
+        require_count("from_timesteps", session.get("from_timesteps", 0), 0)
 
 
 def write_record(out: Path, record: Mapping[str, Any]) -> None:

@@ -37,12 +37,13 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
 
 
 def read_tensors(
-    path: Path, key: str, what: str, entries: AbstractSet[str], finite: bool = True
+    path: Path, key: str, what: str, entries: AbstractSet[str], finite: bool = True, sealed: bool = False
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """The JSON under `key` of a .safetensors header, and the tensors, all finite; else `SpringfootError`.
 
     `what` it is called in messages, and `entries` are those that its JSON may have. Unless `finite`, numbers may be of
-    any kind, infinite ones and NaN too. A file without a digest, of an earlier version, is read without that check.
+    any kind, infinite ones and NaN too. A file without a digest, of an earlier version, is read without that check;
+    with `sealed` it is refused.
     """
     try:
         if (size := path.stat().st_size) > MOST_TENSOR_BYTES:
@@ -71,6 +72,8 @@ def read_tensors(
         whole = text == _text(header)
         if header.pop(DIGEST) != digest_of(header, tensors) or not whole:
             raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
+    elif sealed:
+        raise SpringfootError(f"{path} is damaged or was changed: it has no {DIGEST}")
     for tensor_name, tensor in tensors.items() if finite else ():
         if tensor.dtype not in (np.float32, np.float64) or not np.isfinite(tensor).all():
             raise SpringfootError(f"{path}: {tensor_name} must be finite float32 or float64 numbers")

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import save
 
-from springfoot.agents.config import TrainingConfig, config_from_json, config_to_json
+from springfoot.agents.checkpoint import STATE_KEY, read_checkpoint
+from springfoot.agents.config import TrainingConfig, config_to_json
 from springfoot.agents.foreign_policy import contract_path, onnx_policy
-from springfoot.agents.policy import find_policy, read_policy
+from springfoot.agents.policy import RUN, find_policy, read_policy
+from springfoot.agents.run_record import read_record
 from springfoot.agents.schedule_files import schedule_file
-from springfoot.agents.tensor_file import DIGEST, read_tensors
+from springfoot.agents.tensor_file import DIGEST, read_tensors, write_tensors
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import Recording, load_recording, record
@@ -51,6 +53,7 @@ def readers(folder: Path) -> dict[str, Reader]:
             read=_walk_on, suffix=".safetensors", bases=(_policy(), find_policy("pretrained").read_bytes())
         ),
         "training state": Reader(read=_state, suffix=".safetensors", bases=(_state_file(),)),
+        "header of a checkpoint": Reader(read=_checkpoint, suffix=".json", bases=(json.dumps(_header()).encode(),)),
         "record of a run": Reader(read=_record, suffix=".json", bases=(json.dumps(_run()).encode(),)),
         "recording": Reader(read=load_recording, suffix=".npz", bases=(recording.read_bytes(),)),
         "schedule": Reader(read=_schedule, suffix=".csv", bases=(_schedule_table(walk, folder),)),
@@ -105,19 +108,45 @@ def _state(path: Path) -> None:
     read_tensors(path, "springfoot-training", "training state", {"timesteps", DIGEST})
 
 
+def _header() -> dict[str, Any]:
+    generator = np.random.PCG64(0).state
+    return {
+        "timesteps": 64,
+        "config": config_to_json(TrainingConfig()),
+        "fingerprint": {"legs": "0"},
+        "record": {"sessions": [{"from_timesteps": 0}], "evaluations": _run()["evaluations"]},
+        "seconds": 1.5,
+        "events": {"events.out.tfevents.1": 64},
+        "learning": {
+            "generators": [generator],
+            "actions": generator,
+            "numpy": [1, 0, 0.0],
+            "python_gauss": None,
+            "updates": 1,
+            "episodes": [{"r": 1.5, "l": 10}],
+            "logged": {"time/fps": [1.5, []]},
+        },
+    }
+
+
+def _checkpoint(path: Path) -> None:
+    """What is changed is the header alone: the file is sealed anew."""
+    header = read_object(path, "header")
+    state = path.with_suffix(".safetensors")
+    try:
+        write_tensors(state, STATE_KEY, header, {})
+    except ValueError as error:  # no JSON
+        raise SpringfootError(str(error)) from None
+    read_checkpoint(state)
+
+
 def _run() -> dict[str, Any]:
-    evaluation = {"timesteps": 64, "seconds": 1.0, "return_mean": 3.5, "falls": 0, "seconds_mean": 10.0}
+    evaluation = {"timesteps": 64, "seconds": 1.0, "return_mean": 3.5, "return_sd": 0.5, "falls": 0, "episodes": 16}
     return {"config": config_to_json(TrainingConfig()), "sessions": [{}], "evaluations": [evaluation], "seconds": 1.0}
 
 
 def _record(path: Path) -> None:
-    record = read_object(path, "record of a run")
-    try:
-        config_from_json(record["config"])
-    except SpringfootError:
-        raise
-    except (KeyError, TypeError, ValueError) as error:  # `springfoot.agents.training` tells of them so
-        raise SpringfootError(f"{path} is not the record of a run: {error!r}") from None
+    read_record(_write(path.with_name(RUN), path.read_bytes()).parent)
 
 
 # Schedules, own data, feet -----------------------------------------------------------------------------------

@@ -111,7 +111,7 @@ def _read(folder: Path) -> dict[str, Any]:
     try:
         numbers = [entry[key] for entry in record_of_run["evaluations"] for key in KEYS]
         float(sum(numbers) + record_of_run["seconds"] + record_of_run["timesteps"])
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         raise SpringfootError(
             f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"
         ) from None

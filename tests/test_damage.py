@@ -3,16 +3,17 @@
 import json
 import re
 import shutil
+from typing import Any
 
 import numpy as np
 import pytest
 from safetensors import safe_open
 from safetensors.numpy import load, save
 
-from springfoot.agents.checkpoint import STATE_KEY, read_checkpoint
+from springfoot.agents.checkpoint import STATE_KEY, newest_checkpoint, read_checkpoint
 from springfoot.agents.config import TrainingConfig
 from springfoot.agents.policy import ENTRIES, read_policy
-from springfoot.agents.tensor_file import DIGEST, MOST_TENSOR_BYTES, read_tensors, write_tensors
+from springfoot.agents.tensor_file import DIGEST, MOST_TENSOR_BYTES, digest_of, read_tensors, write_tensors
 from springfoot.agents.training import resume, train
 from springfoot.envs import BipedSettings
 from springfoot.gait import SpringfootError
@@ -146,6 +147,77 @@ def _forged(path, key, header, tensors, name, value):
         )
     write_tensors(path, key, header, tensors)
     return path
+
+
+HEADERS = [
+    ("seconds", None, "in its header, value of key 'seconds' of dict is neither float or int"),
+    ("seconds", 1e999, "Out of range float values are not JSON compliant"),
+    ("timesteps", -1, "timesteps must be a whole number >= 0, got -1"),
+    ("config", [], "in its header, value of key 'config' of dict is not a dict"),
+    ("fingerprint.legs", 3, "in its header, value of key 'legs' of value of key 'fingerprint' of dict is not a"),
+    ("record.sessions", [], "sessions must be one or more"),
+    ("record.sessions", [1], "in its header, item 0 of value of key 'sessions' of value of key 'record' of dict is"),
+    ("record.sessions.0.best", 1, "best must be an object"),
+    ("record.sessions.0.from_timesteps", "0", "from_timesteps must be a whole number >= 0, got '0'"),
+    ("record.evaluations.0", {}, "it has no 'timesteps'"),
+    ("record.evaluations.0.return_mean", "x", "return_mean must be a finite number >= -inf, got 'x'"),
+    ("events.a", -1, "size of a must be a whole number >= 0, got -1"),
+    ("learning.generators.0", None, "in its header, item 0 of value of key 'generators' of value of key 'learning'"),
+    ("learning.episodes.0", {"r": 1.0}, "in its header, item 0 of value of key 'episodes' of value of key 'learning'"),
+]
+"""What no training writes into the header of a checkpoint, and how it is refused where its digest fits."""
+
+
+@pytest.mark.parametrize(("place", "value", "said"), HEADERS, ids=lambda each: str(each)[:30])
+def test_a_header_that_no_training_writes_is_refused_though_its_digest_fits(run, tmp_path, place, value, said):
+    header, tensors = _header_with(run, place, value)
+    path = tmp_path / STATE
+    content = save(tensors, {STATE_KEY: json.dumps(header | {DIGEST: digest_of(header, tensors)}, sort_keys=True)})
+    path.write_bytes(content)
+    with pytest.raises(SpringfootError) as caught:
+        read_checkpoint(path)
+    assert str(caught.value).startswith(f"{path} is damaged: {said}")
+
+
+def _header_with(run, place, value):
+    header, tensors = read_checkpoint(run / STATE)
+    *into, last = (int(part) if part.isdecimal() else part for part in place.split("."))
+    found: Any = header
+    for part in into:
+        found = found[part]
+    found[last] = value
+    return header, tensors
+
+
+MISFITS = [
+    ("learning.updates", 10**400, "updates must be a whole number >= 0 and <= 1000000000000, got infinity"),
+    ("learning.numpy", [1.0], "not enough values to unpack (expected 3, got 1)"),
+    ("learning.numpy.0", 10**30, "Python int too large to convert to C long"),
+    ("learning.actions", {}, "state must be for a PCG64 RNG"),
+    ("learning.generators.0", {}, "'bit_generator'"),
+    ("learning.logged.a", [1.0], "logged must be values, each with the formats that leave it out"),
+    ("learning.logged.a", ["x", []], "must be real number, not str"),
+]
+"""What has the types of a header, and yet cannot be gone on from."""
+
+
+@pytest.mark.parametrize(("place", "value", "said"), MISFITS, ids=lambda each: str(each)[:30])
+def test_a_state_that_cannot_be_gone_on_from_is_one_line(run, tmp_path, place, value, said):
+    folder = shutil.copytree(run, tmp_path / "run")
+    write_tensors(folder / STATE, STATE_KEY, *_header_with(run, place, value))
+    with pytest.raises(SpringfootError, match=re.escape(said)):
+        resume(folder, 64)
+
+
+def test_a_checkpoint_without_a_digest_is_passed_over(run, tmp_path, capsys):
+    header, tensors = read_checkpoint(run / STATE)
+    older = shutil.copyfile(run / STATE, tmp_path / STATE)
+    newer = tmp_path / "state-128.safetensors"
+    newer.write_bytes(save(tensors, {STATE_KEY: json.dumps(header)}))
+    found = newest_checkpoint(tmp_path)
+    assert found is not None and found[0] == header
+    said = f"Warning: {newer} is damaged or was changed: it has no sha256; going on from {older.name}\n"
+    assert capsys.readouterr().err == said
 
 
 def test_a_policy_of_an_earlier_version_has_no_digest_and_is_read(run, tmp_path):
