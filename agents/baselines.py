@@ -5,7 +5,7 @@ stiffness in N m/rad into an action by the inverse of the environment's log scal
 `action_mode="absolute"`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_phases
-from springfoot.envs.control.reference_walk import reference_walks, tabulated_speeds
-from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.control.reference_walk import ReferenceWalk, tabulated_speeds, walks_of_legs
+from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.gait.arrays import NDArray
@@ -66,15 +66,21 @@ def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
 def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
     """A fixed stiffness over the stride, times `factor`: that of `settings.schedule`, or that of the leg tuning.
 
-    The tuned one goes with the speed that is commanded at each moment. Both scale with the body.
+    The tuned one goes with the speed that is commanded at each moment, and each leg has its own where a person has
+    adapted to a foot. Both scale with the body.
     """
     body, speeds = body_of(settings), tabulated_speeds(settings)
     if settings.schedule is not None:
         stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
         return follow(factor * stiffness[None], speeds[:1], settings, body)
-    walks = reference_walks(settings)
-    stiffness = np.stack([fixed_stiffness(walk.constants[0], body, walk.human.foot.plateaus) for walk in walks])
+    left, right = walks_of_legs(settings)
+    stiffness = np.stack([_scheduled(left), _scheduled(right)], 2) if right else _scheduled(left)
     return follow(factor * stiffness, speeds, settings, body)
+
+
+def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
+    """(speeds, samples, (ankle, toe)) stiffness of the leg tuning [N m/rad]."""
+    return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.human.foot.plateaus) for walk in walks])
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
@@ -88,16 +94,20 @@ def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
 def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
     """The policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
 
-    It reads phase and Froude speed from the observation; between two of `speeds` [m/s, of `body`] it is linear.
+    Where the legs have their own it is (speeds, samples, side, (ankle, toe)). Phase and Froude speed are read from the
+    observation; between two of `speeds` [m/s, of `body`] it is linear.
     """
     require_absolute(settings)
-    table, froude = PhaseTable(stiffness), np.array([body.froude_speed(speed) for speed in speeds])
+    froude, own = np.array([body.froude_speed(speed) for speed in speeds]), np.arange(len(SIDES))
+    each = stiffness if stiffness.ndim == 4 else np.stack([stiffness] * len(SIDES), 2)
+    table = PhaseTable(each.reshape(*each.shape[:2], -1))
 
     def policy(observation: NDArray) -> NDArray:
         spot = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
         place = np.zeros(len(spot), PLACE)
         place["row"], place["weight"] = spot, spot % 1.0
-        action = action_of(table.at(leg_phase(observation), place), settings, body)
+        curves = table.at(leg_phase(observation), place).reshape(-1, *2 * [len(SIDES)], each.shape[-1])
+        action = action_of(curves[:, own, own], settings, body)
         return action.reshape(len(observation), -1).astype(np.float32)
 
     return policy

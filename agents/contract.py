@@ -4,6 +4,7 @@ The same numbers that stand in it, `scale_of`, stand in every exported file; not
 made.
 """
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from math import e
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_rows import controlled_joints
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.phase_table import SAMPLES
-from springfoot.envs.control.reference_walk import reference_walks, rows
+from springfoot.envs.control.reference_walk import ReferenceWalk, rows, walks_of_legs
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task.observation import OBSERVATION
@@ -111,15 +112,17 @@ def contract_of(policy: Policy) -> dict[str, Any]:
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
-    """What a residual action multiplies, at each percent of the leg's stride, by speed; of the body of the contract."""
-    speeds, curves, unit = [], [], body_of(settings).stiffness_scale
-    for constants, walk in rows(reference_walks(settings)):
-        speeds.append(float(walk.speed))
-        curves.append(foot_curves(settings, constants, walk)[1][::SCHEDULE_STEP] / unit)
+    """What a residual action multiplies, at each percent of the leg's stride, by speed; of the body of the contract.
+
+    `right` is the right leg's, where a person has adapted to a foot; the rest is then the left leg's.
+    """
+    left, right = walks_of_legs(settings)
+    found = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
+    return found | {"right": _curves(settings, right)} if right else found
+
+
+def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str, list[list[float]]]:
+    unit = body_of(settings).stiffness_scale
+    curves = [foot_curves(settings, constants, walk)[1][::SCHEDULE_STEP] / unit for constants, walk in rows(walks)]
     table = np.round(np.stack(curves), 6)
-    return {
-        "unit": "N m/rad",
-        "speed_m_s": speeds,
-        "ankle": table[..., 0].tolist(),
-        "toe": table[..., 1].tolist(),
-    }
+    return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}

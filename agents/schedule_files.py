@@ -11,8 +11,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from springfoot.envs.control.foot_springs import FEET, action_of
-from springfoot.envs.control.phase_table import GRID, PhaseTable
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings import BipedSettings, Equilibrium, body_of
 from springfoot.gait.arrays import NDArray
@@ -23,7 +23,7 @@ from springfoot.gait.json_file import read_object
 from springfoot.gait.stiffness import SPRINGS, STIFFNESS_RANGE, Segment, StiffnessSchedule
 from springfoot.gait.text_table import Table, read_csv
 
-from .baselines import PolicyFunction, leg_phase, require_absolute, schedule
+from .baselines import PolicyFunction, follow, schedule
 
 SPRING_KEYS = ("stiffness_Nm_per_rad", "damping_time_s", "equilibrium_deg")
 """What a state says of each spring."""
@@ -47,7 +47,7 @@ def schedule_file(
     table = read_csv(path)
     stiffness = _stiffness(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), conditions)
     own = {"action_mode": "absolute"} | _equilibrium(table, stiffness)
-    return own, lambda settings: _follow(stiffness, settings)
+    return own, lambda settings: follow(stiffness[None], np.zeros(1), settings, body_of(settings))
 
 
 def _scale(height: float | None, mass: float | None, settings: BipedSettings) -> float:
@@ -127,19 +127,6 @@ def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
     starts = np.broadcast_to(GRID[::every, None, None], (len(springs), len(SPRINGS), 1))
     lines = np.concatenate([starts, springs], axis=-1).swapaxes(0, 1).tolist()
     return {"equilibrium": kind, "schedule": dict(zip(SPRINGS, lines, strict=True))}
-
-
-def _follow(stiffness: NDArray, settings: BipedSettings) -> PolicyFunction:
-    """The policy that sets `stiffness` (SAMPLES, side, joint) [N m/rad] by each leg's phase."""
-    body, shape = body_of(settings), stiffness.shape[1:]
-    require_absolute(settings)
-    table, own = PhaseTable(stiffness.reshape(len(GRID), -1)), np.arange(len(SIDES))
-
-    def policy(observation: NDArray) -> NDArray:
-        wanted = table.at(leg_phase(observation)).reshape(-1, len(SIDES), *shape)[:, own, own]
-        return action_of(wanted, settings, body).reshape(len(observation), -1).astype(np.float32)
-
-    return policy
 
 
 # Springs of finite states, in a JSON file --------------------------------------------------------------------

@@ -179,16 +179,18 @@ class Adapt(Study):
             strategy.tell(vectors, list(paid))
             lines.append((generation + 1, float(paid.min()), float(np.median(paid))))
             progress(1)
-            if generation % 10 == 9 or generation == self.generations - 1:
-                self._keep(label, space.person(strategy.mean))
+            last = generation == self.generations - 1
+            if generation % 10 == 9 or last:
+                self._keep(label, space.person(strategy.mean), last)
                 tqdm.write(f"{label}: generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}")
         return space.person(strategy.mean), lines
 
-    def _keep(self, label: str, found: Person) -> None:
-        """Write what was found so far, and the command that does; with --quick nothing."""
+    def _keep(self, label: str, found: Person, last: bool) -> None:
+        """Write what was found so far and, at the `last`, the command that finds it; with --quick nothing."""
         if self.quick:
             return
         known = read_feet(self.feet)  # anew: another search may have written its own
         known["feet"][label] = found.setting(self.speed)
-        known["found_by"][label] = without_places(self.command)
+        known["found_by"].pop(label, None)
+        known["found_by"] |= {label: without_places(self.command)} if last else {}
         write_atomically(self.feet, (json.dumps(known, indent=1) + "\n").encode())

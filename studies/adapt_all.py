@@ -2,7 +2,7 @@
 
     springfoot study adapt-all
 
-A search that is done is not run again: the command may be stopped and begun anew.
+A search that was finished is not run again: the command may be stopped and begun anew.
 """
 
 import shlex
@@ -47,11 +47,10 @@ class AdaptAll(Study):
         """Search; with --quick for a moment, and nothing is written."""
         known, lines = read_feet(self.feet), []
         for label, command in list(known["found_by"].items())[: self.first]:
-            done = read_feet(self.to)["feet"]
-            if label not in done or self.quick:
+            if read_feet(self.to)["found_by"].get(label) != command or self.quick:
                 self._run(label, command, progress)
-                done = read_feet(self.to)["feet"]
-            same = "same" if done.get(label) == known["feet"][label] else "other"
+            found = read_feet(self.to)["feet"].get(label)
+            same = "same" if found == known["feet"][label] else "other"
             lines.append([label, same, f"`{command}`"])
         return Answer(text=table(["foot", "as committed", "found by"], lines))
 

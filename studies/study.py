@@ -111,9 +111,9 @@ class Study:
 
 
 def without_places(command: str) -> str:
-    """A command without the folder, the page and the file it writes to, which are somebody's own."""
+    """A command without the folder, the page and the files it writes to, which are somebody's own."""
     words = shlex.split(command)
-    for flag in ("--out", "--page", "--keep"):
+    for flag in ("--out", "--page", "--keep", "--feet"):
         if flag in words:
             place = words.index(flag)
             del words[place : place + 2]

@@ -136,17 +136,20 @@ def test_the_stiffness_is_what_the_environment_sets_in_the_body_of_the_contract(
         assert set_to == pytest.approx(stiffness[:, column] * own, rel=1e-6)
 
 
-def test_a_residual_export_says_which_schedule_its_factor_multiplies(tmp_path):
-    policy = drawn(action_mode="residual", height=1.9, mass=90.0)
+@pytest.mark.parametrize("right_foot", ["intact", {"kind": "adaptive", "adapted": "adaptive"}])
+def test_a_residual_export_says_which_schedule_its_factor_multiplies(right_foot, tmp_path):
+    policy = drawn(action_mode="residual", height=1.9, mass=90.0, right_foot=right_foot)
     biped = Biped(policy.settings, 8)
     biped.reset(np.arange(8), list(range(8)))
-    rows, phase = biped.observe(), biped.leg_phase[:, 0]
+    rows, phase = biped.observe(), biped.leg_phase.copy()
     _, factor = exported(policy, tmp_path, "numpy")(rows)
     schedule = contract_of(policy)["schedule"]
     assert schedule["speed_m_s"] == [1.2]
-    ankle = np.interp(phase, np.arange(100) / 100, schedule["ankle"][0], period=1.0)
-    own = 90.0 / 63.0 * 1.9 / 1.7
-    assert biped.step(policy(rows)).info["stiffness/ankle_left"] == pytest.approx(factor[:, 0] * ankle * own, rel=1e-6)
+    assert ("right" in schedule) == (right_foot != "intact")
+    info, own = biped.step(policy(rows)).info, 90.0 / 63.0 * 1.9 / 1.7
+    for side, (name, curves) in enumerate((("left", schedule), ("right", schedule.get("right", schedule)))):
+        ankle = np.interp(phase[:, side], np.arange(100) / 100, curves["ankle"][0], period=1.0)
+        assert info[f"stiffness/ankle_{name}"] == pytest.approx(factor[:, 2 * side] * ankle * own, rel=1e-6)
 
 
 def test_the_contract_names_everything_in_its_order_and_nothing_of_where_or_when():
