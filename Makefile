@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, a file of tests on one: what its tests share is made once.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: help install walk test test-wheel test-sdist test-learners test-kills fuzz extremes check format bench feet clean
+.PHONY: help install walk predict test test-wheel test-sdist test-learners test-kills fuzz extremes check format bench feet clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -26,6 +26,7 @@ help:
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
 	@echo "make feet     docs/feet.md from committed people and policies; goes on after a stop; FULL=1: searches, trains"
 	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
+	@echo "make predict  docs/prediction.md's walk from nothing: plan, leg constants, policy; goes on after a stop"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
 install: $(VENV)/installed
@@ -113,6 +114,10 @@ feet: install
 	if [ -n "$(FULL)" ]; then $(FEET) adapt-all; cp runs/feet/adapted.json envs/control/adapted.json; fi; \
 	$(FEET) prosthesis $(if $(FULL),--train) --keep runs/feet/prosthesis.json --page docs/feet.md; \
 	$(FEET) orthosis --keep runs/feet/orthosis.json --page docs/feet.md
+
+# Each stage is kept in runs/predict: after a stop the same command goes on.
+predict: install
+	$(BIN)/springfoot study predict --page docs/prediction.md
 
 bench: install
 	$(BIN)/python -m benchmarks.bench

@@ -85,6 +85,16 @@ class TrainingConfig:
             )
 
 
+PREDICTED = replace(
+    TRAINED_ON,
+    push_newton=100.0,
+    guide="plan",
+    action_mode="residual",
+    reward_weights={"pose": 0.0, "grf": 0.0, "effort": -0.5},
+)
+"""The task of a body that follows its own plan: its action is a factor on the schedule found with its leg constants;
+it is paid for CoM, speed and ZMP of the plan and pays for effort; angles and forces count nothing."""
+
 PRESETS: dict[str, TrainingConfig] = {
     "walk": TrainingConfig(),
     "any-body": TrainingConfig(
@@ -101,6 +111,7 @@ PRESETS: dict[str, TrainingConfig] = {
             stiffness_delay_range_s=(0.0, 0.02),
         ),
     ),
+    "predict": TrainingConfig(timesteps=500_000, environment=PREDICTED),
 }
 """Trainings that are known to work, by name."""
 

@@ -39,6 +39,8 @@ Output = Literal["clip", "tanh"]
 
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
+SHIPPED = {"pretrained": "walk.safetensors", "predicted": "predicted.safetensors"}
+"""Name of a policy of this package -> its file in `pretrained/`: of preset `walk` (mixed), and of preset `predict`."""
 RUN = "run.json"
 """Name of a run folder's record: configuration, evaluations, status."""
 
@@ -126,12 +128,12 @@ def save_policy(path: str | Path, policy: Policy) -> None:
 
 
 def find_policy(name: str | Path) -> Path:
-    """The file that a path, a run folder (its best) or `pretrained` means; `SpringfootError` if there is none."""
+    """The file that a path, a run folder (its best) or one of `SHIPPED` means; `SpringfootError` if there is none."""
     path = Path(name)
-    if str(name) == "pretrained":
-        path = Path(str(resources.files("springfoot.agents") / "pretrained" / "walk.safetensors"))
+    if str(name) in SHIPPED:
+        path = Path(str(resources.files("springfoot.agents") / "pretrained" / SHIPPED[str(name)]))
         if not path.is_file():
-            raise SpringfootError("this installation of springfoot has no pretrained policy; train one: train.py")
+            raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: train.py")
     elif path.is_dir():
         if not (path / BEST).is_file():
             raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of train.py")
@@ -147,7 +149,7 @@ _NUMBERS = ("observation_clip", "variance_floor")
 
 
 def load_policy(name: str | Path) -> Policy | ForeignPolicy:
-    """The policy in a file, a run folder (its best), `pretrained`, or the function that `module:function` names.
+    """The policy in a file, a run folder (its best), one of `SHIPPED`, or the function that `module:function` names.
 
     A .safetensors file is read by `read_policy`, an .onnx file by `onnx_policy`; neither executes anything. Only a
     `name` that is a text of the form `module:function` runs code: `function_policy` imports that module.
@@ -159,7 +161,7 @@ def load_policy(name: str | Path) -> Policy | ForeignPolicy:
 
 
 def read_policy(name: str | Path) -> Policy:
-    """The policy in a .safetensors file, a run folder (its best) or `pretrained`, checked against this springfoot.
+    """The policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, checked against this springfoot.
 
     Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of
     another format version, incomplete or not finite, or made for other spaces, another model or other legs than

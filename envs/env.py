@@ -35,8 +35,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | 2   | ankle_right | 20              | 800             | N m/rad  |
     | 3   | toe_right   | 5               | 200             | N m/rad  |
 
-    The stiffnesses are those of 1.70 m and 63 kg; they scale with mass x height.
-    Actions of a joint that has a device in place of muscles (see Feet) are read as 0, also in the observation.
+    For 1.70 m and 63 kg; scales with mass x height. Of a joint with a device (Feet) an action is read and seen as 0.
 
     ## Feet
     `left_foot` and `right_foot` are each one of these kinds, or a dictionary of `kind` and numbers. Stiffness [N m/rad]
@@ -192,6 +191,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `cadence`                 | `"people"`      | step length and time of `"people"` or of the `"thesis"`            |
     | `guide`                   | `"people"`      | whose walk it follows: that of `"people"` or of its `"plan"`       |
     | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
+    | `plan_file`               | `None`          | the plan's style and leg constants in place of the package's       |
     | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
     | **springs**               |                 |                                                                    |
     | `equilibrium`             | `"planned"`     | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                   |

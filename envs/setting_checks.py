@@ -14,6 +14,7 @@ from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, as_float, quoted, require_count, require_number
 from springfoot.gait.human import harmonics
 from springfoot.gait.stiffness import STIFFNESS_RANGE
+from springfoot.gait.walk_style import styles_of
 
 from .timing import CONTROL_WINDOW
 
@@ -44,6 +45,18 @@ def check_people_file(name: object) -> None:
         if not isinstance(name, str):
             raise SpringfootError(f"people_file must be the name of a file, got {quoted(name)}")
         harmonics(Path(name))
+
+
+def check_guide(guide: str, human: object, plan_file: object) -> None:
+    """Refuse somebody's walk where the plan is the guide, and a file of plans where it is not."""
+    if guide == "plan" and human is not None:
+        raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
+    if plan_file is not None:
+        if not isinstance(plan_file, str):
+            raise SpringfootError(f"plan_file must be the name of a file, got {quoted(plan_file)}")
+        if guide != "plan":
+            raise SpringfootError(f"plan_file needs guide 'plan', got {guide!r}")
+        styles_of(Path(plan_file))  # raises for another kind of file
 
 
 def check_names(given: Iterable[str], names: Sequence[str]) -> None:

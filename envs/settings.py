@@ -1,7 +1,7 @@
 """Everything that can be set about the walking task: plain JSON values, validated in one place.
 
-The settings are flat, as `gym.make` takes them. Each one also names its theme, once; the groups of `--help`, the table
-of `SegmentedFootBiped` and what an evaluation sets anew follow from that.
+Flat, as `gym.make` takes them. Each also names its theme, once: of it are made the groups of `--help`, the table of the
+environment and what an evaluation sets anew.
 """
 
 import json
@@ -22,6 +22,7 @@ from .physics.foot_contact import FRICTION
 from .setting_checks import (
     check_bounds,
     check_choice,
+    check_guide,
     check_names,
     check_people_file,
     check_range,
@@ -110,6 +111,8 @@ class BipedSettings:
     people's walk; or the plan's own (plan), of people the step length and time alone (`docs/prediction.md`)."""
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
+    plan_file: str | None = field(default=None, metadata=_REFERENCE)
+    """With guide `plan`: file of the plan's style and leg constants (`springfoot study predict`), not the package's."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
     """Equilibrium angle of ankle and toe: people's ankle angle with the moment of `feedforward` fed forward (planned),
     that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
@@ -173,13 +176,8 @@ class BipedSettings:
         require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
         self._check_draws()
         for name, choices in (
-            ("cadence", Cadence),
-            ("guide", Guide),
-            ("equilibrium", Equilibrium),
-            ("feedforward", Feedforward),
-            ("action_mode", ActionMode),
-            ("decisions", Decisions),
-            ("stiffness_joints", StiffnessJoints),
+            *(("cadence", Cadence), ("guide", Guide), ("equilibrium", Equilibrium), ("feedforward", Feedforward)),
+            *(("action_mode", ActionMode), ("decisions", Decisions), ("stiffness_joints", StiffnessJoints)),
         ):
             check_choice(name, getattr(self, name), get_args(choices))
         for name in FOOT_SETTINGS:
@@ -195,8 +193,7 @@ class BipedSettings:
         if self.human is not None:
             OwnGait.from_json(self.human)
         check_people_file(self.people_file)
-        if self.guide == "plan" and self.human is not None:
-            raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
+        check_guide(self.guide, self.human, self.plan_file)
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
         if self.stop_at is not None:
@@ -221,8 +218,7 @@ class BipedSettings:
 
     def _check_draws(self) -> None:
         for name, allowed, unit in (
-            ("height_range", HEIGHT_RANGE, "m"),
-            ("mass_range", MASS_RANGE, "kg"),
+            *(("height_range", HEIGHT_RANGE, "m"), ("mass_range", MASS_RANGE, "kg")),
             ("speed_range", PLAN_SPEED_RANGE, "m/s"),
         ):
             if getattr(self, name) is not None:
@@ -289,6 +285,11 @@ def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
 def body_of(settings: BipedSettings) -> Body:
     """The body of the settings."""
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
+
+
+def plan_file_of(settings: BipedSettings) -> Path | None:
+    """The file of the plan's style and leg constants, if it is not the package's."""
+    return None if settings.plan_file is None else Path(settings.plan_file)
 
 
 def reference_gait(settings: BipedSettings) -> HumanGait:

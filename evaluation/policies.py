@@ -1,7 +1,7 @@
 """A policy by its name, and the environment it is evaluated in: the one place where names of policies are understood.
 
-A name is a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `module:function`, a baseline
-(`springfoot.agents.baselines`), or `frozen:POLICY`, the open-loop copy of one that was trained.
+A name is a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `predicted`, `module:function`, a
+baseline (`springfoot.agents.baselines`), or `frozen:POLICY`, the open-loop copy of one that was trained.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from springfoot.agents.baselines import (
     own_settings,
 )
 from springfoot.agents.foreign_policy import is_function
-from springfoot.agents.policy import load_policy
+from springfoot.agents.policy import SHIPPED, load_policy
 from springfoot.agents.schedule_files import schedule_file
 from springfoot.envs.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
@@ -39,9 +39,9 @@ def prepare(
     """A policy by name and the environment it is evaluated in.
 
     Args:
-        name: a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `module:function`, a baseline
-            of `agents.baselines`, or `frozen:POLICY`, the mean K of one of the first four, which first walks for it
-            (`open_loop_copy`).
+        name: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, `module:function`, a
+            baseline of `agents.baselines`, or `frozen:POLICY`, the mean K of one of the first four, which first walks
+            for it (`open_loop_copy`).
         given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
         seed: of the baseline `random`.
         threads: of the physics where a copy is made; any number gives the same bits.
@@ -60,8 +60,8 @@ def prepare(
         own, make = schedule_file(name, settings_from(**{key: wanted[key] for key in CONDITIONS}))
         settings = settings_from(**(own | wanted))
         return make(settings), settings
-    if name != "pretrained" and not Path(name).exists() and not is_function(name):
-        known = ", ".join(["pretrained", *BASELINES])
+    if name not in SHIPPED and not Path(name).exists() and not is_function(name):
+        known = ", ".join([*SHIPPED, *BASELINES])
         raise SpringfootError(
             f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, module:function, or one of {known}, "
             f"or {FROZEN}:POLICY"

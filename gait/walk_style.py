@@ -8,11 +8,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .errors import SpringfootError
 from .foot_style import FootStyle
+
+STYLES = Path(str(resources.files("springfoot.gait") / "least_work.json"))
+"""The package's own file of styles."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +46,10 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
     return WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
 
 
-def least_work(speed: float) -> WalkStyle:
-    """The committed style of least cost at `speed` [m/s at 1.70 m]: linear between the speeds it was searched at, and
-    beyond them that of the nearest."""
-    table = _committed()
+def least_work(speed: float, file: Path | None = None) -> WalkStyle:
+    """The style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`: linear between the
+    speeds it was searched at, and beyond them that of the nearest. Raises `SpringfootError` for a file of no styles."""
+    table = _committed() if file is None else styles_of(file)
     speeds = sorted(table)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
     low, high = table[speeds[int(place)]], table[speeds[min(int(place) + 1, len(speeds) - 1)]]
@@ -63,5 +68,16 @@ def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
 
 @cache
 def _committed() -> dict[float, WalkStyle]:
-    text = resources.files("springfoot.gait").joinpath("least_work.json").read_text(encoding="utf-8")
-    return {float(speed): style_from(values) for speed, values in json.loads(text)["styles"].items()}
+    return styles_of(STYLES)
+
+
+def styles_of(file: Path) -> dict[float, WalkStyle]:
+    """Speed [m/s at 1.70 m] -> the style of a file; raises `SpringfootError` for one that has none."""
+    try:
+        styles = json.loads(file.read_text(encoding="utf-8"))["styles"]
+        found = {float(speed): style_from(values) for speed, values in styles.items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise SpringfootError(f"{file} is not a file of styles of walks: {error}") from None
+    if not found:
+        raise SpringfootError(f"{file} has no style of any walk")
+    return found

@@ -43,6 +43,7 @@ STUDIES = {
     "learning-curves": ("learning_curves.LearningCurves", "How fast was a walk learned?"),
     "leg-tuning": ("leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
     "plan-tuning": ("plan_tuning.PlanTuning", "Which plan of a walk costs least effort? (searches)"),
+    "predict": ("predict.Predict", "Which walk follows from body, plan and physics alone? (searches, trains)"),
     "leg-sets": ("leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
     "adapt": ("adapt.Adapt", "How does a person walk who has adapted to a foot? (searches for minutes)"),
     "adapt-all": (

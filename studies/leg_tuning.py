@@ -28,9 +28,11 @@ from springfoot.gait.errors import SpringfootError, require_count, require_numbe
 from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.plan import Cadence
 from springfoot.gait.stiffness import LOWEST_STIFFNESS
+from springfoot.gait.walk_style import least_work
 
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .generic_constants import GENERIC, generic_constants
+from .kept_search import asked_of, generations
 from .leg_cost import REFINED_SECONDS, all_misses, cost
 from .study import Answer, OnProgress, Study
 
@@ -132,6 +134,10 @@ class LegTuning(Study):
     beside them."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
+    plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """With guide plan: file of the plan's style, in place of the package's."""
+    log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2, "refinements": 0}
     PAGED: ClassVar[bool] = False
@@ -173,6 +179,7 @@ class LegTuning(Study):
             speed=self.speed,
             feedforward=self.feedforward,
             guide=self.guide,
+            plan_file=self.plan_file and str(self.plan_file),
             episode_seconds=REFINED_SECONDS + 1,
         )
         human = reference_walk_at(settings, self.speed, [begin]).human
@@ -184,13 +191,15 @@ class LegTuning(Study):
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
-        for generation in range(self.generations):
-            vectors = strategy.ask()
+
+        def price(generation: int, vectors: list[NDArray]) -> NDArray:
             ease = max(0.0, 1.0 - generation / self.ease) if self.ease else 0.0
             candidates = [search.constants(v) for v in vectors]
             seed = self.seed + 1000 * generation
-            paid = cost(settings, candidates, seed, self.threads, self.push_newton, ease, self.foreign)
-            strategy.tell(vectors, list(paid))
+            return cost(settings, candidates, seed, self.threads, self.push_newton, ease, self.foreign)
+
+        asked = asked_of(self) | {"from": asdict(begin), "style": self._style()}
+        for generation, _, paid in generations(strategy, self.generations, price, self.log, asked):
             lines.append([generation + 1, paid.min(), np.median(paid)])
             progress(1)
             if generation % 10 == 9 or generation == self.generations - 1:
@@ -199,6 +208,10 @@ class LegTuning(Study):
         found = search.constants(strategy.mean)
         text = f"{json.dumps({name: asdict(found)})}\n\n{told}{_told(*lines[-1])}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
+
+    def _style(self) -> dict[str, Any] | None:
+        """The style of the plan that is followed; None where people are."""
+        return least_work(self.speed, self.plan_file).to_json() if self.guide == "plan" else None
 
     def _refined(
         self,

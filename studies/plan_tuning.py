@@ -9,7 +9,6 @@ range. The search begins at round numbers.
 
 import json
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -24,12 +23,11 @@ from springfoot.gait.body import Body
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.plan import WalkPlan, plan_walk
 from springfoot.gait.plan_effort import PlanEffort, effort_of
-from springfoot.gait.walk_style import WalkStyle, style_from
+from springfoot.gait.walk_style import STYLES, WalkStyle, style_from
 
+from .kept_search import asked_of, generations
 from .study import Answer, OnProgress, Study
 
-STYLES = Path(str(resources.files("springfoot.gait") / "least_work.json"))
-"""The package's own."""
 CHOICES: dict[str, tuple[float, float, float]] = {
     "double_support": (0.2, 0.05, 0.06),  # of the step time
     "zmp_from": (0.0, 0.03, -0.06),  # m from the ankle
@@ -104,6 +102,8 @@ class PlanTuning(Study):
     """Seed of the search."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
     """File of styles to write to."""
+    log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4}
     PAGED: ClassVar[bool] = False
@@ -126,19 +126,20 @@ class PlanTuning(Study):
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(len(CHOICES)), self.sigma, options)
         lines, best = [], (np.inf, np.zeros(len(CHOICES)))
-        for generation in range(self.generations):
-            vectors = strategy.ask()
-            paid = [price(body, self.speed, np.asarray(vector))[0] for vector in vectors]
-            strategy.tell(vectors, paid)
-            best = min(best, (min(paid), np.asarray(vectors[int(np.argmin(paid))])), key=lambda each: each[0])
-            lines.append([generation + 1, min(paid), float(np.median(paid))])
+
+        def priced(_: int, vectors: list[NDArray]) -> NDArray:
+            return np.array([price(body, self.speed, vector)[0] for vector in vectors])
+
+        for generation, vectors, paid in generations(strategy, self.generations, priced, self.log, asked_of(self)):
+            best = min(best, (float(paid.min()), vectors[int(np.argmin(paid))]), key=lambda each: each[0])
+            lines.append([generation + 1, float(paid.min()), float(np.median(paid))])
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
-        paid, _, effort = price(body, self.speed, best[1])
+        cost, _, effort = price(body, self.speed, best[1])
         style = style_at(best[1])
         self._keep(style)
-        text = f"{json.dumps(style.to_json())}\n\npaid {paid:.4f}: {effort}"
+        text = f"{json.dumps(style.to_json())}\n\npaid {cost:.4f}: {effort}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
     def _keep(self, style: WalkStyle) -> None:

@@ -14,7 +14,7 @@ from springfoot.gait.errors import SpringfootError
 
 from ..adapted import ADAPTED, LEGS, committed_feet
 from ..feet import FOOT_SETTINGS
-from ..settings import BipedSettings
+from ..settings import BipedSettings, plan_file_of
 from .leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
 
 HELD_BY_SOUND = (
@@ -47,7 +47,8 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
 
 def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
     """The constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
-    tuned = leg_constants(settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.guide)
+    asked = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.guide
+    tuned = leg_constants(*asked, plan_file_of(settings))
     adapted = adapted_foot(settings)
     if adapted is None:
         return tuned

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,20 @@ def constants_name(
 
 
 def leg_constants(
-    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", guide: str = "people"
+    equilibrium: str,
+    cadence: str,
+    speed: float = TUNED_SPEED,
+    feedforward: str = "people",
+    guide: str = "people",
+    file: Path | None = None,
 ) -> LegConstants:
-    """The committed constants for a setting at `speed` [m/s at 1.70 m].
+    """The constants for a setting at `speed` [m/s at 1.70 m], the committed ones or those of `file`.
 
-    They are linear between the speeds of the committed sets; beyond those speeds the nearest set holds. Raises
-    `SpringfootError` for a setting without a committed set.
+    They are linear between the speeds of the sets there; beyond those speeds the nearest set holds. Raises
+    `SpringfootError` for a setting without a set.
     """
-    name, table = constants_name(equilibrium, cadence, feedforward=feedforward, guide=guide), _committed()
+    name = constants_name(equilibrium, cadence, feedforward=feedforward, guide=guide)
+    table = _committed() if file is None else _constants_of(file, name)
     if guide == "plan" and name not in table:
         raise SpringfootError(f"no leg constants walk with guide 'plan' at cadence {cadence!r}; it must be 'people'")
     if name not in table:
@@ -140,6 +147,15 @@ def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
 
 def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
     return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+
+
+def _constants_of(file: Path, name: str) -> dict[str, dict]:
+    try:
+        table = json.loads(file.read_text(encoding="utf-8"))["constants"]
+        _ = constants_from(table[name])
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise SpringfootError(f"{file} has no leg constants {name!r}: {error}") from None
+    return table
 
 
 def _committed() -> dict[str, dict]:

@@ -23,7 +23,7 @@ from springfoot.gait.plan_gait import gait_of
 from springfoot.gait.walk_style import least_work
 
 from ..physics.model import LEFT, RIGHT
-from ..settings import BipedSettings, body_of, reference_gait
+from ..settings import BipedSettings, body_of, plan_file_of, reference_gait
 from .adapted_legs import adapted_foot, person_constants
 from .leg_constants import LegConstants
 from .phase_table import GRID
@@ -90,7 +90,8 @@ def reference_walk_at(
     equal_speed = speed / sqrt(body.length_scale)
     legs = legs or [person_constants(settings, equal_speed, side)]
     if settings.guide == "plan":
-        plan = plan_walk(body, speed, settings.cadence, human=human, style=least_work(equal_speed))
+        style = least_work(equal_speed, plan_file_of(settings))
+        plan = plan_walk(body, speed, settings.cadence, human=human, style=style)
         guide = gait_of(plan)
         moments = _moments_of(guide, body)
         return ReferenceWalk(body=body, speed=speed, human=guide, plan=plan, constants=tuple(legs), moments=moments)

@@ -1,0 +1,188 @@
+"""A walk from body, plan and physics by one command: plan, leg constants, policy, and how it walks.
+
+    springfoot study predict
+
+Nothing that was found before takes part: the plan's search begins at round numbers, that of leg constants at `generic`
+ones, the policy untrained. Of people it knows what docs/prediction.md lists. What each stage finds is kept in the
+folder `runs`; after a stop the same command goes on, with the bits of one that nothing interrupted.
+"""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any, ClassVar
+
+import tyro
+
+from springfoot.agents.config import PRESETS, config_from_json
+from springfoot.agents.files import make_folder
+from springfoot.agents.markdown import table
+from springfoot.agents.multi_seed import is_finished
+from springfoot.agents.ownership import owned
+from springfoot.agents.policy import RUN
+from springfoot.agents.run_record import read_record
+from springfoot.envs.settings import BipedSettings
+from springfoot.gait.errors import SpringfootError, require_count
+
+from .constants_file import write_constants
+from .generic_constants import GENERIC
+from .leg_tuning import LegTuning
+from .plan_tuning import PlanTuning
+from .prediction_table import people_numbers, plan_numbers, prediction_table, walk_numbers
+from .protocol import Protocol, measured
+from .study import Answer, OnProgress, WalkingStudy
+
+FOUND = "found.json"
+"""In the folder, the plan's style and the leg constants: a `plan_file` of the settings."""
+SECTION = "PREDICTION"
+"""Of a page."""
+STAGE_PUSH = 100.0
+"""Size of the pushes of the third stage, of the training and of the second half of the evaluation [N]; chosen."""
+FIRST_SPREAD, SECOND_SPREAD = 0.5, 0.3
+"""First spread of the second and third stage [units of the search]; chosen: the third has a walk to keep."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predict(WalkingStudy):
+    """Predict a walk from nothing: a plan of least effort, leg constants that follow it, a policy; then evaluate."""
+
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
+    """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
+    plan_generations: int = 120
+    """Generations of the first stage, the plan of least effort."""
+    walk_generations: int = 100
+    """Generations of the second stage, leg constants of walks without pushes."""
+    push_generations: int = 100
+    """Generations of the third stage, leg constants of walks with pushes."""
+    population: int = 20
+    """Candidates in each generation."""
+    timesteps: int = PRESETS["predict"].timesteps
+    """Steps of the fourth stage, the training of a policy (preset `predict`)."""
+    search_seed: int = 0
+    """Seed of the searches and of the training."""
+
+    QUICK: ClassVar[dict[str, Any]] = {
+        **WalkingStudy.QUICK,
+        "plan_generations": 1,
+        "walk_generations": 1,
+        "push_generations": 1,
+        "population": 4,
+        "timesteps": 8192,
+    }
+    UNIT: ClassVar[str] = " generations"
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        super().check()
+        for name in ("plan_generations", "walk_generations", "push_generations", "timesteps"):
+            require_count(name, getattr(self, name))
+        require_count("population", self.population, 4)
+        require_count("search_seed", self.search_seed, 0, 2**31 - 2)
+
+    @property
+    def total(self) -> float:
+        """Generations of all searches."""
+        return self.plan_generations + self.walk_generations + self.push_generations
+
+    @property
+    def folder(self) -> Path:
+        """Where the stages keep what they find; with --quick, a folder of its own."""
+        return self.runs.with_name(f"{self.runs.name}-quick") if self.quick else self.runs
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Go through the stages, or through what is left of them."""
+        make_folder(self.folder)
+        with owned(self.folder):
+            return self._staged(progress)
+
+    def _staged(self, progress: OnProgress) -> Answer:
+        found, took = self.folder / FOUND, {}
+
+        def stage(name: str, make: Callable[[], Any]) -> Any:
+            began = perf_counter()
+            result = make()
+            took[name] = perf_counter() - began
+            return result
+
+        if not found.is_file():
+            write_constants(found, {"styles": {}, "constants": {}, "found_by": {}})
+        plan = PlanTuning(
+            generations=self.plan_generations,
+            population=self.population,
+            seed=self.search_seed,
+            styles=found,
+            log=self.folder / "plan.json",
+        )
+        walk = LegTuning(
+            guide="plan",
+            start=GENERIC,
+            push_newton=0.0,
+            generations=self.walk_generations,
+            population=self.population,
+            sigma=FIRST_SPREAD,
+            seed=self.search_seed,
+            threads=self.threads,
+            constants=found,
+            plan_file=found,
+            log=self.folder / "walk.json",
+        )
+        pushed = replace(
+            walk,
+            start="",
+            push_newton=STAGE_PUSH,
+            generations=self.push_generations,
+            sigma=SECOND_SPREAD,
+            seed=self.search_seed + 1,
+            log=self.folder / "pushed.json",
+        )
+        for name, search in (("plan", plan), ("walk", walk), ("walk, pushed", pushed)):
+            text = stage(name, lambda search=search: search.ask(progress)).text
+            (self.folder / f"{name.replace(', ', '-')}.txt").write_text(f"{text}\n", encoding="utf-8")
+        policy = self.folder / "policy"
+        settings = replace(PRESETS["predict"].environment, plan_file=str(found))
+        stage("policy", lambda: self._train(settings, policy))
+        text = stage("evaluation", lambda: self._evaluated(found, policy, settings))
+        spent = table(["stage", *took], [["seconds, this time", *(f"{each:.0f}" for each in took.values())]])
+        return Answer(text=f"{text}\n\n{spent}", files={"prediction.md": f"{text}\n"}, sections={SECTION: text})
+
+    def _train(self, settings: BipedSettings, out: Path) -> None:
+        """Train what is left of the training in `out`."""
+        from springfoot.agents import training  # torch takes seconds, which --help need not wait for
+
+        preset = PRESETS["predict"]
+        config = replace(
+            preset, timesteps=self.timesteps, seed=self.search_seed, environment=settings, threads=self.threads
+        )
+        if (out / RUN).is_file():
+            before = config_from_json(read_record(out)["config"])
+            if replace(before, threads=config.threads) != config:
+                raise SpringfootError(f"{out} was trained with other settings; choose another folder")
+        if is_finished(out):
+            return
+        begun = (out / RUN).is_file()
+        record = training.resume(out, threads=self.threads) if begun else training.train(config, out)
+        if record["status"] == "interrupted":
+            raise KeyboardInterrupt
+
+    def _evaluated(self, found: Path, policy: Path, settings: BipedSettings) -> str:
+        how = Protocol(
+            episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads
+        )
+        digest = hashlib.sha256(found.read_bytes()).hexdigest()
+        given = {"guide": "plan", "plan_file": str(found)}
+        columns = {"people": people_numbers(settings), "the plan": plan_numbers(settings)}
+        pushed = []
+        for name, label in (("schedule", "schedule"), (str(policy), "policy")):
+            key = [name, digest, self.timesteps]
+            metrics = measured(self.folder / f"{label}.json", how, key, lambda name=name: how.of(name, given))
+            columns[label] = walk_numbers(metrics["undisturbed"])
+            pushed.append(f"{label} {metrics['pushed']['falls']} of {metrics['pushed']['episodes']}")
+        return "\n\n".join(
+            [
+                prediction_table(columns, ("schedule", "policy")),
+                f"{self.what_ran}. Schedule: the search's own springs, no policy. **Bold**: not as wanted. "
+                f"Falls under pushes of {STAGE_PUSH:g} N: {', '.join(pushed)}.",
+            ]
+        )
