@@ -178,8 +178,8 @@ ERRORS = [
     ),
     (
         "frozen:nobody",
-        "no policy 'nobody': give a .safetensors or .onnx file, a run folder, module:function, or one of pretrained, "
-        f"{', '.join(BASELINES)}, "
+        "no policy 'nobody': give a .safetensors or .onnx file, a run folder, module:function, or one of "
+        f"pretrained, predicted, {', '.join(BASELINES)}, "
         "or frozen:POLICY",
     ),
 ]
