@@ -21,6 +21,7 @@ EXTRA_OF = {
     "tensorboard": "train",
     "torch": "train",
     "tqdm": "evaluate",
+    "typeguard": "evaluate",
     "tyro": "evaluate",
     "viser": "live",
 }
