@@ -1,5 +1,7 @@
 """Own data with a wrong unit, sign or beginning are refused with a guess; people and bodies that walk are taken."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import tyro
@@ -30,7 +32,8 @@ def people(speed=1.2, seed=None):
     if seed is not None:
         for name, values in curves.items():
             offset = random.uniform(-8, 8) if name in ANGLES else 0.0
-            curves[name] = values * random.uniform(0.6, 1.4) + offset * (name != "knee")
+            most = 0.1 if name in FORCES else 0.4  # everybody bears their own weight
+            curves[name] = values * random.uniform(1 - most, 1 + most) + offset * (name != "knee")
     return curves
 
 
@@ -51,6 +54,30 @@ def late(percent):
 
 def only(*names):
     return lambda curves: {name: curves[name] for name in names}
+
+
+def moved(degrees, name):
+    return lambda curves: curves | {name: curves[name] + degrees}
+
+
+def one_late(percent, name):
+    return lambda curves: curves | {name: late(percent)(curves)[name]}
+
+
+def noisy(share, *names):
+    random = np.random.default_rng(0)
+    return lambda curves: {
+        name: values + (name in names) * random.normal(0.0, share * np.ptp(values), len(values))
+        for name, values in curves.items()
+    }
+
+
+def backward(percent, *names):
+    return lambda curves: late(percent)({name: curves[name][::-1] for name in names})
+
+
+def interchanged(one, other):
+    return lambda curves: curves | {one: curves[other], other: curves[one]}
 
 
 def knee_from_straight(curves):
@@ -105,6 +132,34 @@ WRONG = {
     ),
     "powers of nobody": (times(0, *POWERS), "hip_power_W_per_kg is 0 throughout the stride: was it measured?"),
     "moments beyond all bodies": (times(1e9, *MOMENTS), "_Nm_per_kg goes from"),
+    "an ankle between shank and foot": (
+        moved(90, "ankle"),
+        "deg more than people's: from another zero? 0 is a shank at right angles to the sole",
+    ),
+    "a thigh from the horizontal": (moved(-90, "thigh"), "less than people's: from another zero? 0 is upright"),
+    "a thigh 60 deg ahead": (moved(60, "thigh"), "deg more than people's: from another zero?"),
+    "a knee from a bent leg": (moved(50, "knee"), "more than people's: from another zero? 0 is a straight leg"),
+    "the knee twice": (times(2, "knee"), "2 times as far as people's: another scale, or another joint's?"),
+    "the ankle three times": (times(3, "ankle"), "times as far as people's: another scale, or another joint's?"),
+    "the ankle's moment 1.9 times": (times(1.9, "ankle_moment"), "m, longer than a foot's: N m/kg and body weights?"),
+    "the same without forces": (
+        lambda curves: times(1.9, "ankle_moment")(only("thigh", "knee", "ankle", "ankle_moment")(curves)),
+        "times as far as people's: another scale",
+    ),
+    "thigh and knee interchanged": (interchanged("thigh", "knee"), "but like knee_flexion_deg: were columns"),
+    "knee and ankle interchanged": (interchanged("knee", "ankle"), "but like ankle_dorsiflexion_deg: were columns"),
+    "noise of 10 deg": (noisy(0.2, "knee"), "knee_flexion_deg jumps up and down from percent to percent: noise?"),
+    "noise on all": (noisy(0.2, *COLUMNS), "jumps up and down from percent to percent: noise?"),
+    "noise on moments": (noisy(0.2, *MOMENTS), "hip_moment_Nm_per_kg jumps up and down"),
+    "time backward": (backward(0, *COLUMNS), "people's backward in time: were the samples reversed?"),
+    "three angles backward": (backward(0, "thigh", "knee", "ankle"), "people's backward in time"),
+    "backward from toe-off": (backward(63, *COLUMNS), "people's backward in time"),
+    "the knee backward": (lambda c: c | backward(0, "knee")(c), "knee_flexion_deg is not like people's (r = -0.4"),
+    "the thigh of the other foot": (one_late(50, "thigh"), "thigh_flexion_deg is not like people's (r = -0.9"),
+    "the knee of the other foot": (one_late(50, "knee"), "knee_flexion_deg is not like people's (r = -0."),
+    "the ankle of the other foot": (one_late(50, "ankle"), "% of the stride late: of the other foot?"),
+    "the moment of the other foot": (one_late(50, "hip_moment"), "% of the stride late: of the other foot?"),
+    "the force of the other foot": (one_late(50, "grf_forward"), "% of the stride late: of the other foot?"),
     "no force": (times(0, "grf_vertical"), "grf_vertical_bw is 0 throughout the stride: was it measured?"),
 }
 
@@ -125,14 +180,33 @@ def test_people_of_every_speed_are_taken_whatever_their_habits(tmp_path, somebod
     read_gait(file_of(tmp_path / "right.csv", people(speed, somebody)))
 
 
-@pytest.mark.parametrize("name", ["schedule", "constant", "quasi_stiffness", "thesis", "untrained"])
-def test_what_walks_here_can_be_walked_after(tmp_path, name):
-    gait = measure(record(*prepare(name, {"episode_seconds": 8.0}), name=name, episodes=1))
+WALKS = {
+    **{name: (name, {}) for name in ("schedule", "constant", "quasi_stiffness", "thesis", "untrained")},
+    "slow": ("schedule", {"speed": 0.6}),
+    "up a slope": ("schedule", {"slope_deg": 5.0}),
+    "limping": ("schedule", {"right_foot": "rigid_toe", "speed": 0.8}),
+    "on a passive foot": ("schedule", {"right_foot": "passive", "slope_deg": 4.0}),
+    "on a rigid foot": ("pretrained", {"right_foot": {"kind": "rigid", "adapted": "rigid"}}),
+}
+
+
+@pytest.mark.parametrize(("name", "settings"), WALKS.values(), ids=WALKS)
+def test_what_walks_here_can_be_walked_after(tmp_path, name, settings):
+    gait = measure(record(*prepare(name, {"episode_seconds": 8.0} | settings), name=name, episodes=1))
     for side, curves in enumerate(gait.feet):
         assert curves.count
         path = tmp_path / f"{side}.csv"
         write_gait_cycle(path, curves, gait.metrics)
         read_gait(path)
+
+
+REFERENCE = Path(__file__).resolve().parents[2] / "shared" / "reference" / "human_gait.csv"
+
+
+@pytest.mark.skipif(not REFERENCE.is_file(), reason="Bovi's data are not ours to publish")
+@pytest.mark.parametrize("condition", ["very_slow", "slow", "natural", "medium", "fast"])
+def test_the_people_themselves_are_taken(condition):
+    assert read_gait(REFERENCE, condition=condition).strides
 
 
 def test_who_insists_is_believed(tmp_path):
