@@ -7,7 +7,7 @@ from numbers import Integral
 from typing import Any
 
 from springfoot.envs.physics.simulation import MOST_THREADS
-from springfoot.envs.setting_checks import MOST_ENVIRONMENTS
+from springfoot.envs.setting_checks import MOST_ENVIRONMENTS, refusing_unknown
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.gait.errors import MOST_COUNT, SpringfootError, quoted, require_count, require_number
 
@@ -21,6 +21,7 @@ TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
 """The default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range where it is 0."""
 
 
+@refusing_unknown
 @dataclass(frozen=True, kw_only=True)
 class TrainingConfig:
     """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
+from dataclasses import fields
 from difflib import get_close_matches
+from functools import wraps
 from math import isfinite
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +19,8 @@ from springfoot.gait.stiffness import STIFFNESS_RANGE
 from springfoot.gait.walk_style import styles_of
 
 from .timing import CONTROL_WINDOW
+
+Settings = TypeVar("Settings")
 
 STIFFNESS_BOUNDS = (1e-3, STIFFNESS_RANGE[1])
 """Softest and stiffest spring of an action [N m/rad]; chosen: beyond, products of stiffnesses leave the numbers."""
@@ -66,6 +70,19 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
             likely = get_close_matches(name, [*names, *CONSTRUCTOR_ARGUMENTS], n=3, cutoff=0.5)
             which = f"likely: {', '.join(likely)}" if likely else f"valid: {', '.join(names)}"
             raise UnknownSettingError(f"got an unexpected keyword argument {name!r}, which is no setting; {which}")
+
+
+def refusing_unknown(settings: type[Settings]) -> type[Settings]:
+    """A dataclass of settings, made to refuse what is none of its fields as `check_names` does."""
+    made, names = settings.__init__, [item.name for item in fields(settings)]  # type: ignore[arg-type]
+
+    @wraps(made)
+    def checked(self: Any, *given: Any, **named: Any) -> None:
+        check_names(named, names)
+        made(self, *given, **named)
+
+    settings.__init__ = checked
+    return settings
 
 
 def check_start(start: Any) -> None:

@@ -23,7 +23,6 @@ from .setting_checks import (
     check_bounds,
     check_choice,
     check_guide,
-    check_names,
     check_people_file,
     check_range,
     check_span,
@@ -31,6 +30,7 @@ from .setting_checks import (
     check_weights,
     check_windows,
     plain,
+    refusing_unknown,
 )
 from .setting_themes import CONDITION_THEMES, THEMES
 from .timing import ACTION_STEP
@@ -72,6 +72,7 @@ _DRAWN = {"drawn": True}  # the setting makes something differ between episodes,
 _KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
 
 
+@refusing_unknown
 @dataclass(frozen=True, kw_only=True)
 class BipedSettings:
     """The walking task of the biped with segmented feet; raises `SpringfootError` for a bad value."""
@@ -267,7 +268,6 @@ def settings_from(**values: Any) -> BipedSettings:
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    check_names(values, [setting.name for setting in fields(BipedSettings)])
     values = {name: plain(value) for name, value in values.items()}
     values |= {name: foot_setting(name, values[name]) for name in FOOT_SETTINGS if name in values}
     if values.get("schedule") is not None:

@@ -33,7 +33,7 @@ class Limits(NamedTuple):
     """Least correlation with people's curve."""
 
 
-LIMITS = {
+CURVE_LIMITS = {
     "thigh": Limits(0.1, 2.5, 0.35),  # 0.43 to 1.76, 0.53
     "hip": Limits(0.1, 2.5, 0.35),  # 0.43 to 1.75, 0.53
     "knee": Limits(0.1, 1.75, 0.1),  # 0.49 to 1.45, 0.24
@@ -124,7 +124,7 @@ def _doubts(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterat
     sizes = {curve: float(np.ptp(mean[curve]) / np.ptp(usual[curve])) for curve in mean}
     yield from _rough(mean, usual)
     yield from _wrong_size(mean, sizes)
-    told = [curve for curve in mean if sizes[curve] >= LIMITS[curve].least]
+    told = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
     late = {curve: _likeness(mean[curve], usual[curve]) for curve in told}
     backward = {curve: _likeness(mean[curve][::-1], usual[curve]) for curve in told}
     yield from _at_another_time(late, backward)
@@ -134,7 +134,7 @@ def _doubts(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterat
     strange = [
         curve
         for curve in told
-        if late[curve][0] < LIMITS[curve].likeness
+        if late[curve][0] < CURVE_LIMITS[curve].likeness
         or (curve in SHAPED and late[curve][HALF_A_STRIDE].max() - late[curve][0] > HALF_GAIN)
     ]
     guesses = {curve: _guess(curve, mean[curve], usual, late[curve], backward[curve][0]) for curve in strange}
@@ -156,7 +156,7 @@ def _rough(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterato
 
 def _wrong_size(mean: Mapping[str, NDArray], sizes: Mapping[str, float]) -> Iterator[str]:
     for curve, size in sizes.items():
-        kind, (low, high, _) = _kind(curve), LIMITS[curve]
+        kind, (low, high, _) = _kind(curve), CURVE_LIMITS[curve]
         if curve == "ankle_moment" and "grf_vertical" not in mean:
             high = ALONE
         if size > high or (size < low and not _may_be_small(curve, sizes)):
@@ -172,8 +172,8 @@ def _wrong_size(mean: Mapping[str, NDArray], sizes: Mapping[str, float]) -> Iter
 
 def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
     """Whether there are walks in which the curve hardly moves: not if all of its kind do so, as in a wrong unit."""
-    rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < LIMITS["ankle"].least
-    others = [size >= LIMITS[each].least for each, size in sizes.items() if _kind(each) == _kind(curve)]
+    rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < CURVE_LIMITS["ankle"].least
+    others = [size >= CURVE_LIMITS[each].least for each, size in sizes.items() if _kind(each) == _kind(curve)]
     return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
 
 

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -13,6 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
+from springfoot.agents.config import TrainingConfig
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import DEFAULT_WEIGHTS, THEME_OF, THEMES, BipedSettings, settings_from, settings_to_json
@@ -219,6 +221,15 @@ def test_an_unknown_setting_is_refused_as_python_refuses_an_unknown_argument(mak
     with pytest.raises(TypeError, match=r"unexpected keyword argument 'frameskip', .*: height, mass, ") as caught:
         maker(frameskip=2)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("maker", [BipedSettings, lambda **given: replace(BipedSettings(), **given), TrainingConfig])
+def test_settings_made_in_python_refuse_an_unknown_name_likewise(maker):
+    with pytest.raises(
+        TypeError, match="got an unexpected keyword argument 'sed', which is no setting; likely: s"
+    ) as told:
+        maker(sed=1)
+    assert isinstance(told.value, SpringfootError)
 
 
 def started(env):
