@@ -14,13 +14,11 @@ from typing import Any, TypeVar
 import tyro
 
 from springfoot.gait.errors import SpringfootError, printable
-from springfoot.terminal import INTERRUPTED
+from springfoot.terminal import INTERRUPTED, TERMINATED
 
 from .baselines import FROZEN, SCHEDULE_SUFFIXES
 
 Flags = TypeVar("Flags")
-TERMINATED = 128 + 15
-"""Exit code after SIGTERM, as a shell gives it."""
 _NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
 """Errors of the system that end a writing: full, read-only, forbidden, broken, vanished."""
 _OURS = {

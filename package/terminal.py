@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 NARROWEST = 40
@@ -14,27 +15,31 @@ READER_LEFT = 128 + 13
 """Exit code after the reader of a pipe has left, as a shell gives it for a program that SIGPIPE ends."""
 
 
-INTERRUPTED = 128 + 2
-"""Exit code after Ctrl-C, as a shell gives it for a program that SIGINT ends."""
+INTERRUPTED, TERMINATED = 128 + 2, 128 + 15
+"""Exit codes after Ctrl-C and SIGTERM, as a shell gives them for a program that these end."""
+_SAID = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"ended by SIGTERM", TERMINATED)}
 
 
 def at_terminal(command: Callable[[], int]) -> int:
     """Run a command; returns its exit code, 141 where its reader left, 2 where its output cannot be written.
 
-    Until the command handles Ctrl-C itself, as it does once it writes anything, Ctrl-C ends the process with one line.
+    Until the command handles Ctrl-C and SIGTERM itself, as it does once it writes anything, they end the process with
+    one line.
     """
     in_main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, _end_at_once) if in_main else None
+    before = {number: signal.signal(number, _end_at_once) for number in _SAID} if in_main else {}
     try:
         return _written_out(command)
     finally:
-        if in_main:
-            signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
-def _end_at_once(_number: int, _frame: Any) -> None:
-    os.write(2, b"springfoot: interrupted before it began\n")
-    os._exit(INTERRUPTED)  # an exception is lost in some imports, and is a traceback in others
+def _end_at_once(number: int, _frame: Any) -> None:
+    said, code = _SAID[signal.Signals(number)]
+    with suppress(OSError):  # nobody reads it any more
+        os.write(2, b"springfoot: " + said + b"\n")
+    os._exit(code)  # an exception is lost in some imports, and is a traceback in others
 
 
 def _written_out(command: Callable[[], int]) -> int:

@@ -118,17 +118,25 @@ def test_two_trainings_into_one_folder_are_one_training(tmp_path):
     assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "finished"
 
 
-@pytest.mark.parametrize("delay", [0.2, 0.6])
-@pytest.mark.parametrize("script", [train, evaluate], ids=["train", "evaluate"])
-def test_ctrl_c_at_the_start_is_one_line_and_leaves_nothing(tmp_path, script, delay):
-    words = ["--out", "new"] if script is train else ["pretrained", "--out", "new"]
-    with subprocess.Popen([sys.executable, script.__file__, *words], cwd=tmp_path, stderr=subprocess.PIPE) as process:
+STARTS = {
+    "train": [train.__file__, "--out", "new"],
+    "evaluate": [evaluate.__file__, "pretrained", "--out", "new"],
+    "study": ["-c", "from springfoot.studies.command import main; exit(main())", "study", "criteria", "--out", "new"],
+}
+
+
+@pytest.mark.parametrize(
+    ("number", "delay", "said"), [(signal.SIGINT, 0.2, "interrupted"), (signal.SIGTERM, 0.5, "ended by SIGTERM")]
+)
+@pytest.mark.parametrize("words", STARTS.values(), ids=STARTS)
+def test_a_signal_at_the_start_is_one_line_and_leaves_nothing(tmp_path, words, number, delay, said):
+    with subprocess.Popen([sys.executable, *words], cwd=tmp_path, stderr=subprocess.PIPE) as process:
         time.sleep(delay)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         assert process.stderr is not None
         error = process.stderr.read().decode()
-    assert process.returncode == 130, error
-    assert error.count("\n") == 1 and "interrupted" in error
+    assert process.returncode == 128 + number, error
+    assert error.count("\n") == 1 and said in error
     assert list(tmp_path.iterdir()) == []
 
 
