@@ -37,6 +37,9 @@ def at_terminal(command: Callable[[], int]) -> int:
 
 def _end_at_once(number: int, _frame: Any) -> None:
     said, code = _SAID[signal.Signals(number)]
+    with suppress(OSError), open(f"/proc/self/task/{os.getpid()}/children", encoding="ascii") as children:  # Linux
+        for child in children.read().split():  # glfw asks a process about its library, which would print its own end
+            os.kill(int(child), signal.SIGKILL)
     with suppress(OSError):  # nobody reads it any more
         os.write(2, b"springfoot: " + said + b"\n")
     os._exit(code)  # an exception is lost in some imports, and is a traceback in others
