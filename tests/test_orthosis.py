@@ -12,7 +12,7 @@ from springfoot.evaluation.recording_feet import record_feet
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.studies.command import study_main
 from springfoot.studies.orthosis import EFFICIENCY, muscle_energy
-from springfoot.studies.orthosis_page import best_springs, directions, weakest_cure
+from springfoot.studies.orthosis_page import at_walked_speeds, best_springs, directions, weakest_cure
 
 
 def walk(foot, **given):
@@ -64,6 +64,21 @@ def test_the_best_spring_takes_least_energy_of_those_that_nobody_falls_with():
     assert none["best_Nm_deg"] is None
 
 
+def test_springs_are_compared_where_they_walk_equally_fast():
+    walks = []
+    for asked, slow, fast in ((1.2, (1.0, 4.0), (1.1, 4.1)), (1.4, (1.2, 5.0), (1.3, 5.3))):  # walked, energy
+        for spring, (walked, energy) in ((8.7, slow), (0.9, fast)):
+            walks += [row | {"walked_m_s": walked} for row in rows({spring: energy}, speed=asked)]
+    even = {row["spring_Nm_deg"]: row for row in at_walked_speeds(walks, (1.15,))}
+    assert even[8.7]["energy_J_kg_m"] == pytest.approx(4.75)
+    assert even[0.9]["energy_J_kg_m"] == pytest.approx(4.4)
+    assert best_springs(walks)[0]["best_Nm_deg"] == 8.7  # it is the slower walk that takes less
+    assert best_springs(list(even.values()))[0]["best_Nm_deg"] == 0.9
+    fallen = [row | {"falls": 0.2} if row["spring_Nm_deg"] == 0.9 else row for row in walks]
+    assert [row["falls"] for row in at_walked_speeds(fallen, (1.15,))] == [0.0, 1.0]
+    assert all(row["energy_J_kg_m"] is None for row in at_walked_speeds(walks, (1.5,)))
+
+
 def test_directions_have_their_sign():
     found = []
     for strength, least in ((0.2, 6.0), (0.3, 3.0), (0.4, 0.0)):
@@ -99,4 +114,4 @@ def test_quick_walks_and_the_same_command_writes_the_same_numbers(tmp_path):
     assert all(float(line["falls"]) == 1.0 for line in slack)  # a drop foot alone catches its toe
     text = (tmp_path / "one" / "feet.md").read_text()
     assert "<!-- WEAK BEGIN -->" in text
-    assert "Weakest that ends the falls" in text
+    assert "Weakest with which 0 of 1 fell" in text
