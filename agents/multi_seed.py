@@ -151,7 +151,9 @@ class _Trainings:
             self._running.remove(process)
         if process.returncode < 0 and not self.stopping:
             ended = signal.Signals(-process.returncode).name
-            said = f"{name}: its process was ended by {ended}; what it has saved is whole, in {folder}"
+            safe = f"springfoot train --resume {folder} goes on from what it has saved"
+            safe = safe if (folder / RUN).is_file() else "it had saved nothing yet"
+            said = f"{name}: its process was ended by {ended}; {safe}"
             print(said, file=sys.stderr, flush=True)
         return _row(config, folder, "interrupted" if self.stopping else "failed")
 

@@ -48,6 +48,11 @@ def require_past(record: Mapping[str, Any]) -> None:
         require_count("from_timesteps", session.get("from_timesteps", 0), 0)
 
 
+def runs_within(out: Path) -> list[Path]:
+    """Folders of the runs in a folder of several seeds, in the order of the seeds."""
+    return sorted((path.parent for path in out.glob(f"seed-*/{RUN}")), key=lambda path: (len(path.name), path.name))
+
+
 def write_record(out: Path, record: Mapping[str, Any]) -> None:
     """Write the record, whole or not at all."""
     write_atomically(out / RUN, sealed_object(dict(record)))

@@ -15,6 +15,8 @@ from .command_line import end_in_order, exit_code, parse, stopped_by
 from .config import PRESETS, TrainingConfig
 from .files import require_new
 from .flags import given, optional_flags
+from .policy import RUN
+from .run_record import runs_within
 
 PRESET = PRESETS["walk"]
 TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
@@ -68,7 +70,9 @@ def run_training(flags: TrainFlags) -> int:
         try:
             require_new(flags.out)
         except SpringfootError as error:
-            raise SpringfootError(f"{error}; to continue a run, give --resume {flags.out}") from None
+            runs = [flags.out] if (flags.out / RUN).is_file() else runs_within(flags.out)
+            further = f"; to continue a run, give {_likewise('--resume', runs)}" if runs else ""
+            raise SpringfootError(f"{error}{further}") from None
     if flags.seeds is not None:
         if flags.resume:
             raise SpringfootError("--seeds begins anew; continue each seed's own by --resume FOLDER/seed-N")
@@ -116,9 +120,16 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
     print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
     print(f"Next:    springfoot study seeds {out}/seed-*")
-    if record["status"] == "interrupted":
-        print(f"Or:      springfoot train --resume {out}/seed-N, for each N that was interrupted")
+    folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
+    if begun := [folder for folder in folders if (folder / RUN).is_file()]:
+        print(f"Or:      {_likewise('springfoot train --resume', begun)}")
     return {"finished": 0, "interrupted": stopped_by(record)}.get(record["status"], 1)
+
+
+def _likewise(words: str, folders: Sequence[Path]) -> str:
+    """A command of the first of some folders, and the names of the others."""
+    others = ", ".join(folder.name for folder in folders[1:])
+    return f"{words} {folders[0]}" + (f", then so with {others}" if others else "")
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:

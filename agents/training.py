@@ -19,7 +19,7 @@ from .files import remove_temporary, require_new
 from .ownership import owned
 from .policy import BEST, LAST, RUN
 from .run_pictures import GALLERY, pictures_of
-from .run_record import read_record
+from .run_record import read_record, runs_within
 from .session import BEST_FILE, Session
 from .training_callbacks import Onlooker
 
@@ -61,7 +61,9 @@ def resume(
     """
     out = Path(out)
     if not (out / RUN).is_file():
-        raise SpringfootError(f"{out} holds no run to continue: no {RUN} in it")
+        within = ", ".join(map(str, runs_within(out)))
+        several = f"; its runs are {within}" if within else ""
+        raise SpringfootError(f"{out} holds no run to continue: no {RUN} in it{several}")
     with owned(out):
         for folder in (out, out / GALLERY):
             remove_temporary(folder)

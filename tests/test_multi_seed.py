@@ -90,7 +90,7 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
         finally:
             process.kill()
     assert process.returncode == 128 + number, error
-    assert "Traceback" not in error and f"springfoot train --resume {folder}/seed-N" in out
+    assert "Traceback" not in error and f"Or:      springfoot train --resume {folder}/seed-0" in out
     record = json.loads((folder / seeds.SEEDS).read_text())
     assert record["status"] == "interrupted"
     assert record["seeds"][0]["status"] == "interrupted" and record["seeds"][0]["timesteps"] >= 1024
@@ -101,7 +101,8 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
 def test_a_process_that_is_killed_is_told_and_the_others_go_on(tmp_path):
     folder = tmp_path / "several"
     words = ["--out", str(folder), "--seeds", "2", "--timesteps", "8192", "--num-envs", "4", "--update-steps", "512"]
-    process = subprocess.Popen([sys.executable, str(SCRIPT), *words], stderr=subprocess.PIPE, text=True)
+    command, pipe = [sys.executable, str(SCRIPT), *words], subprocess.PIPE
+    process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
     while not (folder / "seed-0" / RUN).exists():
         assert process.poll() is None
         time.sleep(0.05)
@@ -109,11 +110,29 @@ def test_a_process_that_is_killed_is_told_and_the_others_go_on(tmp_path):
     for child in map(int, " ".join(children).split()):
         if str(folder / "seed-0") in Path(f"/proc/{child}/cmdline").read_text():
             os.kill(child, signal.SIGKILL)
-    _, error = process.communicate()
+    out, error = process.communicate()
     assert process.returncode == 1 and "Traceback" not in error
-    assert f"seed 0: its process was ended by SIGKILL; what it has saved is whole, in {folder / 'seed-0'}" in error
+    on = f"springfoot train --resume {folder / 'seed-0'}"
+    assert f"seed 0: its process was ended by SIGKILL; {on} goes on from what it has saved" in error
+    assert f"\nOr:      {on}\n" in out
     rows = json.loads((folder / seeds.SEEDS).read_text())["seeds"]
     assert [row["status"] for row in rows] == ["failed", "finished"]
+
+
+def test_what_goes_on_where_all_were_killed_is_named(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name in ("seed-10", "seed-9", "seed-11"):
+        (tmp_path / "many" / name).mkdir(parents=True)
+    assert main(monkeypatch, "--out", "many", "--seeds", 3) == 2
+    new = "train.py: error: many already exists; out must be a new or an empty folder"
+    assert capsys.readouterr().err == f"{new}\n"
+    for name in ("seed-10", "seed-9"):
+        (tmp_path / "many" / name / RUN).touch()
+    assert main(monkeypatch, "--out", "many", "--seeds", 3) == 2
+    assert capsys.readouterr().err == f"{new}; to continue a run, give --resume many/seed-9, then so with seed-10\n"
+    assert main(monkeypatch, "--resume", "many") == 2
+    error = "many holds no run to continue: no run.json in it; its runs are many/seed-9, many/seed-10"
+    assert capsys.readouterr().err == f"train.py: error: {error}\n"
 
 
 def test_ctrl_c_before_anything_runs_is_no_failure(tmp_path):

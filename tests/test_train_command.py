@@ -79,7 +79,7 @@ def test_flags_take_the_place_of_the_preset():
 
 
 def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
-    rows = [f"{percent},{10 + percent % 100},{name}" for name in ("slow", "fast") for percent in range(101)]
+    rows = [f"{percent},{10 + percent % 100 / 2},{name}" for name in ("slow", "fast") for percent in range(101)]
     (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
     own = flagged("--human", f"{tmp_path / 'mean.csv'}:fast")["human"]
     assert own["name"] == "mean.csv:fast" and list(own["mean"]) == ["knee"]
