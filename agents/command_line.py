@@ -19,6 +19,8 @@ from springfoot.terminal import INTERRUPTED, TERMINATED
 from .baselines import FROZEN, SCHEDULE_SUFFIXES
 
 Flags = TypeVar("Flags")
+LONGEST_WORD = 160
+"""Characters of a word in an error's line; longer ones are cut in their middle; chosen, two lines of a terminal."""
 _NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
 """Errors of the system that end a writing: full, read-only, forbidden, broken, vanished."""
 _OURS = {
@@ -42,7 +44,7 @@ def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flag
             return tyro.cli(flags, args=words, prog=program)
     except SystemExit as end:
         if end.code == 2:
-            print(f"{program}: error: {printable(_of_box(said.getvalue()))}", file=sys.stderr)
+            print(f"{program}: error: {_in_a_line(_of_box(said.getvalue()))}", file=sys.stderr)
         raise
 
 
@@ -75,7 +77,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
     except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
         raise
     except (SpringfootError, OSError, MemoryError) as error:
-        print(f"{name}: error: {printable(_told(error))}", file=sys.stderr)
+        print(f"{name}: error: {_in_a_line(_told(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
@@ -120,6 +122,12 @@ def _told(error: Exception) -> str:
     where = "" if error.filename is None else f": {error.filename}"
     safe = "; results are written whole or not at all" if error.errno in _NOT_WRITTEN else ""
     return f"{error.strerror}{where}{safe}"
+
+
+def _in_a_line(text: str) -> str:
+    """A line for a terminal, in which no word, as names of files are, is longer than `LONGEST_WORD`."""
+    half = LONGEST_WORD // 2 - 2
+    return re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: f"{word[0][:half]}...{word[0][-half:]}", printable(text))
 
 
 def policy_label(name: str) -> str:

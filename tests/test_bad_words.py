@@ -37,6 +37,8 @@ EVALUATE = [
     (["--reward-weights", "None"], "--reward-weights must be JSON text in braces or the name of a JSON file, got 'None'"),
     (["--schedule", '{"ankle": ' + "[" * 100_000], "--schedule must be JSON, but it is nested too deeply: '{\"ankle\": [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[..."),
     (["--human", "None"], "None must be a .csv, .mot, .sto or .c3d file"),
+    (["--human", "n" * 240 + ".csv"], f"no file {'n' * 78}...{'n' * 74}.csv"),
+    (["--out", "o" * 400], f"File name too long: {'o' * 78}...{'o' * 78}"),
     (["--out"], "--out needs a value"),
     (["-z"], "unrecognized options: -z"),
 ]
