@@ -1,7 +1,7 @@
 """Policies from elsewhere: an ONNX file, or a function of a module that the user names. Both take raw observations.
 
-An ONNX file is data, as a .safetensors file is: reading it executes nothing. `module:function` is the user's own code,
-and runs because the user typed its name; no file and no folder can ask for it.
+An ONNX file is data, as a .safetensors file is: reading it executes nothing but what onnxruntime computes.
+`module:function` is the user's own code, and runs because the user typed its name; no file or folder can ask for it.
 """
 
 import json
@@ -19,10 +19,12 @@ import numpy as np
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings import BipedSettings, settings_from
+from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError
 
 from .fingerprint import fingerprint, require_same
+from .onnx_process import INPUT_TYPES, one_line, onnx_session
 
 CONTRACT_KEY = "springfoot"
 """Key of an ONNX file's metadata under which an exported policy carries its contract."""
@@ -81,33 +83,28 @@ def onnx_policy(path: Path) -> ForeignPolicy:
 
     The input is (N, D), (1, D) or (D,), of float32 or float64. Its settings are those of the contract beside it, else
     of the contract inside it (exported policies carry theirs), else the defaults. Raises `SpringfootError`, one line,
-    without onnxruntime, for a file it does not run, for other widths, and for a contract that is wrong or of another
-    version of the environment.
+    without onnxruntime, for a file it does not run within the bounds of `onnx_process`, for other widths, and for a
+    contract that is wrong or of another version of the environment.
     """
     try:
-        import onnxruntime  # not above: an extra
+        import onnxruntime  # noqa: F401  # not above: an extra
     except ModuleNotFoundError as error:
         raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1  # more would compete with the physics'
-    options.log_severity_level = 4  # errors are raised, and told below
-    try:
-        session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # its classes have no common one
-        raise SpringfootError(f"{path} is not an ONNX file that onnxruntime runs: {_one_line(error)}") from None
+    session, fails = onnx_session(path, len(OBSERVATION))
     inputs, outputs = session.get_inputs(), [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
         names = ", ".join(each.name for each in inputs) or "none"
         raise SpringfootError(f"{path} has the inputs {names}; a policy has one, the observation")
-    types = {"tensor(float)": np.float32, "tensor(double)": np.float64}
     (given,) = inputs
-    if given.type not in types:
+    if given.type not in INPUT_TYPES:
         raise SpringfootError(f"{path}: its input must be of float32 or float64, is {given.type}")
     biped = _asked_by(path, session.get_modelmeta().custom_metadata_map.get(CONTRACT_KEY))
     width = len(biped.observation_names)
     if len(given.shape) not in (1, 2) or (isinstance(given.shape[-1], int) and given.shape[-1] != width):
         raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, given.shape))})")
-    output, dtype = "action" if "action" in outputs else outputs[0], types[given.type]
+    if fails:
+        raise SpringfootError(f"{path} fails on observations (2, {width}): {fails}")
+    output, dtype = "action" if "action" in outputs else outputs[0], INPUT_TYPES[given.type]
 
     def act(observation: NDArray) -> Any:
         return session.run([output], {given.name: np.ascontiguousarray(observation, dtype)})[0]
@@ -133,7 +130,7 @@ def function_policy(name: str) -> ForeignPolicy:
     try:
         module = import_module(module_name)
     except Exception as error:  # whatever the user's module raises
-        raise SpringfootError(f"{name}: cannot import {module_name}: {_one_line(error)}") from error
+        raise SpringfootError(f"{name}: cannot import {module_name}: {one_line(error)}") from error
     function = getattr(module, function_name, None)
     if not callable(function):
         place = getattr(module, "__file__", None) or "it"
@@ -158,7 +155,7 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
         biped = Biped(settings_from(**contract["settings"]), 1)
         stored = None if contract.get("fingerprint") is None else dict(contract["fingerprint"])
     except (KeyError, TypeError, ValueError, RecursionError) as error:
-        what = f"has no {error}" if isinstance(error, KeyError) else f"is not a contract: {_one_line(error)}"
+        what = f"has no {error}" if isinstance(error, KeyError) else f"is not a contract: {one_line(error)}"
         raise SpringfootError(f"{name} {what}") from None
     if stored is not None:
         require_same(path, stored, fingerprint(biped))
@@ -182,7 +179,7 @@ def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPo
         try:
             found = np.shape(act(given))
         except Exception as error:  # whatever the user's function raises
-            failed = failed or f"{name} fails on observations {given.shape}: {_one_line(error)}"
+            failed = failed or f"{name} fails on observations {given.shape}: {one_line(error)}"
             continue
         if found == wanted:
             policy = ForeignPolicy(name=name, settings=biped.settings, width=width, act=take)
@@ -190,8 +187,3 @@ def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPo
             return policy
         wrong = wrong or f"{name} must return actions {wanted} for observations {given.shape}, returned {found}"
     raise SpringfootError(wrong or failed)
-
-
-def _one_line(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    return text if isinstance(error, SpringfootError) else f"{type(error).__name__}: {text}"

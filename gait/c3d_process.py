@@ -1,13 +1,8 @@
-"""C3D files are read in a process of their own, with bounds on its memory and its time.
-
-ezc3d believes what a file says of itself: a few changed bytes make it ask for gigabytes, run for ever or crash. Here
-that ends the child, and the parent says so in one line. What comes back are arrays and JSON text, no pickles.
-"""
+"""C3D files are read in a process of their own (`bounded_process`); arrays and JSON text come back, no pickles."""
 
 import io
 import json
 import os
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from .bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, in_process
 from .cycle import Contacts
 from .errors import SpringfootError, quoted
 from .motion_files import Trial
 from .text_table import existing
 
-MOST_MEMORY, MOST_SECONDS, MOST_WAIT = 2**29, 60, 300
-"""Memory that reading a file may take beyond the imports [bytes], its processor time and its time on the clock [s];
-chosen. A file of ten minutes takes a tenth of them."""
 _CHILD = "from springfoot.gait.c3d_process import main; main()"
 
 
@@ -30,22 +23,12 @@ def c3d_trial(path: Path) -> Trial:
     """The walk in a C3D file, as `c3d_file.read_c3d` reads it; raises `SpringfootError` for what it cannot read."""
     if find_spec("ezc3d") is None:
         raise SpringfootError(f"{path.name}: reading C3D needs ezc3d; install springfoot[c3d]")
-    try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", _CHILD, str(existing(path).absolute())],  # -P: no modules of this folder
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=MOST_WAIT,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-        )
-    except subprocess.TimeoutExpired:
-        raise SpringfootError(f"{path.name} is damaged: reading it did not end within {MOST_WAIT} s") from None
-    if done.returncode:
+    said = in_process(_CHILD, str(existing(path).absolute()))
+    if said is None:
         raise SpringfootError(
             f"{path.name} is damaged: ezc3d crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"
         )
-    with np.load(io.BytesIO(done.stdout)) as file:
+    with np.load(io.BytesIO(said)) as file:
         arrays = dict(file)
     return _trial(json.loads(str(arrays.pop("header"))), arrays)
 
@@ -77,7 +60,7 @@ def main() -> None:
 
     out = os.dup(1)
     os.dup2(2, 1)  # what a library prints is not ours
-    _bound_resources()
+    bound_resources()
     arrays: dict[str, np.ndarray] = {}
     try:
         trial = read_c3d(Path(sys.argv[1]))
@@ -96,15 +79,3 @@ def main() -> None:
         buffer = io.BytesIO()
         np.savez(buffer, header=np.array(json.dumps(header)), **dict[str, Any](arrays))
         file.write(buffer.getvalue())
-
-
-def _bound_resources() -> None:
-    try:
-        import resource  # not on every system
-    except ImportError:
-        return
-    if Path("/proc/self/statm").exists():
-        used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + MOST_MEMORY, used + MOST_MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -3,12 +3,13 @@
 import json
 import subprocess
 import sys
+from resource import RUSAGE_SELF, getrusage
 
 import numpy as np
 import pytest
 from onnx import TensorProto, helper, numpy_helper, save_model
 
-from springfoot.agents import ForeignPolicy, load_policy
+from springfoot.agents import ForeignPolicy, load_policy, onnx_process
 from springfoot.agents.command_line import policy_label
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.task.observation import OBSERVATION
@@ -100,6 +101,44 @@ def test_an_onnx_file_that_is_no_policy_is_refused_with_one_line(how, said, tmp_
     with pytest.raises(SpringfootError) as refused:
         load_policy(path)
     assert str(refused.value).startswith(f"{path}{said}") and "\n" not in str(refused.value)
+
+
+def save_nodes(path, nodes):
+    """An ONNX file of `nodes`, which make the (N, 4) `action` of the `observation`."""
+    given = [helper.make_tensor_value_info("observation", TensorProto.FLOAT, ("N", D))]
+    made = [helper.make_tensor_value_info("action", TensorProto.FLOAT, ("N", 4))]
+    graph = helper.make_graph(nodes, "nodes", given, made)
+    save_model(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
+    return path
+
+
+def constant(name, values, kind=TensorProto.INT64):
+    return helper.make_node("Constant", [], [name], value=helper.make_tensor(name, kind, [len(values)], values))
+
+
+def test_an_onnx_file_that_would_fill_the_memory_is_one_line(tmp_path):
+    nodes = [constant("shape", [2**16, 2**15]), helper.make_node("ConstantOfShape", ["shape"], ["large"])]
+    nodes += [helper.make_node("ReduceMax", ["large"], ["zero"], keepdims=0)]
+    nodes += [constant("ends", [4]), constant("begin", [0]), constant("axis", [1])]
+    nodes += [helper.make_node("Slice", ["observation", "begin", "ends", "axis"], ["four"])]
+    nodes += [helper.make_node("Add", ["four", "zero"], ["action"])]
+    path, before = save_nodes(tmp_path / "mine.onnx", nodes), getrusage(RUSAGE_SELF).ru_maxrss
+    with pytest.raises(
+        SpringfootError, match=r"mine\.onnx (is damaged|is not an ONNX file|fails on).*allocat"
+    ) as refused:
+        load_policy(path)
+    assert "\n" not in str(refused.value) and getrusage(RUSAGE_SELF).ru_maxrss < before + 300 * 1024
+
+
+def test_an_onnx_file_that_is_too_large_or_crashes_the_library_is_one_line(tmp_path, monkeypatch):
+    path = tmp_path / "mine.onnx"
+    with path.open("wb") as file:
+        file.truncate(2**26 + 1)  # sparse
+    with pytest.raises(SpringfootError, match=r"mine\.onnx must have at most 67,108,864 bytes, has 67,108,865"):
+        load_policy(path)
+    monkeypatch.setattr(onnx_process, "_CHILD", "import os; os.abort()")
+    with pytest.raises(SpringfootError, match="is damaged: onnxruntime crashed on it, or took over 60 s or 512 MiB"):
+        load_policy(save_linear(path))
 
 
 @pytest.mark.parametrize("content", [b"", b"import springfoot\n" * 20, b"\x80\x04K\x01."])
