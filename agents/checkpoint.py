@@ -12,6 +12,7 @@ from typeguard import CollectionCheckStrategy, TypeCheckError, check_type
 
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 
+from .config import config_from_json
 from .learning_state import Learning
 from .run_record import require_past
 from .tensor_file import read_tensors, write_tensors
@@ -73,6 +74,7 @@ def _require_header(header: dict[str, Any]) -> None:
         check_type(header, Header, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
     except TypeCheckError as error:
         raise SpringfootError(f"in its header, {error}") from None
+    config_from_json(header["config"])
     require_count("timesteps", header["timesteps"], 0)
     require_number("seconds", header["seconds"], 0.0, unit="s")
     require_past(header["record"])

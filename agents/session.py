@@ -130,6 +130,9 @@ class Session(BaseCallback):
                     f"The best policy returns {again['return_mean']:.1f} in this task now", file=sys.stderr, flush=True
                 )
         settings = json.loads(json.dumps(config_to_json(self._config)))
+        before, now = header["config"].get("environment", {}), settings["environment"]
+        if changed := {name: value for name, value in before.items() if now.get(name) != value}:
+            session["changed_from"] = changed
         same = {**header["config"], "threads": 0} == {**settings, "threads": 0}
         if not (same and same_source(self._record["sessions"][-1], session) and "best" not in session):
             self._record["sessions"].append(session)

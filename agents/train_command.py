@@ -19,6 +19,8 @@ from .policy import RUN
 from .run_record import runs_within
 
 PRESET = PRESETS["walk"]
+RESUMED = {"timesteps", "threads", "reward_weights"}
+"""Settings that a run may be continued with others of."""
 TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
 FOLDER = tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")
 EnvironmentFlags = optional_flags("EnvironmentFlags", BipedSettings, PRESET.environment)
@@ -37,7 +39,7 @@ class TrainFlags:
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
     """Folder of a run to continue, with its saved settings, by the bits of one that nothing interrupted; --timesteps
-    is then how many more, and --threads may be others."""
+    is then how many more, --threads may be others, and --reward-weights others from there on."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""
@@ -79,13 +81,13 @@ def run_training(flags: TrainFlags) -> int:
         if "threads" in settings:
             raise SpringfootError("--seeds gives each seed one thread; drop --threads")
         require_count("seeds", flags.seeds)
-    if flags.resume and (fixed := sorted(set(settings) - {"timesteps", "threads"})):
+    if flags.resume and (fixed := sorted(set(settings) - RESUMED)):
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
         from . import training  # not above: torch takes seconds, and bad flags need not wait for it
 
         end_in_order()
-        folder, record = flags.resume, training.resume(flags.resume, settings.get("timesteps"), settings.get("threads"))
+        folder, record = flags.resume, training.resume(flags.resume, **settings)
     else:
         assert flags.out is not None
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))

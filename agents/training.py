@@ -7,10 +7,11 @@ after it, and all other files are made again from it when the run is resumed.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from springfoot.envs.settings import settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
 
 from .checkpoint import Checkpoint, newest_checkpoint
@@ -44,6 +45,7 @@ def resume(
     timesteps: int | None = None,
     threads: int | None = None,
     callbacks: Sequence[Onlooker] = (),
+    reward_weights: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """Continue the run in `out` with its saved settings; return what `run.json` holds.
 
@@ -53,6 +55,8 @@ def resume(
             None finishes an interrupted run.
         threads: of the physics in place of the saved ones; results are the same with any number.
         callbacks: as for `train`; their own state is theirs to keep.
+        reward_weights: of the reward from here on, the setting of that name in place of the saved one. The best policy
+            is measured anew by it, and the session in `run.json` keeps what was saved as `changed_from`.
 
     It goes on from the newest checkpoint that is whole, and ends with the bits of a run that nothing interrupted, on
     the same versions and a processor of the same instructions. Whatever an earlier end left undone in the folder is
@@ -73,6 +77,9 @@ def resume(
             raise SpringfootError(f"{out} holds no run to continue: no state-{record['timesteps']}.safetensors in it")
         done = found[0]["timesteps"] if found else 0
         config = config_from_json(record["config"])
+        if reward_weights is not None:
+            settings = settings_to_json(config.environment) | {"reward_weights": dict(reward_weights)}
+            config = dataclasses.replace(config, environment=settings_from(**settings))
         total = config.timesteps if timesteps is None else done + timesteps
         if total <= done and found and _in_order(out, record, found):
             raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")

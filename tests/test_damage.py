@@ -154,6 +154,8 @@ HEADERS = [
     ("seconds", 1e999, "Out of range float values are not JSON compliant"),
     ("timesteps", -1, "timesteps must be a whole number >= 0, got -1"),
     ("config", [], "in its header, value of key 'config' of dict is not a dict"),
+    ("config.environment", [], "springfoot.envs.settings.settings_from() argument after ** must be a mapping"),
+    ("config.seed", -1, "seed must be a whole number >= 0"),
     ("fingerprint.legs", 3, "in its header, value of key 'legs' of value of key 'fingerprint' of dict is not a"),
     ("record.sessions", [], "sessions must be one or more"),
     ("record.sessions", [1], "in its header, item 0 of value of key 'sessions' of value of key 'record' of dict is"),

@@ -20,6 +20,7 @@ from springfoot.agents.checkpoint import KEPT_CHECKPOINTS, checkpoints, newest_c
 from springfoot.agents.config import PRESETS, config_from_json
 from springfoot.agents.ownership import OWNER
 from springfoot.agents.run_record import read_record
+from springfoot.agents.train_command import train_main
 from springfoot.agents.training import resume, train
 from springfoot.gait.errors import SpringfootError
 
@@ -195,9 +196,11 @@ def test_killed_before_its_record_a_folder_is_still_new(tmp_path):
 
 def test_the_best_is_measured_anew_where_the_reward_has_changed(half, capsys):
     record = read_record(half)
-    record["config"]["environment"]["reward_weights"] = {"grf": 0.0, "pose": 0.0}
-    (half / "run.json").write_text(json.dumps(record))
-    after = resume(half)
+    words = ["--resume", str(half), "--reward-weights", '{"grf": 0.0, "pose": 0.0}']
+    assert train_main(words) == 0
+    after = read_record(half)
+    assert after["config"]["environment"]["reward_weights"] == {"grf": 0.0, "pose": 0.0}
+    assert after["sessions"][-1]["changed_from"] == {"reward_weights": {}}
     assert "The best policy returns" in capsys.readouterr().err
     told = after["sessions"][-1]
     assert (told["from_timesteps"], told["best"]["timesteps"]) == (1280, record["best"]["timesteps"])
