@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import tyro
 
-from springfoot.gait.errors import SpringfootError, printable
+from springfoot.gait.errors import SpringfootError, printable, quoted
 from springfoot.terminal import INTERRUPTED, TERMINATED
 
 from .baselines import FROZEN, SCHEDULE_SUFFIXES
@@ -69,14 +69,15 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
     read or written, or too little memory; 130 after Ctrl-C, 143 after SIGTERM, which says so in a line as well.
     """
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
+        if stream is not None:  # closed
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
     in_main = threading.current_thread() is threading.main_thread()
     before = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)] if in_main else []
     try:
         return work() or 0
     except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
         raise
-    except (SpringfootError, OSError, MemoryError) as error:
+    except (SpringfootError, OSError, MemoryError, UnicodeEncodeError) as error:
         print(f"{name}: error: {_in_a_line(_told(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -117,6 +118,9 @@ def _told(error: Exception) -> str:
     """What happened, and where files cannot be written what of them is safe."""
     if isinstance(error, MemoryError):
         return "not enough memory; results are written whole or not at all"
+    if isinstance(error, UnicodeEncodeError):
+        part = error.object[max(error.start - 40, 0) : error.end + 40]
+        return f"a name must be UTF-8 text, got {quoted(part, LONGEST_WORD)}"
     if not isinstance(error, OSError) or error.strerror is None:
         return str(error)
     where = "" if error.filename is None else f": {error.filename}"

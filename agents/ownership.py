@@ -42,6 +42,10 @@ def owned(folder: Path) -> Iterator[None]:
     Says so on standard error where it takes the folder over from a dead owner. Raises `SpringfootError`, with nothing
     changed, where it cannot be made, and `TakenError` where another process owns it.
     """
+    try:
+        str(folder).encode()
+    except UnicodeEncodeError:  # TensorBoard, JSON and pages could not name it
+        raise SpringfootError(f"cannot make the folder {folder}: its name must be UTF-8 text") from None
     path = folder / OWNER
     made: list[Path] = []
     try:
@@ -49,10 +53,15 @@ def owned(folder: Path) -> Iterator[None]:
         mine, over = True, threading.Event()
         try:
             former = _read(path)
-            elsewhere = former and not (locked and former.get("host") == socket.gethostname())
-            if elsewhere and (silent := max(time.time() - path.stat().st_mtime, 0.0)) < DEAD:
-                mine = False
-                raise TakenError(_taken(folder, former, f", last heard of {_span(silent)} ago"))
+            if former and (former.get("host") != socket.gethostname() or (not locked and _runs(former))):
+                silent = time.time() - path.stat().st_mtime
+                mine = silent >= DEAD
+                if silent < -DEAD:
+                    raise TakenError(
+                        _taken(folder, former, f", by a clock {_span(-silent)} ahead; remove {path} if not")
+                    )
+                if not mine:
+                    raise TakenError(_taken(folder, former, f", last heard of {_span(silent)} ago"))
             if former:
                 print(f"{folder}: taken over from {_named(former)}, which has ended", file=sys.stderr, flush=True)
             me = {"pid": os.getpid(), "host": socket.gethostname(), "began": datetime.now(UTC).isoformat()}
@@ -126,6 +135,17 @@ def _read(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def _runs(owner: dict[str, Any]) -> bool:
+    """Whether there is a process of that id on this host."""
+    try:
+        os.kill(int(owner["pid"]), 0)
+    except (ProcessLookupError, KeyError, TypeError, ValueError, OverflowError):
+        return False
+    except OSError:  # somebody else's
+        return True
+    return True
 
 
 def _taken(folder: Path, owner: dict[str, Any], more: str = "") -> str:

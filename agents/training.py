@@ -15,7 +15,7 @@ from springfoot.envs.settings import settings_from, settings_to_json
 from springfoot.gait.errors import SpringfootError
 
 from .checkpoint import Checkpoint, newest_checkpoint
-from .config import TrainingConfig, config_from_json
+from .config import TrainingConfig, config_from_json, config_to_json
 from .files import remove_temporary, require_new
 from .ownership import owned
 from .policy import BEST, LAST, RUN
@@ -83,8 +83,17 @@ def resume(
         total = config.timesteps if timesteps is None else done + timesteps
         if total <= done and found and _in_order(out, record, found):
             raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
+        if found:
+            _require_shape(out, found[0]["config"], config_to_json(config))
         told = found[0]["record"] if found else {"sessions": [], "evaluations": []}
         return Session(dataclasses.replace(config, timesteps=total), out, told, found, threads, callbacks).learn()
+
+
+def _require_shape(out: Path, trained: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+    """Raise `SpringfootError` where what a state has the shape of was changed in the record."""
+    for name in ("num_envs", "hidden"):
+        if trained[name] != asked[name]:
+            raise SpringfootError(f"{out} was trained with {name} {trained[name]}; its {RUN} says {asked[name]}")
 
 
 def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:

@@ -46,6 +46,11 @@ def _end_at_once(number: int, _frame: Any) -> None:
 
 
 def _written_out(command: Callable[[], int]) -> int:
+    for handle in (0, 1, 2):  # one that is closed would become that of a file, into which others then print
+        try:
+            os.fstat(handle)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by who started us
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115

@@ -211,6 +211,16 @@ def test_a_state_that_cannot_be_gone_on_from_is_one_line(run, tmp_path, place, v
         resume(folder, 64)
 
 
+@pytest.mark.parametrize(("name", "value"), [("num_envs", 8), ("hidden", [16])])
+def test_a_record_that_says_another_shape_than_was_trained_is_one_line(run, tmp_path, name, value):
+    folder = shutil.copytree(run, tmp_path / "run")
+    record = read_object(folder / "run.json", "record of a run")
+    trained = record["config"][name]
+    (folder / "run.json").write_text(json.dumps(record | {"config": record["config"] | {name: value}}))
+    with pytest.raises(SpringfootError, match=re.escape(f"{folder} was trained with {name} {trained}; its run.json")):
+        resume(folder, 64)
+
+
 def test_a_checkpoint_without_a_digest_is_passed_over(run, tmp_path, capsys):
     header, tensors = read_checkpoint(run / STATE)
     older = shutil.copyfile(run / STATE, tmp_path / STATE)

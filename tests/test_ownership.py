@@ -1,5 +1,6 @@
 """One owner a folder: two at once, dead owners, free names, and commands that signals end."""
 
+import errno
 import json
 import os
 import signal
@@ -13,8 +14,10 @@ import pytest
 import evaluate
 import train
 from springfoot.agents import ownership
+from springfoot.agents.command_line import exit_code
 from springfoot.agents.files import whole_folder
 from springfoot.agents.ownership import OWNER, TakenError, owned
+from springfoot.gait.errors import SpringfootError
 
 HOLD = """
 import sys, time
@@ -74,6 +77,31 @@ def test_an_owner_on_another_host_is_dead_after_a_while_without_a_sign_of_life(t
     else:
         with owned(tmp_path):
             assert "taken over from process 1 on elsewhere.invalid" in capsys.readouterr().err
+
+
+def test_an_owner_by_a_clock_far_ahead_is_told_with_what_to_remove(tmp_path):
+    (tmp_path / OWNER).write_text(json.dumps({"pid": 1, "host": "elsewhere.invalid", "began": "x"}))
+    ahead = time.time() + 3 * 86400
+    os.utime(tmp_path / OWNER, (ahead, ahead))
+    said = rf"by another process, by a clock 3 d ahead; remove {tmp_path / OWNER} if not; wait for it, or choose"
+    with pytest.raises(TakenError, match=said), owned(tmp_path):
+        raise AssertionError
+
+
+def test_without_locks_an_owner_is_dead_whose_process_has_ended(holder, tmp_path, monkeypatch, capsys):
+    def no_locks(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(ownership.fcntl, "flock", no_locks)
+    with (
+        pytest.raises(TakenError, match=rf"by process {holder.pid} on .*, last heard of \d+ s ago"),
+        owned(tmp_path / "run"),
+    ):
+        raise AssertionError
+    holder.kill()
+    holder.wait()
+    with owned(tmp_path / "run"):
+        assert f"taken over from process {holder.pid} on" in capsys.readouterr().err
 
 
 def test_free_names_are_taken_before_anything_is_written(tmp_path):
@@ -153,6 +181,14 @@ def test_a_signal_leaves_nothing_of_an_evaluation(tmp_path, number):
     assert process.returncode == 128 + number
     assert b"Traceback" not in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_no_text_is_one_line(tmp_path, capsys):
+    said = r"cannot make the folder .*\\udcff: its name must be UTF-8 text"
+    with pytest.raises(SpringfootError, match=said), owned(tmp_path / "bad\udcff"):
+        raise AssertionError
+    assert exit_code("name", lambda: (tmp_path / "text").write_text("bad\udcff", encoding="utf-8")) == 2
+    assert capsys.readouterr().err == "name: error: a name must be UTF-8 text, got 'bad\\udcff'\n"
 
 
 def test_a_read_only_parent_is_one_line(tmp_path):

@@ -29,6 +29,14 @@ def test_output_that_was_closed_or_is_full_ends_without_a_traceback():
         assert (done.returncode, done.stderr) == (2, said)
 
 
+def test_what_is_closed_becomes_no_file_of_ours_and_no_process_of_ours_misses_it():
+    said = "import os, subprocess, sys; from springfoot.terminal import at_terminal\n"
+    said += "child = [sys.executable, '-c', 'import os; [os.fstat(handle) for handle in range(3)]']\n"
+    said += "sys.exit(at_terminal(lambda: subprocess.run(child).returncode or open(os.devnull).fileno() < 3))"
+    done = subprocess.run(["sh", "-c", '"$@" <&- >&- 2>&-', "sh", sys.executable, "-c", said])
+    assert done.returncode == 0
+
+
 def test_help_ends_in_a_terminal_of_one_column():
     words = [*SPRINGFOOT, "evaluate", "--help"]
     done = subprocess.run(words, env=os.environ | {"COLUMNS": "1"}, capture_output=True, text=True)
