@@ -18,7 +18,8 @@ from .physics.foot import LOCK, Feet, Foot, FootJoint, Spring
 FOOT_SETTINGS = ("left_foot", "right_foot")
 """Names of the settings that are feet."""
 RIGID_TOE_STIFFNESS = 110.0
-"""Stiffness of the toe of a rigid foot [N m/rad]: the bend of a forefoot, the thesis's foot of Figure 1-b."""
+"""Stiffness of the toe of a rigid foot [N m/rad]: the bend of a forefoot; chosen, for a foot as that of the thesis's
+Figure 1-b, of which it says how little ankle and toe move, not how stiff they are."""
 
 
 class Number(NamedTuple):

@@ -24,9 +24,11 @@ from tqdm import tqdm
 from springfoot.agents.files import csv_text, write_atomically
 from springfoot.agents.flags import FootFlag, foot_given
 from springfoot.agents.markdown import table, text_of
-from springfoot.envs.adapted import ADAPTED, LEGS, without_person
-from springfoot.envs.control.leg_constants import TUNED_SPEED, constants_from, leg_constants
+from springfoot.envs.adapted import without_person
+from springfoot.envs.control.adapted_legs import person_constants
+from springfoot.envs.control.leg_constants import TUNED_SPEED, leg_constants
 from springfoot.envs.feet import SPRING_NUMBERS, foot_of, foot_setting, kind_of
+from springfoot.envs.physics.model import LEFT, RIGHT
 from springfoot.envs.setting_checks import LONGEST_EPISODE
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import SpringfootError, require_count, require_number
@@ -67,8 +69,8 @@ class Adapt(Study):
     speed: float = TUNED_SPEED
     """Walking speed [m/s]."""
     start: str = ""
-    """Name of a foot of the file to start from, its numbers too where `foot` is but its kind; empty: the committed walk
-    of sound feet."""
+    """Name of a foot of the file to start from, as its person walks at this speed, its numbers too where `foot` is but
+    its kind; empty: the committed walk of sound feet."""
     searches: tuple[int, ...] = (1, 2)
     """Which independent searches; search k has the seed `seed` + 1,000,000 (k - 1)."""
     generations: int = 80
@@ -81,6 +83,8 @@ class Adapt(Study):
     """Size of the pushes of the pushed walks [N]."""
     bend_deg: float | None = None
     """Range of the right toe beyond which a candidate pays for it [deg]; none unless given."""
+    bend_weight: float = 1.0
+    """How many times it pays for that."""
     seed: int = 0
     """Seed of the first search and its walks."""
     threads: int = 1
@@ -110,6 +114,7 @@ class Adapt(Study):
         require_number("push_newton", self.push_newton, 0, unit="N")
         if self.bend_deg is not None:
             require_number("bend_deg", self.bend_deg, 0, unit="deg")
+        require_number("bend_weight", self.bend_weight, 0)
 
     @property
     def total(self) -> float:
@@ -157,9 +162,8 @@ class Adapt(Study):
             raise SpringfootError(f"no foot {self.start!r} to start from in {self.feet}; there are {', '.join(known)}")
         if foot == kind_of(known[self.start]):  # a word: the numbers found there
             foot = without_person(known[self.start])
-        sets = known[self.start][ADAPTED]
-        at = min(sets, key=lambda speed: abs(float(speed) - self.speed))
-        sound, other = (constants_from(dict(sets[at][leg])) for leg in LEGS)
+        walked = BipedSettings(speed=self.speed, right_foot=known[self.start])
+        sound, other = (person_constants(walked, self.speed, side) for side in (LEFT, RIGHT))
         return Person(sound=sound, other=other, foot=foot)
 
     def _search(
@@ -175,7 +179,7 @@ class Adapt(Study):
             vectors = strategy.ask()
             people = [space.person(vector) for vector in vectors]
             own = seed + 1000 * generation
-            paid = person_cost.cost(settings, people, own, self.threads, self.push_newton, bend)
+            paid = person_cost.cost(settings, people, own, self.threads, self.push_newton, bend, self.bend_weight)
             strategy.tell(vectors, list(paid))
             lines.append((generation + 1, float(paid.min()), float(np.median(paid))))
             progress(1)

@@ -1,7 +1,7 @@
 """Walks on feet that differ, and what a designer of feet asks of them."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -125,13 +125,3 @@ class Kept:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(self._path, (json.dumps(self._known, indent=1) + "\n").encode())
         return self._known[text]
-
-
-def better_in(ours: Mapping[str, float | None], theirs: Mapping[str, float | None]) -> Sequence[str]:
-    """Keys of `ASKED` in which `ours` is better than `theirs`; a number that is missing is worse."""
-    found = []
-    for each in ASKED:
-        own, other = ours[each.key], theirs[each.key]
-        if own is not None and (other is None or each.better * (own - other) > 0):
-            found.append(each.key)
-    return found

@@ -49,7 +49,7 @@ WALKED_SPEEDS = (0.8, 1.1, 1.4)
 """At which, walked, springs are compared [m/s]; between two speeds that are walked energy is linear."""
 DROP_SPEEDS = (0.8, 1.2, 1.6)
 """For which a walk with a drop foot is asked [m/s]."""
-PEOPLE = ("weak, 20 %", "drop")
+WHO_ADAPTED = ("weak, 20 %", "drop")
 """Names of the committed people who have adapted to such a foot."""
 SWING_SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
 """Stiffness of an orthosis for a drop foot [N m/rad]."""
@@ -137,7 +137,7 @@ class Orthosis(WalkingStudy):
         return rows
 
     def _adapted(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
-        """Walks on the feet of `PEOPLE`, of one who has not adapted and of one who has."""
+        """Walks on the feet of `WHO_ADAPTED`, of one who has not adapted and of one who has."""
         rows = []
         for name in self._people():
             bare = without_person(committed_feet()[name])
@@ -165,7 +165,7 @@ class Orthosis(WalkingStudy):
         return (1.2,) if self.quick else DROP_SPEEDS
 
     def _people(self) -> list[str]:
-        return [name for name in PEOPLE if name in committed_feet()]
+        return [name for name in WHO_ADAPTED if name in committed_feet()]
 
     def _walk(
         self, kept: Kept, given: Mapping[str, Any], feet: Sequence[dict[str, Any]], progress: OnProgress

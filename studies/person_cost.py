@@ -47,8 +47,10 @@ def cost(
     threads: int,
     push: float,
     bend: float | None = None,
+    bend_weight: float = 1.0,
 ) -> NDArray:
-    """(C,) what each person pays; `push` [N]; the range of the right toe beyond `bend` [rad] costs too, if given."""
+    """(C,) what each person pays; `push` [N]; the range of the right toe beyond `bend` [rad], if given, costs too,
+    `bend_weight` times."""
     settings = replace(settings, unevenness_m=UNEVENNESS, action_mode="residual")
     legs, right, feet = [p.sound for p in people], [p.other for p in people], [p.feet for p in people]
     total = np.zeros(len(people))
@@ -59,7 +61,7 @@ def cost(
         if lost > 0:
             total[index // LEVEL] += lost * 3 * FALL_COST / LEVEL
         else:
-            missed = misses(record, index, biped, bend)
+            missed = misses(record, index, biped, bend, bend_weight)
             total[index // LEVEL] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / LEVEL
     pushed = replace(settings, push_newton=push, push_interval=PUSH_INTERVAL)
     seeds = [seed + index % PUSHED for index in range(PUSHED * len(people))]
@@ -67,7 +69,9 @@ def cost(
     return total + FALL_COST * missing.reshape(len(people), PUSHED).mean(1)
 
 
-def misses(record: dict[str, NDArray], index: int, biped: Biped, bend: float | None = None) -> NDArray | None:
+def misses(
+    record: dict[str, NDArray], index: int, biped: Biped, bend: float | None = None, bend_weight: float = 1.0
+) -> NDArray | None:
     """What walk `index` misses in strides that begin after `SETTLED`, in tolerances; None if it takes too few."""
     human, mass, tick = biped.human, biped.body.mass, Biped.tick_dt
     first = round(SETTLED / tick)
@@ -83,7 +87,7 @@ def misses(record: dict[str, NDArray], index: int, biped: Biped, bend: float | N
         joints = np.column_stack([angle[:, HIP] - record["pitch"][:, index], angle[:, KNEE], angle[:, TOE]])
         curves = on_percent(joints, strides[:, 0], strides[:, 2], tick).mean(0)
         if side == RIGHT and bend is not None:
-            off["bend"].append(max(float(np.ptp(curves[:, 2])) - bend, 0.0))
+            off["bend"].append(bend_weight * max(float(np.ptp(curves[:, 2])) - bend, 0.0))
         for name, curve in zip(("thigh", "knee"), curves.T, strict=False):
             off[name].append(float(np.sqrt(np.mean((curve - human.mean(name, PERCENT / 100)) ** 2))))
         begin, leave, end = np.floor(strides / tick).astype(int).T

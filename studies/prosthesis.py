@@ -1,4 +1,4 @@
-"""What is a foot worth to the person who wears it on the right: rigid, the best passive spring, adaptive, intact?
+"""What is a foot worth to the person who wears it on the right: rigid, a passive spring, adaptive, intact?
 
     springfoot study prosthesis --page docs/feet.md
     springfoot study prosthesis --train --page docs/feet.md
@@ -6,7 +6,8 @@
 The feet and the people who have adapted to them are the committed ones of `springfoot study adapt`, two independent
 searches of each kind at the same budget: of the passive foot stiffness and rest angles too, of the adaptive one its
 schedule and rest angles. With --train a policy learns on each, from several seeds, as factors on the schedule that
-the search found; it sets the stiffness of the sound foot, and of the right one where that is adaptive.
+the search found; it sets the stiffness of the sound foot, and of the right one where that is adaptive. Walks for which
+nothing was trained are told in groups of episodes, for their spread.
 """
 
 import hashlib
@@ -26,11 +27,11 @@ from springfoot.agents.policy import BEST
 from springfoot.envs.adapted import ADAPTED, committed_feet, without_person
 from springfoot.envs.control.leg_constants import TUNED_SPEED
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
-from springfoot.gait.errors import SpringfootError
+from springfoot.gait.errors import SpringfootError, require_count
 
 from .adapt import kept_name
 from .foot_walks import PUSH_NEWTON, SCHEDULE, Kept, for_body, walked
-from .prosthesis_page import ADAPTED_ALONE, NOT_ADAPTED, WITH_POLICY, draw, sections, share_rows
+from .prosthesis_page import ADAPTED_ALONE, NOT_ADAPTED, TOE_HELD, WITH_POLICY, draw, sections, share_rows
 from .study import Answer, OnProgress
 from .trainings import TrainingStudy
 
@@ -51,14 +52,18 @@ STEPS = 150_000
 class Prosthesis(TrainingStudy):
     """Walk on each foot, with legs that have not adapted, legs that have, and policies trained on them."""
 
-    episodes: int = 10
-    """Episodes of each row, undisturbed, and as many pushed."""
+    episodes: int = 20
+    """Episodes of each walk, undisturbed, and as many pushed."""
+    groups: int = 5
+    """Groups in which those of a walk without training are told, in place of seeds of trainings."""
     seconds: float = 12.0
     """Length of each."""
+    seed: int = 500
+    """Seed of the first episode; no search has walked these."""
     seeds: int = 5
     """Seeds of the trainings."""
     episodes_elsewhere: int = 4
-    """Episodes of each row of other bodies and speeds."""
+    """Episodes of each walk of other bodies and speeds."""
     seeds_elsewhere: int = 1
     """Seeds of the trainings that walk there."""
     timesteps: int | None = STEPS
@@ -72,27 +77,34 @@ class Prosthesis(TrainingStudy):
     keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """File in which each row's numbers are kept, to go on after a stop."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "seeds": 1, "train": False, "keep": None}
+    QUICK: ClassVar[Mapping[str, Any]] = {
+        **{"episodes": 1, "groups": 1, "seconds": 6.0, "seeds": 1, "train": False, "keep": None}
+    }
+
+    def check(self) -> None:
+        """Refuse counts out of range, and groups of unequal size."""
+        super().check()
+        require_count("groups", self.groups)
+        if self.episodes % self.groups:
+            raise SpringfootError(f"episodes must be a multiple of groups, got {self.episodes} and {self.groups}")
 
     @property
     def total(self) -> float:
         """Simulated seconds without falls, of what is not kept."""
-        here = [_here(row) for row, _, _ in self._rows()]
-        episodes = sum(self.episodes if first else self.episodes_elsewhere for first in here)
-        return 2.0 * episodes * self.seconds
+        return 2.0 * self.seconds * sum(self._how(row)["episodes"] for row, _, _ in self._rows())
 
     def ask(self, progress: OnProgress) -> Answer:
         """Train what is asked for and missing, and walk."""
         failed = self._train() if self.train else False
         kept, rows = Kept(self.keep), []
         for row, policy, given in self._rows():
-            how = self.how if _here(row) else {**self.how, "episodes": self.episodes_elsewhere}
+            how = self._how(row)
             asked = [row, policy, _digest(policy, given), given, {**how, "threads": 0}, PUSH_NEWTON]
             found = kept.get(asked, lambda p=policy, g=given, h=how: walked(p, g, progress=progress, **h))
             rows.append({**row, **found})
         shares = share_rows(rows)
         columns = list(rows[0])
-        elsewhere = f"{self.episodes_elsewhere} episodes of each row, of {self.seeds_elsewhere} seeds"
+        elsewhere = f"{self.episodes_elsewhere} episodes of each, of {self.seeds_elsewhere} seeds of the trainings"
         text = sections(rows, shares, (self.what_ran, elsewhere), self.policies)
         files = {
             "prosthesis.csv": csv_text(columns, [[row[name] for name in columns] for row in rows]),
@@ -102,14 +114,24 @@ class Prosthesis(TrainingStudy):
         files = {name: content for name, content in files.items() if content}
         return Answer(text="\n\n".join(text.values()), files=files, sections=text, failed=failed)
 
+    def _how(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        """How the episodes of a row are recorded."""
+        if not (_here(row) or row["asked_m_s"] == _held_speed()):
+            return {**self.how, "episodes": self.episodes_elsewhere}
+        if row["person"] == WITH_POLICY:
+            return self.how
+        each = self.episodes // self.groups
+        return {**self.how, "episodes": each, "seed": self.seed + each * row["seed"]}
+
     def _rows(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """What a row is of, its policy, and its settings."""
+        """What a row is of, its policy, and its settings; `seed` is that of a training, or a group of episodes."""
         feet, quick = committed_feet(), self.quick
         for (height, mass), speed in PLACES[: 1 if quick else None]:
             given = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
             where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
-
-            yield _row("intact", NOT_ADAPTED, where), "pretrained", given
+            groups = range(self.groups if _here(where) else 1)
+            for group in groups:
+                yield _row("intact", NOT_ADAPTED, where, "", group), "pretrained", given
             for kind in WORN:
                 for search in SEARCHES:
                     name = kept_name(kind, search)
@@ -118,15 +140,32 @@ class Prosthesis(TrainingStudy):
                     bare = for_body(without_person(feet[name]), height, mass)
                     worn = {**bare, ADAPTED: name}
                     if kind != "adaptive":  # without its schedule nothing says what an adaptive one would do
-                        yield _row(kind, NOT_ADAPTED, where, search), "pretrained", {**given, "right_foot": bare}
+                        own = {**given, "right_foot": bare}
+                        for group in groups:
+                            yield _row(kind, NOT_ADAPTED, where, search, group), "pretrained", own
                     own = {**given, **SCHEDULE[1], "right_foot": worn}
-                    yield _row(kind, ADAPTED_ALONE, where, search), SCHEDULE[0], own
+                    for group in groups:
+                        yield _row(kind, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own
                     seeds = self.seeds if _here(where) else min(self.seeds, self.seeds_elsewhere)
                     for seed in range(seeds if kind in TRAINED else 0):
                         policy = self.policies / f"{kind}-{search}-{seed}.safetensors"
                         if policy.is_file():
                             its = {**given, "right_foot": worn}
                             yield _row(kind, WITH_POLICY, where, search, seed), str(policy), its
+        yield from self._held()
+
+    def _held(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
+        """The rigid foot whose toe is held, and the passive feet, at the speed at which it was found."""
+        if (speed := _held_speed()) is None:
+            return
+        (height, mass), feet = BODIES[0], committed_feet()
+        where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
+        found = [(TOE_HELD, "", TOE_HELD), *(("passive", search, kept_name("passive", search)) for search in SEARCHES)]
+        for foot, search, name in found:
+            worn = {**without_person(feet[name]), ADAPTED: name}
+            given = {"speed": speed, "episode_seconds": self.seconds, **SCHEDULE[1], "right_foot": worn}
+            for group in range(self.groups):
+                yield _row(foot, ADAPTED_ALONE, where, search, group), SCHEDULE[0], given
 
     def _train(self) -> bool:
         jobs = []
@@ -149,9 +188,12 @@ def _here(where: Mapping[str, Any]) -> bool:
     return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
 
 
-def _row(
-    foot: str, person: str, where: Mapping[str, float], search: int | str = "", seed: int | str = ""
-) -> dict[str, Any]:
+def _held_speed() -> float | None:
+    held = committed_feet().get(TOE_HELD)
+    return None if held is None else float(next(iter(held[ADAPTED])))
+
+
+def _row(foot: str, person: str, where: Mapping[str, float], search: int | str, seed: int) -> dict[str, Any]:
     return {"foot": foot, "person": person, "search": search, "seed": seed, **where}
 
 

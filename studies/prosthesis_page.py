@@ -12,52 +12,58 @@ from springfoot.agents.markdown import MISSING, table, text_of
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.gait.scores import mean_sd
 
-from .foot_walks import ASKED, PUSH_NEWTON, better_in, told_numbers
+from .foot_walks import ASKED, PUSH_NEWTON, Asked, told_numbers
 from .intervals import t_interval
 
 NOT_ADAPTED, ADAPTED_ALONE, WITH_POLICY = "not adapted", "adapted", "adapted, trained"
 """Whose walk a row is: of legs as with sound feet, sound side by `pretrained`; of the legs found, by their own
 schedule; the same by a trained policy."""
+TOE_HELD = "rigid, toe held"
+"""The committed rigid foot of a person who was made to hold its toe; they walk at a speed of their own."""
 WHERE = ("height_m", "mass_kg", "asked_m_s")
 COLORS = {"intact": "#555555", "rigid": "#7a5195", "passive": "#c26a1b", "adaptive": "#0b6e8f"}
 Row = Mapping[str, Any]
 
 
 def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """What adaptive stiffness changes against the best passive spring, by place, number and search, seeds paired.
+    """What adaptive stiffness changes against the passive spring found, by place, person, number and search, in pairs:
+    of the same seed of the trainings, or the same episodes where nobody learned.
 
     `share` is that change over the gap between the passive and the intact foot; where the intact one is not better,
-    or by no more than the interval of the gap over the seeds, there is no gap to close and no share. Of `both` searches
+    or by no more than the interval of the gap over the pairs, there is no gap to close and no share. Of `both` searches
     the intervals are over the means of each, as what a search finds differs more than what a seed does.
     """
     found = []
-    for where in dict.fromkeys(tuple(row[name] for name in WHERE) for row in rows):
-        here = [row for row in rows if tuple(row[name] for name in WHERE) == where]
-        intact = next(row for row in here if row["foot"] == "intact")
-        searches = sorted({row["search"] for row in here if row["person"] == WITH_POLICY})
-        groups = [(search, [search]) for search in searches]
-        groups += [("both", searches)] if len(searches) > 1 else []
-        for asked in ASKED:
-            for label, of in groups:
-                pairs = _pairs(here, asked.key, of)
-                line = dict(zip(WHERE, where, strict=True)) | {"number": asked.key, "search": label}
-                if label == "both":
-                    means = [own.mean(0) for each in of if len(own := _pairs(here, asked.key, [each]))]
-                    change = _change(np.array(means).reshape(-1, 2), intact[asked.key], asked.better, few=True)
-                else:
-                    change = _change(pairs, intact[asked.key], asked.better)
-                found.append(line | {"pairs": len(pairs)} | change)
+    for where in dict.fromkeys(_place(row) for row in rows):
+        here = [row for row in rows if _place(row) == where]
+        for person in (ADAPTED_ALONE, WITH_POLICY):
+            own = [row for row in here if row["person"] == person or row["foot"] == "intact"]
+            searches = sorted({row["search"] for row in own if row["foot"] == "adaptive"})
+            for asked in ASKED:
+                line = dict(zip(WHERE, where, strict=True)) | {"person": person, "number": asked.key}
+                found += [line | change for change in _changes(own, asked, searches)]
     return found
 
 
-def _pairs(rows: Sequence[Row], key: str, searches: Sequence[int]) -> np.ndarray:
-    """(n, 2) passive and adaptive of the same search and seed, where both have a number."""
-    values = {(row["foot"], row["search"], row["seed"]): row[key] for row in rows if row["person"] == WITH_POLICY}
-    pairs = [
-        (own, values[("adaptive", search, seed)])
-        for (foot, search, seed), own in values.items()
-        if foot == "passive" and search in searches and ("adaptive", search, seed) in values
+def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list[dict[str, Any]]:
+    """Of each search by itself, and of both."""
+    known = [row[asked.key] for row in rows if row["foot"] == "intact" and row[asked.key] is not None]
+    intact = float(np.mean(known)) if known else None
+    pairs = {each: pairs_of(rows, (("passive", each), ("adaptive", each)), asked.key) for each in searches}
+    found = [
+        {"search": search, "pairs": len(own)} | _change(own, intact, asked.better) for search, own in pairs.items()
     ]
+    if len(searches) > 1:
+        means = np.array([own.mean(0) for own in pairs.values() if len(own)]).reshape(-1, 2)
+        both = {"search": "both", "pairs": sum(map(len, pairs.values()))}
+        found.append(both | _change(means, intact, asked.better, few=True))
+    return found
+
+
+def pairs_of(rows: Sequence[Row], worn: Sequence[tuple[str, Any]], key: str) -> np.ndarray:
+    """(n, 2) a number of two feet, each with its search, in pairs of the same `seed` in which both have it."""
+    of = [{row["seed"]: row[key] for row in rows if (row["foot"], row["search"]) == each} for each in worn]
+    pairs = [(of[0][seed], of[1][seed]) for seed in of[0] if seed in of[1]]
     return np.array([pair for pair in pairs if None not in pair], float).reshape(-1, 2)
 
 
@@ -83,29 +89,41 @@ def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = Fa
 
 def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], policies: Path) -> dict[str, str]:
     """Sections of the page; `ran` says what was walked at the first place and at the others."""
-    first = tuple(rows[0][name] for name in WHERE)
-    here = [row for row in rows if tuple(row[name] for name in WHERE) == first]
-    head = ["foot", "person", "search", "seeds", "falls", "speed m/s", *(each.label for each in ASKED)]
-    lines = []
-    for (foot, person, search), group in _groups(here).items():
-        cells = [_mean(group, key, pattern) for key, pattern in told_numbers()]
-        seeds = str(len(group)) if person == WITH_POLICY else ""
-        lines.append([foot, person, str(search), seeds, *cells])
+    first = _place(rows[0])
+    here = [row for row in rows if _place(row) == first]
     note = (
-        f"{ran[0]} of each row (and seed), undisturbed and, for the last column, pushed by ±{PUSH_NEWTON:g} N; falls "
-        "as shares of episodes; numbers of walks that fell are of the strides before. Not adapted: legs of two sound "
-        "feet, stiffness by `pretrained`. Adapted: legs (and the foot's own numbers) of `springfoot study adapt`, "
-        "stiffness as its search left it. Trained: the same, stiffness by policies trained for a short time on it "
-        f"({policies}), mean ± SD over seeds. Cost of transport counts what a passive spring gives back as well."
+        f"{ran[0]} of each walk, undisturbed and, for the column `falls, pushed`, pushed by ±{PUSH_NEWTON:g} N; falls "
+        "as shares of episodes; numbers of walks that fell are of the strides before. Mean ± SD over rows of the CSV: "
+        "groups of the same episodes, or seeds of trainings. Not adapted: legs of two sound feet, stiffness by "
+        "`pretrained`. Adapted: legs (and the foot's own numbers) of `springfoot study adapt`, stiffness as its search "
+        f"left it. Trained: the same, stiffness by policies trained for a short time on it ({policies}). Cost of "
+        "transport counts what a passive spring gives back as well."
     )
-    text = {"PROSTHESIS": f"{_where(first)}\n\n{table([*head, 'ankle °', 'toe °'], lines)}\n\n{note}"}
-    if against := _passive_against_rigid(here):
+    text = {"PROSTHESIS": f"![Feet](prosthesis.png)\n\n{_where(first)}\n\n{_walks_table(here)}\n\n{note}"}
+    if against := _passive_against(here, "rigid"):
         text["PROSTHESIS"] += f"\n\n{against}"
+    if held := [row for row in rows if row["foot"] == TOE_HELD]:
+        own = [row for row in rows if _place(row) == _place(held[0])]
+        text["TOE-TOE_HELD"] = f"{_where(_place(held[0]))}\n\n{_walks_table(own)}\n\n{_passive_against(own, TOE_HELD)}"
+        rows = [row for row in rows if row not in own]
     if shares:
-        text["RECOVERED"] = _shares_text([row for row in shares if tuple(row[name] for name in WHERE) == first])
-    if len({tuple(row[name] for name in WHERE) for row in rows}) > 1:
+        text["RECOVERED"] = _shares_text([row for row in shares if _place(row) == first])
+    if len({_place(row) for row in rows}) > 1:
         text["PROSTHESIS-ELSEWHERE"] = _elsewhere(rows, ran[1])
-    return {name: f"![Feet](prosthesis.png)\n\n{own}" if name == "PROSTHESIS" else own for name, own in text.items()}
+    return text
+
+
+def _place(row: Row) -> tuple[float, ...]:
+    return tuple(row[name] for name in WHERE)
+
+
+def _walks_table(rows: Sequence[Row]) -> str:
+    head = ["foot", "person", "search", "rows", "falls", "speed m/s", *(each.label for each in ASKED)]
+    lines = []
+    for (foot, person, search), group in _groups(rows).items():
+        cells = [_mean(group, key, pattern) for key, pattern in told_numbers()]
+        lines.append([foot, person, str(search), str(len(group)), *cells])
+    return table([*head, "ankle °", "toe °"], lines)
 
 
 def _groups(rows: Sequence[Row]) -> dict[tuple[str, str, Any], list[Row]]:
@@ -124,20 +142,24 @@ def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
     return text if spread["sd"] is None or len(rows) < 2 else f"{text} ± {text_of(spread['sd'], pattern)}"
 
 
-def _passive_against_rigid(rows: Sequence[Row]) -> str:
-    told = []
-    for search in sorted({row["search"] for row in rows if row["person"] == ADAPTED_ALONE}):
-        pair = [
-            next(
-                (row for row in rows if (row["foot"], row["person"], row["search"]) == (foot, ADAPTED_ALONE, search)),
-                None,
-            )
-            for foot in ("passive", "rigid")
-        ]
-        if pair[0] and pair[1]:
-            better = better_in(pair[0], pair[1])
-            told.append(f"search {search}: in {len(better)} of {len(ASKED)} ({', '.join(better) or 'none'})")
-    return f"The best passive spring is better than the rigid foot, both adapted to, {'; '.join(told)}." if told else ""
+def _passive_against(rows: Sequence[Row], foot: str) -> str:
+    """In which numbers the passive feet found are better, person adapted to both; a foot with searches by search."""
+    own, told = [row for row in rows if row["person"] == ADAPTED_ALONE], []
+    theirs = {row["search"] for row in own if row["foot"] == foot}
+    for search in sorted({row["search"] for row in own if row["foot"] == "passive"}):
+        said: dict[str, list[str]] = {"better": [], "worse": [], "not told apart": []}
+        for asked in ASKED:
+            worn = (foot, search if search in theirs else ""), ("passive", search)
+            low, high = t_interval(asked.better * np.diff(pairs_of(own, worn, asked.key), axis=1).ravel())
+            said["better" if low > 0 else "worse" if high < 0 else "not told apart"].append(asked.label)
+        words = [f"{word} in {len(names)} ({'; '.join(names)})" for word, names in said.items() if names]
+        told.append(f"search {search}: {', '.join(words)}")
+    if not told or not theirs:
+        return ""
+    return (
+        f"Of {len(ASKED)} numbers the passive foot found is, against `{foot}`, the person adapted to each: "
+        f"{'; '.join(told)}; by 95 % intervals of the mean difference over the groups of episodes, Student's."
+    )
 
 
 def _shares_text(shares: Sequence[Row]) -> str:
@@ -147,12 +169,13 @@ def _shares_text(shares: Sequence[Row]) -> str:
         means = [text_of(row[name], asked.pattern) for name in ("passive", "adaptive", "intact")]
         change = _interval(row, "change", asked.pattern)
         share = _interval(row, "share", ".0%") if row["share"] is not None else "no gap"
-        lines.append([asked.label, str(row["search"]), str(row["pairs"]), *means, change, share])
-    head = ["", "search", "pairs", "best passive", "adaptive", "intact", "change", "share of the gap closed"]
+        lines.append([asked.label, row["person"], str(row["search"]), str(row["pairs"]), *means, change, share])
+    head = ["", "person", "search", "pairs", "passive, found", "adaptive", "intact", "change", "share of the gap"]
     return (
-        f"{table(head, lines)}\n\nTrained policies, adaptive less best passive of the same search and seed; 95 % "
-        "intervals of the mean, Student's, over seeds (`both`: over the means of the two searches). "
-        "More push-off work, and less of all else, is better. No gap: the intact foot is not better, or not told apart."
+        f"{table(head, lines)}\n\nAdaptive less passive of the same search, and of the same seed of the training or "
+        "the same episodes; 95 % intervals of the mean, Student's, over those pairs (`both`: over the means of the two "
+        "searches). More push-off work, and less of all else, is better. No gap: the intact foot is not better, or not "
+        "told apart."
     )
 
 
@@ -167,8 +190,8 @@ def _elsewhere(rows: Sequence[Row], ran: str) -> str:
     keys = [("falls", ".2f"), ("speed_m_s", ".2f"), ("falls_pushed", ".2f")]
     keys += [(each.key, each.pattern) for each in ASKED if each.key != "falls_pushed"]
     lines = []
-    for where in dict.fromkeys(tuple(row[name] for name in WHERE) for row in rows):
-        here = [row for row in rows if tuple(row[name] for name in WHERE) == where]
+    for where in dict.fromkeys(_place(row) for row in rows):
+        here = [row for row in rows if _place(row) == where]
         for foot in COLORS:
             group = [row for row in here if row["foot"] == foot]
             best = [row for row in group if row["person"] == WITH_POLICY]
@@ -177,12 +200,12 @@ def _elsewhere(rows: Sequence[Row], ran: str) -> str:
                 label = f"{foot}, {best[0]['person']}"
                 lines.append([_where(where), label, str(len(best)), *(_mean(best, *key) for key in keys)])
     labels = {each.key: each.label for each in ASKED} | {"falls": "falls", "speed_m_s": "speed m/s"}
-    head = ["where", "foot and person", "walks", *(labels[key] for key, _ in keys)]
+    head = ["where", "foot and person", "rows", *(labels[key] for key, _ in keys)]
     return (
-        f"{table(head, lines)}\n\nMeans ± SD over searches and seeds, {ran} but for the first place. Legs were "
-        "searched, and policies trained, at 1.2 m/s and 63 kg; at other speeds the legs are the committed ones of that "
-        "speed, moved as far as the search moved them at 1.2 m/s; other bodies wear springs as much stiffer as their "
-        "mass × height is larger."
+        f"{table(head, lines)}\n\nMeans ± SD over searches, and seeds or groups of episodes; {ran}, but for the first "
+        "place, which is that of the tables above. Legs were searched, and policies trained, at 1.2 m/s and 63 kg; at "
+        "other speeds the legs are the committed ones of that speed, moved as far as the search moved them at 1.2 m/s; "
+        "other bodies wear springs as much stiffer as their mass × height is larger."
     )
 
 
@@ -194,7 +217,7 @@ def _where(where: Sequence[float]) -> str:
 def draw(path: Path, rows: Sequence[Row]) -> None:
     """Write the picture: each number of each foot at the first place, a point a walk."""
     first = tuple(rows[0][name] for name in WHERE)
-    here = [row for row in rows if tuple(row[name] for name in WHERE) == first]
+    here = [row for row in rows if _place(row) == first]
     places = [
         ("intact", NOT_ADAPTED),
         *((foot, ADAPTED_ALONE) for foot in ("rigid", "passive", "adaptive")),
