@@ -18,6 +18,8 @@ from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
 PUSH_NEWTON = 150.0
 """Of the pushed walks [N]."""
+UNSEARCHED = 500
+"""Seed from which episodes are such as no search of `adapt` has walked: its own end in 0, 1 and 2 of a thousand."""
 SCHEDULE = "untrained", {"action_mode": "residual"}
 """The person's own fixed schedule, as a policy and settings."""
 

@@ -31,7 +31,7 @@ from springfoot.evaluation.recording_feet import record_feet
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.errors import require_count
 
-from .foot_walks import SCHEDULE, Kept, numbers_of, walked
+from .foot_walks import SCHEDULE, UNSEARCHED, Kept, numbers_of, walked
 from .orthosis_page import at_walked_speeds, best_springs, draw_drop, draw_weak, drop_text, people_text, weak_text
 from .study import Answer, OnProgress, WalkingStudy
 
@@ -93,6 +93,7 @@ class Orthosis(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with every spring."""
         kept, dropping = Kept(self.keep), replace(self, episodes=self.episodes_drop)
+        elsewhere = replace(dropping, seed=UNSEARCHED)
         weak, drop = self._weak(kept, progress), dropping._drop(kept, progress)
         even = at_walked_speeds(weak, (1.1,) if self.quick else WALKED_SPEEDS)
         best, as_asked = best_springs(even), best_springs([row for row in weak if row["speed_m_s"] in DROP_SPEEDS])
@@ -107,7 +108,7 @@ class Orthosis(WalkingStudy):
         text = {
             "WEAK": weak_text(weak, best, as_asked, self.what_ran),
             "DROP": drop_text(drop, self.episodes_drop, dropping.what_ran, self.push_newton),
-            "ADAPTED": people_text(dropping._adapted(kept, progress), dropping.what_ran, self.push_newton),
+            "ADAPTED": people_text(elsewhere._adapted(kept, progress), elsewhere.what_ran, self.push_newton),
         }
         text = {name: told for name, told in text.items() if told}
         return Answer(text="\n\n".join(text.values()), files=files, sections=text)

@@ -180,10 +180,15 @@ def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
     """The section of people who adapted; nothing where there are none."""
     head = ["right foot", "person", "falls", "speed m/s", *(each.label for each in ASKED), "ankle °", "toe °"]
     lines = [
-        [row["foot"], row["person"], *(text_of(row[key], pattern) for key, pattern in told_numbers())] for row in rows
+        [row["foot"], row["person"], *(_unless_all_fall(row, key, pattern) for key, pattern in told_numbers())]
+        for row in rows
     ]
     note = f"{what_ran}, undisturbed and, for `falls, pushed`, pushed by ±{push_newton:g} N; without an orthosis."
     return f"{table(head, lines)}\n\n{note}" if lines else ""
+
+
+def _unless_all_fall(row: Row, key: str, pattern: str) -> str:
+    return MISSING if row["falls"] == 1.0 and not key.startswith("falls") else text_of(row[key], pattern)
 
 
 def _cell(row: Row) -> str:

@@ -30,7 +30,7 @@ from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.errors import SpringfootError, require_count
 
 from .adapt import kept_name
-from .foot_walks import PUSH_NEWTON, SCHEDULE, Kept, for_body, walked
+from .foot_walks import PUSH_NEWTON, SCHEDULE, UNSEARCHED, Kept, for_body, walked
 from .prosthesis_page import ADAPTED_ALONE, NOT_ADAPTED, TOE_HELD, WITH_POLICY, draw, sections, share_rows
 from .study import Answer, OnProgress
 from .trainings import TrainingStudy
@@ -58,7 +58,7 @@ class Prosthesis(TrainingStudy):
     """Groups in which those of a walk without training are told, in place of seeds of trainings."""
     seconds: float = 12.0
     """Length of each."""
-    seed: int = 500
+    seed: int = UNSEARCHED
     """Seed of the first episode; no search has walked these."""
     seeds: int = 5
     """Seeds of the trainings."""

@@ -136,6 +136,23 @@ def test_the_same_seed_finds_the_same(tmp_path):
     assert "rigid, search 2" in json.loads((tmp_path / "0.json").read_text())["feet"]
 
 
+def test_a_search_that_was_stopped_is_searched_anew_and_a_finished_one_is_not(tmp_path, capsys, monkeypatch):
+    command = "springfoot study adapt --foot rigid --searches 1 --generations 1 --population 2 --episodes 1 --seconds 1"
+    known, to = tmp_path / "known.json", tmp_path / "to.json"
+    person = beginning("rigid", 1.2).setting(1.2)
+    known.write_text(json.dumps({"found_by": {"rigid": command}, "feet": {"rigid": person}}))
+    to.write_text(json.dumps({"found_by": {}, "feet": {"rigid": person}}))  # as a search leaves it half-way
+    words = ["adapt-all", "--feet", str(known), "--to", str(to), "--out", str(tmp_path / "out")]
+    assert study_main(words) == 0
+    found = json.loads(to.read_text())
+    assert found["found_by"] == {"rigid": command}
+    assert found["feet"]["rigid"] != person
+    assert "| rigid | other |" in capsys.readouterr().out
+    monkeypatch.setattr(person_cost, "cost", None)  # nothing is searched for again
+    assert study_main([*words[:-1], str(tmp_path / "again")]) == 0
+    assert json.loads(to.read_text()) == found
+
+
 def test_a_candidate_is_kept_with_its_foot_and_speed():
     person = beginning({"kind": "weak", "strength": 0.3}, 0.8)
     setting = person.setting(0.8)
