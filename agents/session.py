@@ -17,7 +17,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.settings import settings_to_json
 from springfoot.gait.errors import SpringfootError
 
-from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, write_checkpoint
+from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, checkpoints, write_checkpoint
 from .config import TrainingConfig, config_to_json
 from .files import write_atomically
 from .fingerprint import fingerprint, require_same
@@ -32,7 +32,7 @@ from .sb3_vec_env import SegmentedFootBipedVecEnv
 from .source import source
 from .stopping import Stopping
 from .training_callbacks import Onlooker, Onlookers, tell
-from .training_log import log_configuration
+from .training_log import log_configuration, no_word_of_writers
 
 EVALUATION_SEED = 2**30
 """Seed of the first episode of every periodic evaluation, the next ones following."""
@@ -76,6 +76,12 @@ class Session(BaseCallback):
 
     def learn(self) -> dict[str, Any]:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
+        with no_word_of_writers():
+            self._learn()
+        draw_run(self._out, self._record, self._evaluation, EVALUATION_SEED)
+        return self._record
+
+    def _learn(self) -> None:
         ppo, session = self.learner.ppo, {"from_timesteps": self._first, **source(PACKAGES)}
         logged = self._go_on(session)
         self._write_record("running")
@@ -93,11 +99,8 @@ class Session(BaseCallback):
                     ppo.learn(self._config.timesteps - self._first, onlookers, reset_num_timesteps=False)
                 self._save("finished" if self._finished else "interrupted")
         except OSError as error:
-            saved = (
-                f"resume goes on from its checkpoint after {self._kept[0]['timesteps']:,} timesteps"
-                if self._kept
-                else ""
-            )
+            found = checkpoints(self._out) if self._out.is_dir() else []
+            saved = f"resume goes on from {found[0].name}" if found else "nothing of it was saved"
             raise SpringfootError(f"{self._out}: {error.strerror or error}; {saved}") from None
         except Exception:
             self._write_record("failed")
@@ -106,8 +109,6 @@ class Session(BaseCallback):
             with suppress(OSError):
                 ppo.logger.close()
             self.learner.normalized.close()
-        draw_run(self._out, self._record, self._evaluation, EVALUATION_SEED)
-        return self._record
 
     def _go_on(self, session: dict[str, Any]) -> dict[str, Any]:
         """Put a new session into the state of the checkpoint, if there is one; returns what was yet to be logged.

@@ -1,12 +1,17 @@
 """What TensorBoard is told of a run beside its curves: the configuration, as a text and as hyperparameters."""
 
 import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from stable_baselines3.common.logger import HParam, Logger, TensorBoardOutputFormat
 
 from .config import TrainingConfig, config_to_json
 
+_WRITERS = "tensorboard"
+"""Package of the thread that writes events."""
 METRICS = ("evaluation/return_mean", "evaluation/falls", "evaluation/seconds_mean")
 """Curves that TensorBoard's table of hyperparameters holds the runs against."""
 
@@ -20,6 +25,22 @@ def log_configuration(logger: Logger, config: TrainingConfig) -> None:
         if isinstance(output, TensorBoardOutputFormat):
             both: dict[str, Any] = {"configuration": text, "hyperparameters": hyperparameters}
             output.write(both, dict.fromkeys(both, ()), 0)
+
+
+@contextmanager
+def no_word_of_writers() -> Iterator[None]:
+    """Within it no thread of TensorBoard's that cannot write prints a traceback: who waits for it raises that, too."""
+    before = threading.excepthook
+
+    def told(ended: threading.ExceptHookArgs) -> None:
+        if not (isinstance(ended.exc_value, OSError) and type(ended.thread).__module__.startswith(_WRITERS)):
+            before(ended)
+
+    threading.excepthook = told
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 def _flat(values: dict[str, Any], at: str = "") -> dict[str, bool | str | float | None]:

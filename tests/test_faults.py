@@ -52,6 +52,30 @@ def test_a_full_or_read_only_disk_is_one_line_and_leaves_nothing(tmp_path, optio
     assert done.stdout.strip().endswith(".:")  # nothing, hidden or not
 
 
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [("8k", "results are written whole or not at all"), ("240k", "resume goes on from state-0.safetensors")],
+)
+def test_a_disk_that_a_training_fills_is_one_line_and_keeps_what_was_saved(tmp_path, size, said):
+    words = [
+        "train",
+        "--out",
+        "new",
+        "--timesteps",
+        "4096",
+        "--num-envs",
+        "4",
+        "--update-steps",
+        "256",
+        "--threads",
+        "1",
+    ]
+    done = on_tmpfs(tmp_path, f"size={size}", *SPRINGFOOT, *words, "--eval-interval", "256", "--eval-episodes", "1")
+    (line,) = (line for line in done.stderr.strip().splitlines() if " of 4,096 steps" not in line)
+    assert done.returncode == 2 and line.startswith("springfoot train: error: ")
+    assert line.endswith(f"No space left on device; {said}")
+
+
 def test_a_folder_that_vanishes_meanwhile_is_one_line(tmp_path):
     parent = tmp_path / "runs"
     parent.mkdir()
