@@ -18,6 +18,8 @@ GRAVITY = 9.81
 
 REFERENCE_HEIGHT = 1.70
 """Height [m] of the thesis's body; `length_scale` is 1 here."""
+HEEL_RADIUS = 0.04
+"""Radius [m] of the heel's contact sphere at 1.70 m; chosen: a rounded heel with a soft pad at most 8 mm deep."""
 REFERENCE_MASS = 63.0
 """Mass [kg] of the thesis's body; `mass_scale` is 1 here."""
 

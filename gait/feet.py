@@ -18,6 +18,7 @@ from .arrays import NDArray
 from .body import Body
 from .errors import SpringfootError, require_within
 from .foot_style import FootStyle, peoples_style
+from .rockers import rising, rolling, turned, turning
 
 ROCKER_MARGIN = 0.005
 """The foot comes flat, and stays flat, this far of the ZMP's way before and after it needs to [m at 1.70 m]; chosen."""
@@ -82,10 +83,19 @@ class FootPath:
         )
 
     def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Back of the heel at the sole (x, z) [m]; on the floor from heel strike to heel-off."""
+        """Lowest point of the heel (x, z) [m], its back at the sole unless it is round; on the floor until heel-off."""
         x, z, pitch = self._jet(stride_phase)
-        back, down = turned(pitch, -self.body.heel_to_ankle, -self.body.ankle_height)
-        return x + back, z + down
+        back, down = turned(pitch, self.flat_heel, self._heel_radius - self.body.ankle_height)
+        return x + back, z + down - self._heel_radius
+
+    @property
+    def flat_heel(self) -> float:
+        """Where the heel touches the floor under a flat foot, x [m]."""
+        return self._heel_radius - self.body.heel_to_ankle
+
+    @property
+    def _heel_radius(self) -> float:
+        return self.style.heel_radius * self.body.length_scale
 
     def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
         """Ball of the foot above the floor [m]: the toe joint above its standing height."""
@@ -114,7 +124,8 @@ class FootPath:
     def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Rear and front end (x, x) [m] of what is on the ground in stance: heel, sole, toe joint to tip, then tip."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
-        heel, joint = -self.body.heel_to_ankle, self.body.ankle_to_toe_joint
+        joint = self.body.ankle_to_toe_joint
+        heel = self.flat_heel - self._heel_radius * self._heel_rocker(np.minimum(phase, self.foot_flat))[0, 2]
         tip = joint + self.body.toe_length
         rear = np.select([phase <= self.heel_off, phase <= self.tip_off], [heel, joint], tip)
         return rear, np.where(phase >= self.foot_flat, tip, heel)
@@ -142,13 +153,16 @@ class FootPath:
         pitch = self.heel_strike_pitch * left**power
         rate = -self.heel_strike_pitch * power / self.foot_flat * left ** (power - 1)
         curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * left ** (power - 2)
-        return _rolling(np.stack([pitch, rate, curvature]), (-self.body.heel_to_ankle, 0.0), self.body)
+        jet = rolling(np.stack([pitch, rate, curvature]), (self.flat_heel, self._heel_radius), self.body)
+        jet[:, 0] -= self._heel_radius * jet[:, 2]
+        return jet
 
     def _toe_rocker(self, phase: ArrayLike) -> NDArray:
         body = self.body
-        pitch = _rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, self.style.toe_rocker_power)
-        jet = _rolling(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
-        about_tip = _turning(self._roll(phase), -body.toe_length, body.toe_joint_height)
+        shape = self.style.heel_rise or self.style.toe_rocker_power
+        pitch = rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)
+        jet = rolling(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
+        about_tip = turning(self._roll(phase), -body.toe_length, body.toe_joint_height)
         about_tip[0, 0] += body.toe_length
         about_tip[0, 1] -= body.toe_joint_height
         jet[:, :2] += about_tip
@@ -158,7 +172,7 @@ class FootPath:
         """(3, ...): toe to ground over its tip [rad] and two phase derivatives."""
         if self.roll_pitch == 0:
             return np.zeros((3, *np.shape(phase)))
-        return _rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
+        return rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
 
     @cached_property
     def _swing(self) -> BSpline:
@@ -184,13 +198,14 @@ def feet_under_zmp(
 ) -> FootPath:
     """Feet whose rockers follow the ZMP, so that it stays on what is on the ground.
 
-    The ZMP runs straight between three points [m from the stance ankle] at three times [s]: heel strike, the other
-    foot's toe-off, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style`
+    The ZMP runs straight between points [m from the stance ankle] at times [s]: heel strike, the other foot's toe-off,
+    perhaps more, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style`
     takes the place of people's. Raises `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
     """
     margin = ROCKER_MARGIN * body.length_scale
-    heel, ball, toe_tip = -body.heel_to_ankle, body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
-    first, zmp_from, zmp_to = zmp_points
+    heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)
+    ball, toe_tip = body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
+    first, zmp_from, *_, zmp_to = zmp_points
     for name, value, low, high in (("start", zmp_from, heel, ball), ("end", zmp_to, ball + margin, toe_tip)):
         beyond = max(low - value, value - high)
         if not beyond < 0:
@@ -205,8 +220,12 @@ def feet_under_zmp(
         )
     stride_time = 2 * zmp_times[-1]
     flat, heel_off = np.interp([heel - margin, ball + margin], zmp_points, zmp_times) / stride_time
-    flat = max(float(flat), QUICKEST_FOOT_FLAT)
     toe_off = float(0.5 + zmp_times[1] / stride_time)
+    if style is not None and style.heel_off is not None:
+        heel_off = max(heel_off, 0.5 - 0.5 * style.heel_off)
+    if style is not None and style.flat is not None:
+        flat = min(flat, style.flat * (toe_off - 0.5))
+    flat = max(float(flat), QUICKEST_FOOT_FLAT)
     zmp_leaves_tip = float(np.interp(toe_tip + margin - step_length, zmp_points, zmp_times))
     rolls = roll > 0 if style is None else style.roll_pitch > 0
     tip_off = min(float(0.5 + zmp_leaves_tip / stride_time), toe_off) if rolls else toe_off
@@ -245,31 +264,3 @@ def refuse_swing_in_ground(feet: FootPath) -> None:
             f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "
             "a longer step, a longer double support or more clearance helps"
         )
-
-
-def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:
-    """The vector (forward, up) of a flat foot, in a foot at `pitch`."""
-    return forward * np.cos(pitch) - up * np.sin(pitch), forward * np.sin(pitch) + up * np.cos(pitch)
-
-
-def _rising(top: float, phase: ArrayLike, start: float, end: float, power: float) -> NDArray:
-    """(3, ...): 0 until `start`, then with a power to `top` at `end`, with two phase derivatives."""
-    lasts = end - start
-    done = np.maximum((np.asarray(phase) - start) / lasts, 0.0)
-    rate = top * power / lasts * done ** (power - 1)
-    return np.stack([top * done**power, rate, top * power * (power - 1) / lasts**2 * done ** (power - 2)])
-
-
-def _rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
-    """(3, 3, ...): x, z, pitch of an ankle whose foot turns about a point of its flat place, two phase derivatives."""
-    ankle = _turning(pitch, -pivot[0], body.ankle_height - pivot[1])
-    ankle[0, 0] += pivot[0]
-    ankle[0, 1] += pivot[1]
-    return np.concatenate([ankle, pitch[:, None]], axis=1)
-
-
-def _turning(pitch: NDArray, forward: float, up: float) -> NDArray:
-    """(3, 2, ...): the vector (forward, up) of a flat foot and its two phase derivatives; `pitch` (3, ...) with its."""
-    angle, rate, curvature = pitch
-    x, z = turned(angle, forward, up)
-    return np.stack([[x, z], [-z * rate, x * rate], [-z * curvature - x * rate**2, x * curvature - z * rate**2]])

@@ -50,7 +50,7 @@ class FootStyle:
     """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
     roll_pitch: float
     """Toe to ground at toe-off, as a positive number [rad]."""
-    toe_rocker_power: float
+    toe_rocker_power: float = 2.0
     """The heel rises with this power of the time since heel-off."""
     roll_power: float
     """The toe joint rises with this power of the time since the ZMP left the toe tip."""
@@ -60,6 +60,16 @@ class FootStyle:
     """Height of the ankle above the floor there [m at 1.70 m]."""
     via_pitch: tuple[float, float]
     """Pitch of the foot there [rad]."""
+    heel_rise: tuple[float, float] | None = None
+    """Share of the toe-off pitch that the foot has half-way from heel-off, and the rate of its pitch at toe-off over
+    the mean rate; None: `toe_rocker_power`."""
+    flat: float | None = None
+    """Part of double support after which the landed foot is flat; None: as the ZMP passes its heel."""
+    heel_radius: float = 0.0
+    """Of the heel on which the foot rolls as it lands [m at 1.70 m]; 0: it turns about the heel's back."""
+    heel_off: float | None = None
+    """Part of the step over which the heel rises before the other foot lands, unless the ZMP passes the toe joint
+    later; None: from when it passes."""
     toe_swing: float | None = None
     """Angle of the toe joint in swing [rad]; None: people's curve."""
 

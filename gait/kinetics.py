@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from .arrays import NDArray
 from .body import GRAVITY, Body, gravity
 from .errors import SpringfootError
-from .feet import turned
 from .fourier import PLAN_HARMONICS, fourier_jet
 from .human import ANGLES, HumanGait, human_cop
 from .leg import (
@@ -29,6 +28,7 @@ from .leg import (
 )
 from .plan import WalkPlan
 from .posture import POSTURE_SAMPLES
+from .rockers import turned
 from .scores import correlation
 
 ZMP_TOLERANCE = 1e-6
@@ -116,13 +116,14 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
 def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
     """Centres of pressure [m] of the rear and the front foot in double support, in the front foot's frame."""
     body, flat, end = plan.body, 2 * plan.feet.foot_flat, 2 * plan.feet.toe_off - 1
-    heel, tip = -body.heel_to_ankle, body.ankle_to_toe_joint + body.toe_length - plan.step_length
+    heel, tip = plan.feet.flat_heel, body.ankle_to_toe_joint + body.toe_length - plan.step_length
     at_start, at_flat, at_end = (float(plan.zmp(each)) for each in (0.0, flat, end))
     if at_flat > heel or tip >= at_end:
         return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
     rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)
     rear = np.interp(step_phase, [0.0, end - rolls], [at_start, tip])
-    return rear, np.interp(step_phase, [flat, end], [heel, at_end])
+    landing = plan.feet.on_ground(0.5 * np.minimum(step_phase, flat))[0]
+    return rear, np.where(step_phase < flat, landing, np.interp(step_phase, [flat, end], [heel, at_end]))
 
 
 def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:

@@ -17,8 +17,8 @@ from scipy.interpolate import CubicSpline
 from .arrays import NDArray
 from .body import Body, gravity
 from .errors import SpringfootError, require_number
-from .feet import turned
 from .human import ANGLES
+from .rockers import turned
 
 JOINTS = ("hip", "knee", "ankle", "toe")
 """Joints of a leg from the top; joint i holds segment i of `LEG_SEGMENTS`."""

@@ -26,23 +26,25 @@ ROUNDS = 60
 
 def spinning_legs(
     body: Body,
-    legs_at: Callable[[float, PPoly | None], tuple[ComMotion, LegPostures]],
+    legs_at: Callable[[float, PPoly], tuple[ComMotion, LegPostures]],
+    still: PPoly,
     step_length: float,
     knee: float,
     height: float | None = None,
 ) -> tuple[ComMotion, LegPostures]:
     """The CoM and the legs whose angular momentum it knows, as high as leaves every knee flexed by `knee` [rad].
 
-    `legs_at` plans for a CoM `height` [m], which may be given, and a pivot. Raises `SpringfootError` where they do not
+    `legs_at` plans for a CoM `height` [m], which may be given, and a pivot; `still` is that of legs that do not turn.
+    Raises `SpringfootError` where they do not
     settle.
     """
     reach, given = full_reach(body, knee), height
-    height, ahead = 1.05 * body.leg_length if given is None else given, None
+    height, ahead = 1.05 * body.leg_length if given is None else given, still
     for _ in range(ROUNDS):
         motion, legs = legs_at(height, ahead)
         lacking = float(legs.reach.max()) - reach if given is None else 0.0
         before, ahead = ahead, pivot_ahead(body, motion, legs, step_length)
-        moved = np.inf if before is None else float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
+        moved = float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
         if abs(lacking) < PLAN_SETTLED and moved < PLAN_SETTLED:
             return motion, legs
         height -= lacking

@@ -166,17 +166,25 @@ def plan_walk(
 
     roll = _roll(body, human, double_support, step_time, step_length) if style is None else 1.0
     zmp_from, zmp_to = _zmp_travel(body, zmp_travel, between(ZMP_TRAVEL, roll) if style is None else style.zmp_travel)
-    zmp_times = np.array([0.0, double_support, step_time])
-    zmp_points = np.array([zmp_to - step_length, zmp_from, zmp_to])
+    way = [] if style is None or style.zmp_way is None else style.zmp_way
+    on_way = double_support + np.arange(1, len(way) + 1) / (len(way) + 1) * (step_time - double_support)
+    zmp_times = np.array([0.0, double_support, *on_way, step_time])
+    passed = zmp_from + np.array(way) * (zmp_to - zmp_from)
+    zmp_points = np.array([zmp_to - step_length, zmp_from, *passed, zmp_to])
     feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance, style and style.foot)
 
+    last: list[LegPostures] = []
+
     def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
-        lowest_at = double_support / 2
+        lowest_at = double_support * (0.5 if style is None else style.lowest)
         motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, lowest_at, slope, ahead)
-        return motion, legs_under_com(body, motion, feet, human)
+        legs = legs_under_com(body, motion, feet, human, last[0] if last and ahead is not None else None)
+        last[:] = [legs]
+        return motion, legs
 
     if style is not None:
-        motion, legs = spinning_legs(body, legs_at, step_length, style.knee, com_height)
+        still = PPoly(np.zeros((1, 1)), np.array([0.0, step_time]))
+        motion, legs = spinning_legs(body, legs_at, still, step_length, style.knee, com_height)
     else:
         motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
     refuse_impossible_legs(body, legs)

@@ -12,6 +12,7 @@ from .body import GRAVITY, Body
 from .kinetics import planned_leg
 from .leg import JOINTS, inverse_dynamics
 from .plan import WalkPlan
+from .tissue import TENDON, passive_moments
 
 EFFORT_SAMPLES = 200
 """Samples of the stride; chosen."""
@@ -20,10 +21,12 @@ MUSCLE_EFFICIENCY = (0.25, 1.2)
 STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "toe": (0.015, 0.015)}
 """Largest moment in extension and flexion, plantarflexion and dorsiflexion, over body weight times height [-]; chosen,
 rounded: the order of the maximal voluntary moments of young adults on dynamometers; of the toe a guess."""
+VOLUME = {"hip": (0.25, 0.13), "knee": (0.25, 0.10), "ankle": (0.15, 0.033), "toe": (0.02, 0.015)}
+"""Muscle that extends and that flexes over all of the leg's, by volume [-]; rounded, after Handsfield et al., J.
+Biomech. 47 (2014) 631-638; of the toe a guess. Activation counts by it: what is small tires, but costs little."""
 ACTIVATION_TIME = 0.05
 """Time in which a muscle's activation follows its excitation [s]; chosen, as models of muscles have it."""
-TOE_TISSUE = 28.0
-"""Passive stiffness of a toe that is bent up [N m/rad] for 1.70 m and 63 kg: `stiffness.TOE_STIFFNESS`."""
+_ANKLE = JOINTS.index("ankle")
 MOTION_RANGE_DEG = {"knee": (0.0, 135.0), "ankle": (-48.0, 18.0), "toe": (-30.0, 70.0)}
 """Least and largest angle [deg], dorsiflexion and toe up positive: ranges of motion of the American Academy of
 Orthopaedic Surgeons (1965)."""
@@ -49,7 +52,21 @@ class PlanEffort:
         return self.work + self.activation + self.rate
 
 
-def effort_of(plan: WalkPlan) -> PlanEffort:
+@dataclass(frozen=True, kw_only=True)
+class Muscle:
+    """Factors on what is said of muscles, to see what it does."""
+
+    tissue: float = 1.0
+    """On passive moments (`tissue.passive_moments`)."""
+    tendon: float = 1.0
+    """On the give of the Achilles tendon."""
+
+
+AS_IS = Muscle()
+"""Muscles as said."""
+
+
+def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> PlanEffort:
     """The effort of a plan."""
     body, phase = plan.body, np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
     motion, load = planned_leg(plan, phase)
@@ -57,25 +74,33 @@ def effort_of(plan: WalkPlan) -> PlanEffort:
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
     angle, rate = (_joints(turns) for turns in (motion.turn, motion.rate))
     toe = JOINTS.index("toe")
+    moment = moment - muscle.tissue * passive_moments(body, angle)
     power = (-moment * rate)[:, :toe]
     tick, distance = plan.stride_time / EFFORT_SAMPLES, 2 * plan.step_length
+    pull = np.maximum(moment[:, _ANKLE], 0.0)
+    power[:, _ANKLE] += muscle.tendon * pull * _change(pull, tick) / (TENDON * body.stiffness_scale)
     spent = (
         np.maximum(power, 0.0).sum() / MUSCLE_EFFICIENCY[0] + np.maximum(-power, 0.0).sum() / MUSCLE_EFFICIENCY[1]
     ) * tick
-    moment[:, toe] -= TOE_TISSUE * body.stiffness_scale * np.maximum(angle[:, toe], 0.0)
     activation = moment / _strength(body, moment)
-    change = (np.roll(activation, -1, 0) - np.roll(activation, 1, 0)) / (2 * tick)
+    change = _change(activation, tick)
     bent = np.degrees(angle)
     beyond = 0.0
     for joint, (least, most) in MOTION_RANGE_DEG.items():
         own = bent[:, JOINTS.index(joint)]
         beyond += max(0.0, float(own.max()) - most) + max(0.0, least - float(own.min()))
+    weight = _of_groups(VOLUME, moment) / np.mean(list(VOLUME.values()))
     return PlanEffort(
         work=float(2 * spent / (body.total_mass * GRAVITY * distance)),
-        activation=float(2 * np.mean(activation**2, 0).sum()),
-        rate=float(2 * ACTIVATION_TIME**2 * np.mean(change**2, 0).sum()),
+        activation=float(2 * np.mean(weight * activation**2, 0).sum()),
+        rate=float(2 * ACTIVATION_TIME**2 * np.mean(weight * change**2, 0).sum()),
         beyond_range=beyond,
     )
+
+
+def _change(values: NDArray, tick: float) -> NDArray:
+    """Time derivative of what repeats itself every stride."""
+    return (np.roll(values, -1, 0) - np.roll(values, 1, 0)) / (2 * tick)
 
 
 def _joints(turns: NDArray) -> NDArray:
@@ -86,5 +111,10 @@ def _joints(turns: NDArray) -> NDArray:
 
 def _strength(body: Body, moment: NDArray) -> NDArray:
     """The strength [N m] against which each of the moments (..., 4) counts."""
-    extending, flexing = np.array([STRENGTH[joint] for joint in JOINTS]).T
-    return body.mass * GRAVITY * body.height * np.where(moment > 0.0, extending, flexing)
+    return body.mass * GRAVITY * body.height * _of_groups(STRENGTH, moment)
+
+
+def _of_groups(table: dict[str, tuple[float, float]], moment: NDArray) -> NDArray:
+    """(..., 4) what a table says of the muscles that make each of the moments (..., 4)."""
+    extending, flexing = np.array([table[joint] for joint in JOINTS]).T
+    return np.where(moment > 0.0, extending, flexing)

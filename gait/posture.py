@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from math import cos, degrees, hypot, sin, sqrt
 
 import numpy as np
@@ -11,8 +12,9 @@ from .arrays import NDArray
 from .body import Body
 from .cart_table import ComMotion
 from .errors import SpringfootError
-from .feet import FootPath, turned
+from .feet import FootPath
 from .human import HumanGait
+from .rockers import turned
 
 POSTURE_SAMPLES = 600
 """Samples of a stride; chosen."""
@@ -52,19 +54,29 @@ class LegPostures:
     reach: NDArray
 
 
-def legs_under_com(body: Body, motion: ComMotion, feet: FootPath, human: HumanGait) -> LegPostures:
-    """The posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one.
+def legs_under_com(
+    body: Body, motion: ComMotion, feet: FootPath, human: HumanGait, near: LegPostures | None = None
+) -> LegPostures:
+    """The posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one; sooner found `near`
+    one.
 
     Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
     """
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)
     com = np.stack([x + feet.step_length * (phase >= 0.5), z])
-    ankle = np.stack(feet.ankle(phase))
-    pitch = feet.pitch(phase)
-    toe = toe_angle(feet, human, phase)
+    ankle, pitch, toe = _feet_over_stride(feet, human)
     half = POSTURE_SAMPLES // 2
-    return legs_under(body, com, ankle, pitch, toe, lambda leg: leg + np.roll(leg, half, axis=-1), motion.slope)
+    return legs_under(
+        body, com, ankle, pitch, toe, lambda leg: leg + np.roll(leg, half, axis=-1), motion.slope, near and near.hip.T
+    )
+
+
+@lru_cache(maxsize=2)
+def _feet_over_stride(feet: FootPath, human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
+    """Ankle (2, samples), foot pitch and toe angle (samples,); kept, as one plan asks for them a dozen times."""
+    phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
+    return np.stack(feet.ankle(phase)), feet.pitch(phase), toe_angle(feet, human, phase)
 
 
 def legs_under(
@@ -75,15 +87,16 @@ def legs_under(
     toe: NDArray,
     both: Callable[[NDArray], NDArray],
     slope: float = 0.0,
+    near: NDArray | None = None,
 ) -> LegPostures:
     """The posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip.
 
     `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
-    length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2).
+    length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2);
+    `near` (2, ...) is where it is looked for first.
     """
     foot_and_toe = _foot_moment(body, pitch, toe)
-    hip = com.copy()
-    hip[1] -= 0.1 * body.leg_length
+    hip = com - np.array([0.0, 0.1 * body.leg_length])[:, *[None] * (com.ndim - 1)] if near is None else near
     trunk = hypot(*body.upper_moment) / body.total_mass
     # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
     for _ in range(60):

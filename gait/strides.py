@@ -9,10 +9,10 @@ from .arrays import NDArray
 from .body import GRAVITY, Body
 from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .errors import SpringfootError
-from .feet import turned
 from .human import COLUMNS, FORCES
 from .leg import FOOT_SEGMENT, joint_positions, segment_turns
 from .motion_files import Series, Trial, refuse_absurd
+from .rockers import turned
 
 FEWEST_STRIDES = 2
 """Fewest strides, of both feet together, for a mean and its spread."""

@@ -32,6 +32,10 @@ class WalkStyle:
     """Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]."""
     knee: float
     """Least knee flexion of the stride [rad], which sets the height of the CoM."""
+    zmp_way: tuple[float, float] | None = None
+    """Parts of its travel that the ZMP has done a third and two thirds through single support; None: these parts."""
+    lowest: float = 0.5
+    """Part of double support after which the CoM is lowest."""
     foot: FootStyle
     """How the feet roll and swing."""
 
@@ -57,6 +61,8 @@ def least_work(speed: float, file: Path | None = None) -> WalkStyle:
 
 
 def _mixed(low: Any, high: Any, weight: float) -> Any:
+    if low is None:
+        return None
     if isinstance(low, dict):
         return {name: _mixed(low[name], high[name], weight) for name in low}
     return (np.array(low) + weight * (np.array(high) - np.array(low))).tolist()

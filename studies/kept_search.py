@@ -25,7 +25,8 @@ NOT_ASKED = frozenset(
 
 def asked_of(study: Study) -> dict[str, Any]:
     """What a study that searches was asked for, as plain JSON values."""
-    return {name: value for name, value in vars(study).items() if name not in NOT_ASKED}
+    asked = {name: value for name, value in vars(study).items() if name not in NOT_ASKED}
+    return {name: str(value) if isinstance(value, Path) else value for name, value in asked.items()}
 
 
 def generations(

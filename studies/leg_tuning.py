@@ -136,6 +136,8 @@ class LegTuning(Study):
     """File of constants to read and to write."""
     plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """With guide plan: file of the plan's style, in place of the package's."""
+    people_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File of people's data, in place of the package's."""
     log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
 
@@ -180,6 +182,7 @@ class LegTuning(Study):
             feedforward=self.feedforward,
             guide=self.guide,
             plan_file=self.plan_file and str(self.plan_file),
+            people_file=self.people_file and str(self.people_file),
             episode_seconds=REFINED_SECONDS + 1,
         )
         human = reference_walk_at(settings, self.speed, [begin]).human

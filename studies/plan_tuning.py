@@ -19,39 +19,53 @@ from tqdm import tqdm
 
 from springfoot.agents.files import csv_text, write_atomically
 from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
+from springfoot.gait.body import HEEL_RADIUS, Body
 from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.gait.human import human_gait
 from springfoot.gait.plan import WalkPlan, plan_walk
-from springfoot.gait.plan_effort import PlanEffort, effort_of
-from springfoot.gait.walk_style import STYLES, WalkStyle, style_from
+from springfoot.gait.plan_effort import AS_IS, Muscle, PlanEffort, effort_of
+from springfoot.gait.plan_gait import gait_of
+from springfoot.gait.walk_style import STYLES, WalkStyle, least_work, style_from
 
 from .kept_search import asked_of, generations
+from .prediction_table import numbers_of, prediction_table
 from .study import Answer, OnProgress, Study
 
-CHOICES: dict[str, tuple[float, float, float]] = {
-    "double_support": (0.2, 0.05, 0.06),  # of the step time
-    "zmp_from": (0.0, 0.03, -0.06),  # m from the ankle
-    "zmp_to": (0.15, 0.02, 0.0),
-    "rise": (0.5, 0.2, 0.0),  # of the compass gait
-    "knee": (0.1, 0.05, 0.02),  # rad
-    "heel_strike_pitch": (0.2, 0.1, 0.01),  # rad
-    "toe_off_pitch": (0.8, 0.2, 0.1),
-    "roll_pitch": (0.3, 0.15, 0.0),
-    "toe_rocker_power": (2.5, 0.5, 2.0),  # below, the pitch's rate would jump
-    "roll_power": (2.5, 0.5, 2.0),
-    "via_forward_1": (1 / 3, 0.05, 0.0),  # of the way of the ankle
-    "via_forward_2": (2 / 3, 0.05, 0.0),
-    "via_up_1": (0.15, 0.03, 0.0),  # m
-    "via_up_2": (0.10, 0.02, 0.0),
-    "via_pitch_1": (-0.5, 0.25, -2.0),  # rad
-    "via_pitch_2": (0.0, 0.15, -2.0),
-    "toe_swing": (0.0, 0.1, -0.3),  # rad
+CHOICES: dict[str, tuple[float, float, float, float]] = {
+    "double_support": (0.2, 0.05, 0.06, 0.4),  # of the step time
+    "lowest": (0.5, 0.2, -0.5, 1.5),  # of double support
+    "zmp_from": (-0.02, 0.03, -0.08, 0.1),  # m from the ankle
+    "zmp_to": (0.14, 0.02, 0.0, 0.16),  # the front of the toe's contact
+    "zmp_way_1": (0.4, 0.1, 0.02, 0.97),  # of its travel
+    "zmp_way_2": (0.7, 0.1, 0.03, 0.98),
+    "rise": (0.5, 0.2, 0.0, 2.0),  # of the compass gait
+    "knee": (0.1, 0.05, 0.02, 1.0),  # rad
+    "heel_strike_pitch": (0.3, 0.1, 0.01, 1.0),  # rad
+    "flat": (0.5, 0.15, 0.1, 1.0),  # of double support
+    "heel_off": (0.2, 0.1, 0.0, 0.6),  # of the step
+    "toe_off_pitch": (0.8, 0.2, 0.1, 2.0),  # rad
+    "roll_pitch": (0.3, 0.15, 0.0, 2.0),
+    "heel_rise_1": (0.3, 0.08, 0.05, 0.6),
+    "heel_rise_2": (1.5, 0.4, 0.0, 4.0),
+    "roll_power": (2.5, 0.5, 2.0, 9.0),  # below, the pitch's rate would jump
+    "via_forward_1": (1 / 3, 0.05, 0.0, 1.0),  # of the way of the ankle
+    "via_forward_2": (2 / 3, 0.05, 0.0, 1.0),
+    "via_up_1": (0.15, 0.03, 0.0, 1.0),  # m
+    "via_up_2": (0.10, 0.02, 0.0, 1.0),
+    "via_pitch_1": (-0.5, 0.25, -2.0, 1.0),  # rad
+    "via_pitch_2": (0.0, 0.15, -2.0, 1.0),
+    "toe_swing": (0.0, 0.1, -0.3, 1.0),  # rad
 }
-"""What is chosen: where the search begins, one unit of it, and the least value."""
+"""What is chosen: where the search begins, one unit of it, the least and the largest value."""
+PAIRS = ("via_forward", "via_up", "via_pitch", "heel_rise")
+LEAST_ADVANCE = 0.005
+"""Least part of its travel that the ZMP does in the second third of single support [-]; chosen."""
 LEAST_CLEARANCE = 0.015
 """Least height of ball and heel in mid-swing [m at 1.70 m]; chosen, to clear uneven ground."""
 PER_METRE_LOW, PER_DEGREE, PER_UNIT = 200.0, 0.1, 10.0
-"""What a swing foot too low costs, a joint beyond its range, and a choice below its least value squared; chosen."""
+"""What a swing foot too low costs, a joint beyond its range, and a choice outside its bounds squared; chosen."""
+EVEN = (1.0, 1.0, 1.0)
+"""Weights of the terms of effort: they weigh alike; chosen."""
 IMPOSSIBLE = 30.0
 """What a plan that cannot be costs, besides how far its choices are from the start; chosen."""
 
@@ -59,30 +73,49 @@ IMPOSSIBLE = 30.0
 def style_at(vector: NDArray) -> WalkStyle:
     """The style at a vector of the search."""
     values = {}
-    for (name, (start, unit, least)), step in zip(CHOICES.items(), vector, strict=True):
-        values[name] = round(float(max(start + unit * step, least)), 5)
-    pairs = {
-        name: [values.pop(f"{name}_1"), values.pop(f"{name}_2")] for name in ("via_forward", "via_up", "via_pitch")
-    }
+    for (name, (start, unit, least, most)), step in zip(CHOICES.items(), vector, strict=True):
+        values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
+    pairs = {name: [values.pop(f"{name}_1"), values.pop(f"{name}_2")] for name in PAIRS}
     travel = [values.pop("zmp_from"), values.pop("zmp_to")]
-    walk = {name: values.pop(name) for name in ("double_support", "rise", "knee")}
-    return style_from(walk | {"zmp_travel": travel, "foot": values | pairs})
+    way = [values.pop("zmp_way_1"), values.pop("zmp_way_2")]
+    way[1] = max(way[1], way[0] + LEAST_ADVANCE)
+    walk = {name: values.pop(name) for name in ("double_support", "lowest", "rise", "knee")}
+    foot = values | pairs | {"heel_radius": HEEL_RADIUS}
+    return style_from(walk | {"zmp_travel": travel, "zmp_way": way, "foot": foot})
 
 
-def price(body: Body, speed: float, vector: NDArray) -> tuple[float, WalkPlan | None, PlanEffort | None]:
-    """What the plan at a vector costs, the plan and its effort; none for a plan that cannot be."""
-    below = sum(
-        max(0.0, least - start - unit * x) ** 2
-        for (start, unit, least), x in zip(CHOICES.values(), vector, strict=True)
+def vector_of(style: WalkStyle) -> NDArray:
+    """The vector of the search at a style of its own; the inverse of `style_at`."""
+    values: dict[str, Any] = style.to_json()
+    values |= values.pop("foot")
+    values["zmp_from"], values["zmp_to"] = values.pop("zmp_travel")
+    for name in (*PAIRS, "zmp_way"):
+        if values.get(name) is None:
+            raise SpringfootError(f"a search cannot begin at a style without {name}")
+        values[f"{name}_1"], values[f"{name}_2"] = values.pop(name)
+    return np.array([(values[name] - start) / unit for name, (start, unit, *_) in CHOICES.items()])
+
+
+def price(
+    body: Body, speed: float, vector: NDArray, weights: tuple[float, float, float] = EVEN, muscle: Muscle = AS_IS
+) -> tuple[float, WalkPlan | None, PlanEffort | None]:
+    """What the plan at a vector costs, the plan and its effort; none for a plan that cannot be.
+
+    `weights` are those of work, activation and its rate.
+    """
+    outside = sum(
+        max(0.0, least - start - unit * x, start + unit * x - most) ** 2
+        for (start, unit, least, most), x in zip(CHOICES.values(), vector, strict=True)
     )
     try:
         plan = plan_walk(body, speed, style=style_at(vector))
     except SpringfootError:
-        return IMPOSSIBLE + PER_UNIT * below + float(np.linalg.norm(vector)), None, None
-    effort = effort_of(plan)
+        return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
+    effort = effort_of(plan, muscle)
     lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())
     low = max(0.0, -0.001 - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
-    paid = effort.total + PER_METRE_LOW * low + PER_DEGREE * effort.beyond_range + PER_UNIT * below
+    terms = effort.work, effort.activation, effort.rate
+    paid = float(np.dot(weights, terms)) + PER_METRE_LOW * low + PER_DEGREE * effort.beyond_range + PER_UNIT * outside
     return paid, plan, effort
 
 
@@ -92,14 +125,22 @@ class PlanTuning(Study):
 
     speed: float = 1.2
     """Speed [m/s] at 1.70 m."""
-    generations: int = 120
+    generations: int = 200
     """Generations of the search."""
-    population: int = 14
+    population: int = 20
     """Candidates in each."""
     sigma: float = 0.5
     """First spread, in units of the search."""
     seed: int = 0
     """Seed of the search."""
+    weights: tuple[float, float, float] = EVEN
+    """Weights of work, of activation and of its rate."""
+    tissue: float = 1.0
+    """Factor on passive moments of tissue."""
+    tendon: float = 1.0
+    """Factor on the give of the Achilles tendon."""
+    start: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File of styles to begin at, in place of round numbers."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
     """File of styles to write to."""
     log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
@@ -114,6 +155,10 @@ class PlanTuning(Study):
         for count, least in (("generations", 1), ("population", 4), ("seed", 0)):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
+        for name in ("tissue", "tendon"):
+            require_number(name, getattr(self, name), 0)
+        for weight in self.weights:
+            require_number("weights", weight, 0)
 
     @property
     def total(self) -> float:
@@ -124,11 +169,12 @@ class PlanTuning(Study):
         """Search."""
         body = Body()
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
-        strategy = cma.CMAEvolutionStrategy(np.zeros(len(CHOICES)), self.sigma, options)
-        lines, best = [], (np.inf, np.zeros(len(CHOICES)))
+        begin = np.zeros(len(CHOICES)) if self.start is None else vector_of(least_work(self.speed, self.start))
+        strategy = cma.CMAEvolutionStrategy(begin, self.sigma, options)
+        lines, best = [], (np.inf, begin)
 
         def priced(_: int, vectors: list[NDArray]) -> NDArray:
-            return np.array([price(body, self.speed, vector)[0] for vector in vectors])
+            return np.array([self._price(body, vector)[0] for vector in vectors])
 
         for generation, vectors, paid in generations(strategy, self.generations, priced, self.log, asked_of(self)):
             best = min(best, (float(paid.min()), vectors[int(np.argmin(paid))]), key=lambda each: each[0])
@@ -136,11 +182,19 @@ class PlanTuning(Study):
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
-        cost, _, effort = price(body, self.speed, best[1])
+        cost, plan, effort = self._price(body, best[1])
         style = style_at(best[1])
         self._keep(style)
         text = f"{json.dumps(style.to_json())}\n\npaid {cost:.4f}: {effort}"
+        if plan is not None:
+            human = human_gait(self.speed)
+            columns = {"people": numbers_of(human, human), "the plan": numbers_of(gait_of(plan), human)}
+            text += f"\n\n{prediction_table(columns, ('the plan',))}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
+
+    def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, PlanEffort | None]:
+        muscle = Muscle(tissue=self.tissue, tendon=self.tendon)
+        return price(body, self.speed, vector, self.weights, muscle)
 
     def _keep(self, style: WalkStyle) -> None:
         """Write what was found, and the command that did, into the file of styles; with --quick nothing."""

@@ -8,6 +8,7 @@ folder `runs`; after a stop the same command goes on, with the bits of one that 
 """
 
 import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,13 +27,13 @@ from springfoot.agents.run_record import read_record
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import SpringfootError, require_count
 
-from .constants_file import write_constants
+from .constants_file import read_constants, write_constants
 from .generic_constants import GENERIC
 from .leg_tuning import LegTuning
 from .plan_tuning import PlanTuning
 from .prediction_table import people_numbers, plan_numbers, prediction_table, walk_numbers
 from .protocol import Protocol, measured
-from .study import Answer, OnProgress, WalkingStudy
+from .study import Answer, OnProgress, WalkingStudy, without_places
 
 FOUND = "found.json"
 """In the folder, the plan's style and the leg constants: a `plan_file` of the settings."""
@@ -50,7 +51,7 @@ class Predict(WalkingStudy):
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
     """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
-    plan_generations: int = 120
+    plan_generations: int = 200
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
     """Generations of the second stage, leg constants of walks without pushes."""
@@ -113,6 +114,7 @@ class Predict(WalkingStudy):
             population=self.population,
             seed=self.search_seed,
             styles=found,
+            command=without_places(self.command),
             log=self.folder / "plan.json",
         )
         walk = LegTuning(
@@ -126,6 +128,7 @@ class Predict(WalkingStudy):
             threads=self.threads,
             constants=found,
             plan_file=found,
+            command=without_places(self.command),
             log=self.folder / "walk.json",
         )
         pushed = replace(
@@ -140,10 +143,13 @@ class Predict(WalkingStudy):
         for name, search in (("plan", plan), ("walk", walk), ("walk, pushed", pushed)):
             text = stage(name, lambda search=search: search.ask(progress)).text
             (self.folder / f"{name.replace(', ', '-')}.txt").write_text(f"{text}\n", encoding="utf-8")
-        policy = self.folder / "policy"
+        # More generations of a search make other constants, and those another policy.
+        sets = read_constants(found)
+        digest = hashlib.sha256(json.dumps([sets["styles"], sets["constants"]]).encode()).hexdigest()
+        policy = self.folder / f"policy-{digest[:8]}"
         settings = replace(PRESETS["predict"].environment, plan_file=str(found))
         stage("policy", lambda: self._train(settings, policy))
-        text = stage("evaluation", lambda: self._evaluated(found, policy, settings))
+        text = stage("evaluation", lambda: self._evaluated(found, digest, policy, settings))
         spent = table(["stage", *took], [["seconds, this time", *(f"{each:.0f}" for each in took.values())]])
         return Answer(text=f"{text}\n\n{spent}", files={"prediction.md": f"{text}\n"}, sections={SECTION: text})
 
@@ -166,11 +172,10 @@ class Predict(WalkingStudy):
         if record["status"] == "interrupted":
             raise KeyboardInterrupt
 
-    def _evaluated(self, found: Path, policy: Path, settings: BipedSettings) -> str:
+    def _evaluated(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
         how = Protocol(
             episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads
         )
-        digest = hashlib.sha256(found.read_bytes()).hexdigest()
         given = {"guide": "plan", "plan_file": str(found)}
         columns = {"people": people_numbers(settings), "the plan": plan_numbers(settings)}
         pushed = []

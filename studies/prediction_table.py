@@ -62,14 +62,13 @@ def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
     """The numbers of `PREDICTION` of the plan that `settings` follow, from its own inverse dynamics."""
-    walk, human = reference_walk_at(settings, settings.speed), reference_gait(settings)
-    return _of_curves(walk.human, human, _positive_work(walk.human) / (2 * walk.plan.step_length))
+    return numbers_of(reference_walk_at(settings, settings.speed).human, reference_gait(settings))
 
 
 def people_numbers(settings: BipedSettings) -> dict[str, Any]:
     """The numbers of `PREDICTION` of people's mean curves."""
     human = reference_gait(settings)
-    return _of_curves(human, human, _positive_work(human) / (2 * human.step_length))
+    return numbers_of(human, human)
 
 
 def prediction_table(columns: Mapping[str, Mapping[str, Any]], held: Sequence[str]) -> str:
@@ -111,7 +110,8 @@ def _positive_work(gait: HumanGait) -> float:
     return 2 * float(stride_work(power, np.full(3, gait.stride_time))[0].sum()) / GRAVITY
 
 
-def _of_curves(gait: HumanGait, human: HumanGait, transport: float) -> dict[str, Any]:
+def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
+    """The numbers of `PREDICTION` of mean curves against people's; falls and speed are not known of them."""
     phase = PERCENT / 100
 
     def pair(name: str) -> tuple[Any, Any]:
@@ -135,5 +135,5 @@ def _of_curves(gait: HumanGait, human: HumanGait, transport: float) -> dict[str,
             joint: {"r": correlation(*pair(f"{joint}_moment")), "peak_Nm_kg": float(pair(f"{joint}_moment")[0].max())}
             for joint in ("hip", "ankle")
         },
-        "cost_of_transport": transport,
+        "cost_of_transport": _positive_work(gait) / (2 * gait.step_length),
     }

@@ -5,14 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.scrambled import scrambled
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.leg_constants import constants_name, leg_constants
 from springfoot.envs.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
 from springfoot.studies.generic_constants import generic_constants
 from springfoot.studies.leg_cost import cost
-
-from .test_people_file import scrambled
 
 PLAN = {"guide": "plan"}
 

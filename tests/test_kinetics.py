@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait, plan_walk
-from springfoot.gait.feet import turned
 from springfoot.gait.human import ANGLES, human_cop
 from springfoot.gait.kinetics import (
     foot_force,
@@ -19,6 +18,7 @@ from springfoot.gait.kinetics import (
     share_forces,
 )
 from springfoot.gait.leg import JOINTS, FootLoad, inverse_dynamics, joint_positions, leg_motion, load_at
+from springfoot.gait.rockers import turned
 
 REFERENCE = Path(__file__).resolve().parents[2] / "shared" / "reference"
 needs_data = pytest.mark.skipif(

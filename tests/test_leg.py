@@ -8,7 +8,6 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError
-from springfoot.gait.feet import turned
 from springfoot.gait.leg import (
     JOINTS,
     FootLoad,
@@ -19,6 +18,7 @@ from springfoot.gait.leg import (
     projection_moments,
     resultant,
 )
+from springfoot.gait.rockers import turned
 
 UNLOADED = FootLoad(force=np.zeros((2, 2)), point=np.zeros((2, 2)))
 

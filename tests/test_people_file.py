@@ -5,34 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.scrambled import scrambled
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, foot_curves
 from springfoot.envs.settings import BipedSettings, reference_gait, settings_from
 from springfoot.gait import SpringfootError, human_gait
 from springfoot.gait.fit_human import SPRING_HABITS
 from springfoot.gait.human import PEOPLE_FILE, foot_habits, human_cop
-
-
-def scrambled(seed=0):
-    """The package's file with noise in place of everything but speeds, step lengths and times."""
-    random, table = np.random.default_rng(seed), json.loads(PEOPLE_FILE.read_text(encoding="utf-8"))
-
-    def noise(value):
-        if isinstance(value, list):
-            return [noise(each) for each in value]
-        return value + 0.1 * random.standard_normal() if isinstance(value, float) else value
-
-    for kind in ("mean", "sd"):
-        table[kind] = {name: noise(rows) for name, rows in table[kind].items()}
-    for condition in table["conditions"]:
-        condition["toe_off_percent"] += random.uniform(1, 3)
-    table["cop"]["coefficients"] = noise(table["cop"]["coefficients"])
-    table["foot"]["plateaus"] = sorted(random.uniform(0, 0.9, 10).tolist())
-    table["foot"]["ankle_quasi_stiffness"] = random.uniform(50, 500, 5).tolist()
-    for name in ("toe_flat", "toe_off"):
-        table["foot"][name] = sorted((np.array(table["foot"][name]) + random.uniform(0, 0.02, 2)).tolist())
-    table["foot"]["toe_swing_deg"] = 3.0
-    return table
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait, plan_walk
-from springfoot.gait.feet import turned
 from springfoot.gait.plan import Cadence
 from springfoot.gait.posture import leg_angles
+from springfoot.gait.rockers import turned
 
 PHASE = np.arange(10_000) / 10_000
 

@@ -7,11 +7,11 @@ import pytest
 
 from springfoot.gait import Body, fit_feet, human_gait, plan_bout, plan_walk
 from springfoot.gait.com_plan import PEOPLES_SHARE
-from springfoot.gait.feet import turned
 from springfoot.gait.human import human_cop
 from springfoot.gait.kinetics import foot_force
 from springfoot.gait.plan import DOUBLE_SUPPORT, ZMP_TRAVEL, Cadence, WalkPlan
 from springfoot.gait.posture import toe_angle
+from springfoot.gait.rockers import turned
 
 GRID = np.arange(600) / 600
 """Where the table of angles is exact."""

@@ -7,13 +7,11 @@ from math import sqrt
 
 import mujoco
 
-from springfoot.gait.body import Body
+from springfoot.gait.body import HEEL_RADIUS, Body
 
 from ..timing import PHYSICS_STEP
 
 CONTACTS = ("heel", "ball", "toe")
-HEEL_RADIUS = 0.04
-"""Radius [m] of the heel's contact sphere at 1.70 m; chosen: a rounded heel with a soft pad at most 8 mm deep."""
 BALL_RADIUS, TOE_RADIUS = 0.02, 0.012
 """Radius [m] of the contact spheres at 1.70 m; chosen. The ball's is the height of the toe joint above the sole: its
 sphere sits on that joint and belongs to the toe, so that heel-off neither rolls it nor drags the toe over the floor."""
