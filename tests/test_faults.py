@@ -52,17 +52,24 @@ def test_a_full_or_read_only_disk_is_one_line_and_leaves_nothing(tmp_path, optio
     assert done.stdout.strip().endswith(".:")  # nothing, hidden or not
 
 
+FILLED = """
+"$0" "$@"
+echo code $? >&2
+mount -o remount,size=64m . && "$0" "$1" "$2" train --resume new
+"""
+"""A shell that trains until the disk is full, and goes on with more room."""
+
+
 @pytest.mark.parametrize(
-    ("size", "said"),
-    [("8k", "results are written whole or not at all"), ("240k", "resume goes on from state-0.safetensors")],
+    ("size", "said"), [("8k", "results are written whole or not at all"), ("240k", "goes on from state-0.safetensors")]
 )
-def test_a_disk_that_a_training_fills_is_one_line_and_keeps_what_was_saved(tmp_path, size, said):
+def test_a_disk_that_a_training_fills_is_one_line_and_it_goes_on_with_more_room(tmp_path, size, said):
     words = [
         "train",
         "--out",
         "new",
         "--timesteps",
-        "4096",
+        "1024",
         "--num-envs",
         "4",
         "--update-steps",
@@ -70,10 +77,12 @@ def test_a_disk_that_a_training_fills_is_one_line_and_keeps_what_was_saved(tmp_p
         "--threads",
         "1",
     ]
-    done = on_tmpfs(tmp_path, f"size={size}", *SPRINGFOOT, *words, "--eval-interval", "256", "--eval-episodes", "1")
-    (line,) = (line for line in done.stderr.strip().splitlines() if " of 4,096 steps" not in line)
-    assert done.returncode == 2 and line.startswith("springfoot train: error: ")
-    assert line.endswith(f"No space left on device; {said}")
+    words += ["--eval-interval", "256", "--eval-episodes", "1", "--episode-seconds", "1"]
+    done = on_tmpfs(tmp_path, f"size={size}", "sh", "-c", FILLED, *SPRINGFOOT, *words)
+    lines = [line for line in done.stderr.strip().splitlines() if " of 1,024 steps" not in line]
+    assert lines[0].startswith("springfoot train: error: ") and lines[0].endswith(f"{said}")
+    assert "No space left on device" in lines[0] and lines[1:] == ["code 2"]
+    assert done.returncode == 0 and "1,024 steps in" in done.stdout and "finished." in done.stdout
 
 
 def test_a_folder_that_vanishes_meanwhile_is_one_line(tmp_path):
