@@ -36,12 +36,12 @@ class Limits(NamedTuple):
 CURVE_LIMITS = {
     "thigh": Limits(0.1, 2.5, 0.35),  # 0.43 to 1.76, 0.53
     "hip": Limits(0.1, 2.5, 0.35),  # 0.43 to 1.75, 0.53
-    "knee": Limits(0.1, 1.75, 0.1),  # 0.49 to 1.45, 0.24
+    "knee": Limits(0.1, 1.75, -0.35),  # 0.49 to 1.45, -0.26
     "ankle": Limits(0.1, 2.2, -0.3),  # 0.23 (rigid 0.004) to 1.55, 0.02
-    "toe": Limits(0.1, 3.0, -0.7),  # 0.001 to 1.40, -0.47
+    "toe": Limits(0.1, 3.0, -0.85),  # 0.001 to 1.40, -0.72
     "hip_moment": Limits(0.1, 4.0, -0.3),  # 0.32 to 2.62, -0.01
     "knee_moment": Limits(0.1, 8.0, -0.7),  # 0.43 to 5.17, -0.54
-    "ankle_moment": Limits(0.1, 3.5, 0.25),  # 0.36 to 2.66, 0.34
+    "ankle_moment": Limits(0.1, 3.5, 0.1),  # 0.36 to 2.66, 0.18
     "hip_power": Limits(0.05, 10.0, -0.5),  # 0.25 to 4.80, -0.16
     "knee_power": Limits(0.05, 12.0, -0.7),  # 0.36 to 7.08, -0.44
     "ankle_power": Limits(0.05, 12.0, -0.5),  # 0.02 to 6.48, -0.09
@@ -50,7 +50,7 @@ CURVE_LIMITS = {
 }
 """Chosen. Behind each are the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits drawn as
 in the tests, and what walked here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5 deg,
-on all kinds of feet, of people who have adapted and who have not, each held against people of its speed and of 1.2."""
+on all kinds of feet, of people who have adapted and who have not, by people's curves or a plan of its own."""
 SMALL_MEANS_NOTHING = ("toe", "knee_moment", "hip_power", "knee_power", "ankle_power", "grf_forward")
 """Curves that some who walk hardly have; a rigid ankle is another, where its power tells so."""
 ALONE = 1.65
