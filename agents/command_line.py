@@ -21,6 +21,8 @@ from .baselines import FROZEN, SCHEDULE_SUFFIXES
 Flags = TypeVar("Flags")
 LONGEST_WORD = 160
 """Characters of a word in an error's line; longer ones are cut in their middle; chosen, two lines of a terminal."""
+LONGEST_LABEL = 60
+"""Letters of what results call a policy; chosen, in any script a folder may have so long a name."""
 _NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
 """Errors of the system that end a writing: full, read-only, forbidden, broken, vanished."""
 _OURS = {
@@ -135,10 +137,17 @@ def _in_a_line(text: str) -> str:
 
 
 def policy_label(name: str) -> str:
-    """What results call a policy: its own name, that of its run or that of its file, without folders."""
+    """What results call a policy: its own name, that of its run or that of its file, without folders.
+
+    It names a folder inside that of the results, whatever `name` is: printable, no path, not hidden, not too long.
+    """
     kind, _, other = name.partition(":")
-    if kind == FROZEN and other:
-        return f"{FROZEN}-{policy_label(other)}"
+    label = f"{FROZEN}-{policy_label(other)}" if kind == FROZEN and other else _own_name(name)
+    safe = "".join(letter if letter.isprintable() and letter not in "/\\" else "-" for letter in label)
+    return safe.lstrip(".")[:LONGEST_LABEL] or "policy"
+
+
+def _own_name(name: str) -> str:
     path = Path(name)
     if path.suffix not in (".safetensors", ".onnx", *SCHEDULE_SUFFIXES):
         return path.resolve().name.replace(":", "-").replace(",", "-")

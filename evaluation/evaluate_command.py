@@ -16,7 +16,7 @@ from springfoot.agents.command_line import end_in_order, exit_code, parse, polic
 from springfoot.agents.files import whole_folder
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.envs.physics.simulation import MOST_THREADS
-from springfoot.gait.errors import MOST_COUNT, SpringfootError, require_count
+from springfoot.gait.errors import MOST_COUNT, SpringfootError, printable, require_count
 
 LONGEST_NAME = 60
 """Letters of the policies' names in the name of a folder; chosen."""
@@ -69,7 +69,7 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     flags = parse(EvaluateFlags, words, program)
-    return exit_code(program, lambda: run_evaluation(flags, program, shlex.join([*program.split(), *words])))
+    return exit_code(program, lambda: run_evaluation(flags, program, printable(shlex.join([*program.split(), *words]))))
 
 
 def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> None:
@@ -117,7 +117,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                     progress=bar.update,
                 )
             own = folder if len(labels) == 1 else folder / label
-            own.mkdir(exist_ok=True)
+            own.mkdir(exist_ok=own == folder)
             with _bar(f"{label}, files", 1.0, delay=0.5) as bar:
                 gait = metrics.measure(episodes)
                 report.write_report(own, episodes, gait, bar.update)
@@ -134,8 +134,12 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
         gait_table.print_table(gait.metrics)
     for name in flags.policies:
         if has_feedback(name):
-            print(f"\nIts mean stiffness alone, open loop: {program} {FROZEN}:{name}, with the same flags")
-    gait_table.print_results(out, [*["report.html"] * flags.report, *["walk.mp4"] * flags.film, *report.FILES])
+            walk_again = f"{program} {shlex.quote(f'{FROZEN}:{name}')}"
+            print()
+            gait_table.print_words(f"Its mean stiffness alone, open loop: {walk_again}, with the same flags")
+    files = ", ".join([*["walk.mp4"] * flags.film, *report.FILES])
+    each = files if len(labels) == 1 else f"in each of the folders {', '.join(labels)}: {files}"
+    gait_table.print_results(out, [*["report.html"] * flags.report, each])
 
 
 def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
@@ -162,11 +166,13 @@ def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """What results call the policies, no two the same."""
+    """What results call the policies: no two the same, in capitals or not, and none as the page beside them."""
     labels: list[str] = []
+    taken = {"report.html"}
     for label in map(policy_label, names):
         number, free = 2, label
-        while free in labels:
+        while free.casefold() in taken:
             number, free = number + 1, f"{label}-{number}"
+        taken.add(free.casefold())
         labels.append(free)
     return labels

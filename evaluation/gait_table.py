@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from springfoot.agents.markdown import plus_minus, text_of
@@ -14,6 +15,7 @@ from springfoot.envs.settings import reference_gait, settings_from
 from springfoot.gait import HumanGait
 from springfoot.gait import scores as score
 from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import printable
 
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
@@ -22,7 +24,7 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     environment, people = metrics["environment"], metrics["reference"]
     pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
     console.print(
-        f"\n[bold]{metrics['policy']}[/] on {environment['height']:g} m, {environment['mass']:g} kg, "
+        f"\n[bold]{escape(metrics['policy'])}[/] on {environment['height']:g} m, {environment['mass']:g} kg, "
         f"{environment['speed']:g} m/s, equilibrium {environment['equilibrium']}{pushes}",
         soft_wrap=not console.is_terminal,
     )
@@ -45,7 +47,7 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         table.add_section()
     console.print(table)
     if metrics["per_leg"] is not None:
-        console.print(_leg_table(metrics))
+        console.print(_leg_table(metrics, narrow))
     for reason, count in metrics["fall_reasons"].items():
         console.print(f"{count} × {reason}")
     if environment["human"] is not None:
@@ -59,13 +61,15 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     )
 
 
-def _leg_table(metrics: dict[str, Any]) -> Table:
-    """The legs beside each other, where their feet differ."""
+def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
+    """The legs beside each other, where their feet differ; a foot's name may take two lines."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    for name in ("each leg", "", *(f"{side}: {kind}" for side, kind in metrics["feet"].items())):
-        table.add_column(name, justify="left" if name == "each leg" else "right", no_wrap=True)
-    for row in leg_rows(metrics):
-        table.add_row(*row)
+    for name in ("each leg",) if narrow else ("each leg", ""):
+        table.add_column(name, no_wrap=not narrow)
+    for side, kind in metrics["feet"].items():
+        table.add_column(f"{side}: {kind}", justify="right", min_width=len("-0.00"))
+    for label, unit, *values in leg_rows(metrics):
+        table.add_row(*([f"{label}, {unit}"] if narrow else [label, unit]), *values)
     return table
 
 
@@ -103,7 +107,13 @@ def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
 def print_results(out: Path, files: Sequence[str]) -> None:
     """Print where the results are: the place as it is, to be copied, and the names of the files."""
     print(f"\nResults: {out}")
-    Console(highlight=False).print(", ".join(files))
+    print_words(", ".join(files))
+
+
+def print_words(text: str) -> None:
+    """Print a sentence as it is, wrapped between words where the output is a terminal."""
+    console = Console(highlight=False, markup=False, emoji=False)
+    console.print(printable(text), soft_wrap=not console.is_terminal)
 
 
 NARROW = 76

@@ -76,6 +76,13 @@ def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
     print_table(gait.metrics, console)
     text = console.export_text()
     assert "feet: left intact, right passive" in text and "right: passive" in text and "ankle range" in text
+    narrow = Console(record=True, width=60, force_terminal=True, color_system=None)
+    print_table(gait.metrics, narrow)
+    lines = [" ".join(line.split()) for line in narrow.export_text().splitlines()]
+    assert not [line for line in lines if "…" in line or len(line) > 60]
+    for label in ("each leg", "vertical force, peak 1, BW", "vertical force, peak 2, BW", "ankle work, positive, J/kg"):
+        assert any(line.startswith(f"{label} ") for line in lines)
+    assert any(line.endswith("left: intact right: passive") for line in lines)
     with kept_figures() as figures:
         save_gait_figure(tmp_path / "gait.png", recording, gait)
     knee = next(ax for ax in figures["gait.png"].axes if ax.get_title(loc="left") == "Knee angle")

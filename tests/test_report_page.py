@@ -191,16 +191,24 @@ def test_a_name_is_text_and_nothing_else(tmp_path):
 
 def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    words = ["schedule", "constant", "schedule", "--episodes", "1", "--seconds", "5"]
+    names = ["schedule", "...csv", "schedule", "report.html.csv"]
+    for name in names[1::2]:
+        head = "percent,ankle_stiffness_Nm_per_rad,toe_stiffness_Nm_per_rad"
+        (tmp_path / name).write_text(f"{head}\n0,300,40\n", encoding="utf-8")
+    words = [*names, "--episodes", "1", "--seconds", "5"]
     assert evaluate_main(words) == 0
-    out = tmp_path / "runs" / "eval-schedule-constant-schedule-2-1"
-    assert {path.name for path in out.iterdir()} == {"schedule", "constant", "schedule-2", "report.html"}
+    assert {path.name for path in tmp_path.iterdir()} == {"...csv", "report.html.csv", "runs"}
+    labels = ["schedule", "policy", "schedule-2", "report.html-2"]
+    out = tmp_path / "runs" / f"eval-{'-'.join(labels)}-1"
+    assert {path.name for path in out.iterdir()} == {*labels, "report.html"}
     reader = Reader((out / "report.html").read_text(encoding="utf-8"))
     for policy in reader.data["policies"]:
         metrics = json.loads((out / policy["name"] / "metrics.json").read_text(encoding="utf-8"))
         assert policy["metrics"] == metrics
     assert reader.data["made"].startswith(f"command: evaluate.py {' '.join(words)}")
-    assert capsys.readouterr().out.count("falls") == 3
+    told = capsys.readouterr().out
+    assert told.count("falls") == 4
+    assert f"\nreport.html, in each of the folders {', '.join(labels)}: metrics.json, " in told
 
 
 def test_the_page_can_be_left_out_and_a_policy_cannot(tmp_path, monkeypatch, capsys):

@@ -149,6 +149,24 @@ def test_no_copy_and_a_label_without_folders():
     assert policy_label("runs/eval/finite_states.json") == "finite_states"
 
 
+LABELS = {
+    "...csv": "policy",
+    "..csv": "policy",
+    ".hidden.csv": "hidden",
+    "frozen:..safetensors": "frozen-policy",
+    "a\nb\t\x1b\udcff\\.csv": "a-b----",
+    "Gang, 3 (zwölf).csv": "Gang, 3 (zwölf)",
+    f"{'x' * 200}.csv": "x" * 60,
+}
+
+
+@pytest.mark.parametrize("name", LABELS, ids=ascii)
+def test_a_label_is_a_folder_inside_that_of_the_results(name, tmp_path):
+    assert policy_label(name) == LABELS[name]
+    (tmp_path / LABELS[name]).mkdir()
+    assert [path.name for path in tmp_path.iterdir()] == [LABELS[name]]
+
+
 HEAD = "percent,ankle_stiffness_Nm_per_rad,toe_stiffness_Nm_per_rad"
 STATE = {joint: {"stiffness_Nm_per_rad": 50.0, "equilibrium_deg": 1.0} for joint in SPRINGS}
 BAD = [
