@@ -118,16 +118,16 @@ function loop(parent, which) {
 }
 function bars(parent, policies) {
   const names = Object.keys(policies[0].metrics.energy_J_kg), values = policies.map(p => names.map(name => p.metrics.energy_J_kg[name]));
-  const high = Math.max(.1, ...known(values.flat()).map(Math.abs)), row = 8 + 9 * policies.length, tall = 34 + row * names.length;
+  const high = Math.max(.1, ...known(values.flat()).map(Math.abs)), row = 8 + 12 * policies.length, tall = 34 + row * names.length;
   const figure = make(parent, "figure"), svg = draw(figure, "svg", { viewBox: `0 0 ${WIDTH} ${tall}`, role: "img", "aria-label": "Energy ledger of a stride (J/kg)" });
   draw(svg, "text", { x: 4, y: 14, class: "title" }, "Energy ledger of a stride, into the body +");
   const X = value => 235 + value / high * 55;
   names.forEach((name, k) => {
-    draw(svg, "text", { x: 4, y: 32 + row * k + 4.5 * policies.length }, name.replaceAll("_", " "));
+    draw(svg, "text", { x: 4, y: 28 + row * k + 6 * policies.length }, name.replaceAll("_", " "));
     values.forEach((own, i) => {
       if (own[k] === null) return;
-      draw(svg, "rect", { x: Math.min(X(0), X(own[k])), y: 25 + row * k + 9 * i, width: Math.abs(X(own[k]) - X(0)), height: 8, fill: colour(i), class: "energy" });
-      draw(svg, "text", { x: WIDTH - 2, y: 32 + row * k + 9 * i, "text-anchor": "end" }, own[k].toFixed(3));
+      draw(svg, "rect", { x: Math.min(X(0), X(own[k])), y: 25 + row * k + 12 * i, width: Math.abs(X(own[k]) - X(0)), height: 10, fill: colour(i), class: "energy" });
+      draw(svg, "text", { x: WIDTH - 2, y: 34 + row * k + 12 * i, "text-anchor": "end" }, own[k].toFixed(3));
     });
   });
   draw(svg, "text", { x: WIDTH - 2, y: tall - 2, "text-anchor": "end", class: "unit" }, "J/kg");
@@ -146,14 +146,14 @@ function walker(parent, policy, i) {
   const figure = make(parent, "figure"), svg = draw(figure, "svg", { viewBox: "0 0 400 360", role: "img", "aria-label": `${policy.name}, animated` });
   if (parent.matches(".verdict")) parent.querySelector("h2").after(figure); // several: the bodies in a row, their verdicts below
   const scale = 155 / size, floor = 325;
-  make(figure, "figcaption", `${policy.name}: left foot ${f.feet[0].words}, right foot ${f.feet[1].words}. The left leg has the policy's colour; orange its ground force, paler the right one's. Dot: centre of mass, ring: its plan. ▲ centre of pressure, △ planned ZMP. Ankle and toe from dark blue (soft) to yellow (stiff)${f.feet.some(foot => foot.joints.some(at => at !== "muscles")) ? "; a square is a device in place of muscles, an open one locked" : ""}${f.feet.some(foot => foot.orthosis) ? "; the line behind the leg is an orthosis" : ""}.`);
+  make(figure, "figcaption", `${policy.name}: left foot ${f.feet[0].words}, right foot ${f.feet[1].words}. The left leg has the policy's colour; Arrows: ground force, paler the right one's. Dot: centre of mass, ring: its plan. ▲ centre of pressure, △ planned ZMP. Ankle and toe from dark blue (soft) to yellow (stiff)${f.feet.some(foot => foot.joints.some(at => at !== "muscles")) ? "; a square is a device in place of muscles, an open one locked" : ""}${f.feet.some(foot => foot.orthosis) ? "; the line behind the leg is an orthosis" : ""}.`);
   const ground = draw(svg, "line", { stroke: "var(--faint)", x1: 0, x2: 400 }), marks = draw(svg, "g", {});
   const layer = draw(svg, "g", { "stroke-linecap": "round", "stroke-linejoin": "round" });
   const line = (width, shade) => draw(layer, "polyline", { fill: "none", stroke: shade, "stroke-width": width * size * scale });
   const disc = (r, style) => draw(layer, "circle", { r: r * size * scale, ...style });
   const square = (r, style) => draw(layer, "path", { "data-r": r * size * scale, ...style });
   const leg = (side, shade) => ({ side, own: f.feet[side], orthosis: f.feet[side].orthosis ? line(.11, "#8a8f94") : null, bones: line(.075, shade), foot: line(.035, shade), toe: line(.022, shade),
-    joints: f.feet[side].joints.map((at, j) => (at === "muscles" ? disc : square)([.03, .022][j], { stroke: at === "lock" ? "var(--ink)" : "var(--paper)", class: `joint ${at}`, visibility: j && f.feet[side].one_piece ? "hidden" : "visible" })), arrow: draw(layer, "path", { fill: "none", stroke: side ? "#F3B291" : "#D55E00", "stroke-width": 3, class: "force" }) });
+    joints: f.feet[side].joints.map((at, j) => (at === "muscles" ? disc : square)([.03, .022][j], { stroke: at === "lock" ? "var(--ink)" : "var(--paper)", class: `joint ${at}`, visibility: j && f.feet[side].one_piece ? "hidden" : "visible" })), arrow: draw(layer, "path", { fill: "none", stroke: "var(--ink)", "stroke-opacity": side ? .45 : 1, "stroke-width": 2.5, class: "force" }) });
   const right = leg(1, "#9EC4D1"), trunk = line(.11, "#7d8b99"), head = disc(.095, { fill: "#7d8b99" }), left = leg(0, colour(i));
   const plan = disc(.034, { fill: "none", stroke: "#CC79A7", "stroke-width": 2 }), com = disc(.02, { fill: "var(--ink)", stroke: "var(--paper)", class: "com" });
   const zmp = draw(layer, "path", { fill: "none", stroke: "var(--ink)", class: "zmp" }), cop = draw(layer, "path", { fill: "var(--ink)", class: "cop" });
@@ -235,7 +235,8 @@ function clock({ show, seconds, step }) {
     document.documentElement.dataset.theme = dark ? "light" : "dark";
   });
   document.addEventListener("keydown", event => {
-    const elsewhere = event.target.closest("button, select") || event.target.closest("input") && event.target !== scrub && event.key !== " ";
+    const at = event.target, table = at.closest(".wide");
+    const elsewhere = at.closest("select") || at.closest("button") && event.key === " " || table && table.scrollWidth > table.clientWidth || at.closest("input") && at !== scrub && event.key !== " ";
     if (elsewhere || event.ctrlKey || event.metaKey || event.altKey) return;
     const act = { " ": toggle, ArrowLeft: () => go(u - step()), ArrowRight: () => go(u + step()), Home: () => go(0), End: () => go(1) }[event.key];
     if (act) { event.preventDefault(); act(); }

@@ -20,13 +20,15 @@ from springfoot.gait.errors import MOST_COUNT, SpringfootError, printable, requi
 
 LONGEST_NAME = 60
 """Letters of the policies' names in the name of a folder; chosen."""
+MOST_IN_REPORT = 6
+"""Policies that the colours and dashes of a report tell apart."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluateFlags:
     """How human is the walk? Runs a policy, prints its gait beside people's, writes numbers, pictures and a report.
 
-    Of several policies each gets a folder of its own, and one report shows them side by side.
+    Of several policies each gets a folder of its own, and one report shows them, up to six, side by side.
 
     A fall is a result: the exit code is 0 with falls, 2 for bad input.
     """
@@ -78,6 +80,10 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
         require_count(name, getattr(flags, name), least, most)
     if not flags.policies:
         raise SpringfootError("give a policy, say pretrained; --help lists them")
+    if flags.report and len(flags.policies) > MOST_IN_REPORT:
+        raise SpringfootError(
+            f"report.html shows up to {MOST_IN_REPORT} policies, got {len(flags.policies)}; give --no-report"
+        )
     labels = _labels(flags.policies)
     if flags.out is not None and flags.out.exists():
         raise SpringfootError(f"{flags.out} exists already; give --out a new folder")

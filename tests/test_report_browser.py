@@ -13,6 +13,11 @@ CUT_OFF = """() => [...document.querySelectorAll("svg text")].filter(text => {
     || own.top < around.top - 1 || own.bottom > around.bottom + 1);
 }).map(text => text.textContent)"""
 """Words of the drawings that reach beyond them."""
+BROKEN = """() => [...document.querySelectorAll("td.number")].filter(cell => {
+  const words = document.createRange(); words.selectNodeContents(cell);
+  return new Set([...words.getClientRects()].map(line => line.top)).size > 1;
+}).map(cell => cell.textContent)"""
+"""Numbers of the tables that stand on more than one line."""
 
 
 def walked(name, **given):
@@ -65,7 +70,10 @@ def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scr
     assert tab.locator("#play").inner_text() == "Pause"
     while at()[0] == frames:  # it plays, so that this ends
         tab.wait_for_timeout(50)
-    tab.keyboard.press("End")
+    tab.locator("#play").click()
+    tab.keyboard.press("Home")  # of the walk, though the button has the focus
+    assert at()[0][0] == "0"
+    assert tab.evaluate(BROKEN) == []
     tab.close()
     assert told == [] and asked == [page.as_uri()]
 
