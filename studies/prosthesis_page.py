@@ -104,7 +104,7 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], p
         text["PROSTHESIS"] += f"\n\n{against}"
     if held := [row for row in rows if row["foot"] == TOE_HELD]:
         own = [row for row in rows if _place(row) == _place(held[0])]
-        text["TOE-TOE_HELD"] = f"{_where(_place(held[0]))}\n\n{_walks_table(own)}\n\n{_passive_against(own, TOE_HELD)}"
+        text["TOE-HELD"] = f"{_where(_place(held[0]))}\n\n{_walks_table(own)}\n\n{_passive_against(own, TOE_HELD)}"
         rows = [row for row in rows if row not in own]
     if shares:
         text["RECOVERED"] = _shares_text([row for row in shares if _place(row) == first])
