@@ -110,7 +110,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
 
     free = Path("runs", f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
     with whole_folder(flags.out, free) as (folder, out):
-        walks = []
+        walks, written = [], set[str]()
         for label, (policy, environment) in zip(labels, prepared, strict=True):
             with _bar(label, flags.episodes * environment.episode_seconds) as bar:
                 episodes = recording.record(
@@ -131,6 +131,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                 with _bar(f"{label}, film", film.film_seconds(episodes)) as bar:
                     film.save_film(own / "walk.mp4", episodes, bar.update)
             walks.append((episodes, gait))
+            written |= {path.name for path in own.iterdir()}
         if flags.report:
             report_page.write_page(folder / "report.html", walks, command)
     if flags.json:
@@ -143,7 +144,10 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
             walk_again = f"{program} {shlex.quote(f'{FROZEN}:{name}')}"
             print()
             gait_table.print_words(f"Its mean stiffness alone, open loop: {walk_again}, with the same flags")
-    files = ", ".join([*["walk.mp4"] * flags.film, *report.FILES])
+    files = ", ".join(name for name in ("walk.mp4", *report.FILES) if name in written)
+    if "finite_states.json" not in written:
+        print()
+        gait_table.print_words("No finite_states.json: both feet have a device, whose stiffness no policy sets")
     each = files if len(labels) == 1 else f"in each of the folders {', '.join(labels)}: {files}"
     gait_table.print_results(out, [*["report.html"] * flags.report, each])
 

@@ -40,6 +40,12 @@ SAME_K = 1e-9
 """Variance of log K below which K is constant and has no share of anything."""
 
 
+def deciding_legs(settings: BipedSettings) -> list[int]:
+    """The sides whose springs follow the policy's stiffness at ankle and toe; in others either is a device."""
+    feet = feet_of(settings.left_foot, settings.right_foot)
+    return [side for side, foot in enumerate(feet) if not any(joint.device for joint in foot.joints)]
+
+
 def decided(
     recording: Recording, sides: Sequence[int] | None = None, series: str = "stiffness"
 ) -> tuple[NDArray, NDArray]:
@@ -53,8 +59,7 @@ def decided(
     step = round(recording.settings.step_seconds / TICK)
     at = np.arange(step, recording.series["phase"].shape[1], step)
     at = at[(at * TICK >= begin + WARM_UP) & (at * TICK < end)]
-    feet = feet_of(recording.settings.left_foot, recording.settings.right_foot)
-    own = [side for side, foot in enumerate(feet) if not any(joint.device for joint in foot.joints)] or [0, 1]
+    own = deciding_legs(recording.settings) or [0, 1]
     where = np.ix_(range(len(recording.ticks)), at, own if sides is None else sides)
     phase = recording.series["phase"][where].ravel().astype(float)  # at the tick's beginning, when K was decided
     values, stiffness = (

@@ -18,10 +18,11 @@ from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings import body_of, reference_gait
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import SpringfootError
 from springfoot.gait.seal import BLANK, SEAL, sealed
 from springfoot.gait.stiffness import SPRINGS
 
-from .open_loop import MEAN_KNOTS, decided, mean_over_phase
+from .open_loop import MEAN_KNOTS, decided, deciding_legs, mean_over_phase
 from .recording import TICK, Recording
 from .stride_series import WARM_UP
 
@@ -30,7 +31,7 @@ STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "l
 
 
 def write_schedules(folder: Path, recording: Recording) -> None:
-    """Write `stiffness_schedule.csv` and `finite_states.json`."""
+    """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`."""
     curves = schedule_curves(recording)
     settings, body = recording.settings, body_of(recording.settings)
     whose = {
@@ -44,9 +45,10 @@ def write_schedules(folder: Path, recording: Recording) -> None:
     rows = ([int(percent), *row, BLANK] for percent, row in zip(PERCENT, values, strict=True))
     text = sealed(csv_text(["percent", *whose, *curves, SEAL], rows))
     (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
-    states = finite_states(recording) | {SEAL: BLANK}
-    table = sealed(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-    (folder / "finite_states.json").write_text(table, encoding="utf-8")
+    if deciding_legs(settings):
+        states = finite_states(recording) | {SEAL: BLANK}
+        table = sealed(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+        (folder / "finite_states.json").write_text(table, encoding="utf-8")
 
 
 def schedule_curves(recording: Recording) -> dict[str, NDArray]:
@@ -84,21 +86,24 @@ def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
 
 
 def finite_states(recording: Recording) -> dict[str, Any]:
-    """`finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of both legs together.
+    """`finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of the `deciding_legs` together.
 
     K is the mean over the state; theta_eq is the angle at which the state's spring has its mean torque at its mean
-    angle and rate. None where the walk has no such state. The states begin at the gait events of the walk that the body
-    is held to (`gait_events`), the inner ones half-way between two.
+    angle and rate. None where the walk has no such state; times at which muscles are slack are left out. The states
+    begin at the gait events of the walk that the body is held to (`gait_events`), the inner ones half-way between two.
+    Raises `SpringfootError` where both feet have a device.
     """
-    settings, body = recording.settings, body_of(recording.settings)
+    settings, body, legs = recording.settings, body_of(recording.settings), deciding_legs(recording.settings)
+    if not legs:
+        raise SpringfootError("a table of finite states needs a foot without a device")
     strike, flat, heel_off, toe_off = gait_events(reference_gait(settings))
     starts = [strike, flat, (flat + heel_off) / 2, heel_off, (heel_off + toe_off) / 2, toe_off]
     events = ["heel strike", "foot flat", None, "heel-off", None, "toe-off"]
     begin, end = steady_walk(settings)
     ticks = slice(round((begin + WARM_UP) / TICK), round(end / TICK) if np.isfinite(end) else None)
-    phase = recording.series["phase"][:, ticks].ravel().astype(float)
-    walked = np.isfinite(phase)
-    of = {name: recording.series[name][:, ticks] for name in ("stiffness", "angle", "velocity", "torque")}
+    phase = recording.series["phase"][:, ticks, legs].ravel().astype(float)
+    of = {name: recording.series[name][:, ticks][:, :, legs] for name in ("stiffness", "angle", "velocity", "torque")}
+    walked = np.isfinite(phase) & (of["stiffness"] > 0.0).all(-1).ravel()
     of |= {name: of[name][..., FEET] for name in ("angle", "velocity", "torque")}
     springs = {name: values.reshape(-1, len(SPRINGS))[walked].astype(float) for name, values in of.items()}
     phase, beta = phase[walked] % 1.0, damping_times(body)[FEET]

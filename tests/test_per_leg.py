@@ -1,5 +1,7 @@
 """Legs whose feet differ: each leg's numbers, how far they are apart, and which is which in table and pictures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn import has_line, kept_figures
@@ -12,7 +14,9 @@ from springfoot.evaluation.animation import FAR, NEAR, save_animation
 from springfoot.evaluation.gait_figure import save_gait_figure
 from springfoot.evaluation.gait_table import print_table
 from springfoot.evaluation.per_leg import asymmetry, leg_numbers
+from springfoot.evaluation.schedule_tables import finite_states, write_schedules
 from springfoot.gait.cycle import PERCENT
+from springfoot.gait.errors import SpringfootError
 
 
 def walked(**feet):
@@ -101,3 +105,23 @@ def test_feedback_is_of_the_leg_that_decides(recordings):
     weak = measure(walked(right_foot="drop")).metrics["feedback"]["ankle"]
     assert weak["share"] is None or np.isfinite(weak["share"])
     assert settings_from(right_foot="drop").right_foot == "drop"
+
+
+@pytest.mark.parametrize(("which", "changed"), [(0, (True, False)), (1, (False, True)), (2, (True, True))])
+def test_finite_states_are_of_the_legs_whose_stiffness_the_policy_sets(recordings, which, changed):
+    recording = recordings[which]
+    states = finite_states(recording)["states"]
+    for side in (0, 1):
+        stiffness = recording.series["stiffness"].copy()
+        stiffness[:, :, side] *= 1.5
+        other = finite_states(replace(recording, series=recording.series | {"stiffness": stiffness}))["states"]
+        assert (states != other) == changed[side]
+
+
+def test_without_a_leg_that_decides_there_is_no_table_of_finite_states(recordings, tmp_path):
+    feet = {"left_foot": "rigid", "right_foot": "passive"}
+    recording = replace(recordings[2], settings=replace(recordings[2].settings, **feet))
+    write_schedules(tmp_path, recording)
+    assert [path.name for path in tmp_path.iterdir()] == ["stiffness_schedule.csv"]
+    with pytest.raises(SpringfootError, match=r"^a table of finite states needs a foot without a device$"):
+        finite_states(recording)
