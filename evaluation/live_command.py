@@ -1,12 +1,13 @@
 """The command that walks a policy live in a browser: `springfoot live`."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import tyro
 
-from springfoot.agents.command_line import exit_code
+from springfoot.agents.command_line import exit_code, parse
 from springfoot.agents.flags import SettingsFlags, given
 from springfoot.gait.errors import MOST_COUNT, require_count, require_number
 
@@ -24,7 +25,8 @@ class LiveFlags:
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")] = "pretrained"
     """Any policy of `springfoot evaluate`."""
     host: str = "127.0.0.1"
-    """Address to listen on. The default is reached from this machine alone; whoever reaches another one can steer."""
+    """Address to listen on. By default programs on this machine and the live page itself can steer, no other page that
+    a browser has open; of another address whoever reaches it."""
     port: int = 8080
     """Port to listen on, the next free one if it is taken; 0 for any."""
     seed: int = 0
@@ -32,12 +34,14 @@ class LiveFlags:
     seconds: float | None = None
     """End after this time [s]; it goes on until Ctrl-C otherwise."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What the sliders begin with, and all else that is set; the walk has no end, and nothing pushes but the button."""
+    """What the sliders begin with, and all else that is set. --push-newton, --push-seconds, --push-interval,
+    --episode-seconds, the ranges of height, mass, speed and slope and --speed-interval are refused: sliders and buttons
+    are there for them, and the walk has no end."""
 
 
 def live_main(arguments: Sequence[str], program: str = "springfoot live") -> int:
     """Run the command line; returns its exit code: 0 ended, 2 bad input, 130 ended by Ctrl-C."""
-    flags = tyro.cli(LiveFlags, args=arguments, prog=program)
+    flags = parse(LiveFlags, arguments, program)
     return exit_code(program, lambda: run_live(flags))
 
 
@@ -47,6 +51,8 @@ def run_live(flags: LiveFlags) -> None:
     require_count("port", flags.port, 0, MOST_PORT)
     if flags.seconds is not None:
         require_number("seconds", flags.seconds, 0.0, unit="s", above=True)
+    if sys.stderr.isatty():
+        print("starting…", file=sys.stderr, flush=True)
     from .live_session import LiveSession
     from .live_view import LiveView  # not above: bad flags need not wait for viser
 

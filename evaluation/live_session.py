@@ -40,6 +40,16 @@ OFFSETS_DEG = (-15.0, 15.0)
 """What is added to theta_eq [deg]; chosen, more than the ankle moves in stance."""
 LIVE_PUSHES, PUSH_SECONDS = (-400.0, 400.0), 0.1
 """Horizontal pushes on the trunk, forward positive [N], and how long each lasts [s]; chosen."""
+ELSEWHERE = {
+    "push_newton": "the button Push pushes",
+    "push_seconds": f"the button Push pushes for {PUSH_SECONDS:g} s",
+    "push_interval": "the button Push pushes",
+    "episode_seconds": "the walk has no end",
+    "height_range": "the slider height sets it",
+    "mass_range": "the slider mass sets it",
+    "speed_range": "the slider speed sets it",
+}
+"""Settings that a live walk does not take, and why."""
 LYING_SECONDS = 1.0
 """Time for which a fallen body is shown before it walks anew [s]."""
 
@@ -111,14 +121,16 @@ class LiveSession:
 
     Args:
         policy: any name that `springfoot evaluate` takes.
-        given: settings asked for. What `Wishes` says is asked from there on; the walk has no end, and pushes come by
-            `push` alone.
+        given: settings asked for, none of those `ELSEWHERE`. What `Wishes` says is asked from there on.
         seed: of the walk.
 
     Raises `SpringfootError` for an unknown policy or a bad setting.
     """
 
     def __init__(self, policy: str, given: dict[str, Any] | None = None, seed: int = 0):
+        for name, instead in ELSEWHERE.items():
+            if (given or {}).get(name):  # 0 pushes and no range are what it does
+                raise SpringfootError(f"live takes no {name}: {instead}")
         own = {"speed_range": LIVE_SPEEDS, "height_range": LIVE_HEIGHTS, "mass_range": LIVE_MASSES, "push_newton": 0.0}
         asked = (given or {}) | own | {"episode_seconds": LONGEST_EPISODE}
         self._policy, self._settings = prepare(policy, asked, seed)

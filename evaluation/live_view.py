@@ -22,6 +22,7 @@ from springfoot.envs.settings import SLOPE_RANGE_DEG
 from springfoot.gait.errors import SpringfootError
 from springfoot.gait.stiffness import SPRINGS
 
+from .live_origin import own_pages_only
 from .live_scene import LiveScene
 from .live_session import (
     LIVE_FACTORS,
@@ -61,7 +62,7 @@ class LiveView:
         session.restart()
         self._session = session
         self._asked: SimpleQueue[dict[str, Any] | Callable[[], None]] = SimpleQueue()
-        with redirect_stdout(StringIO()):  # viser would print a table of addresses
+        with redirect_stdout(StringIO()), own_pages_only(host):  # viser would print a table of addresses
             self._server = viser.ViserServer(host=host, port=port, label="springfoot live", verbose=False)
         self._gui = self._server.gui
         self._gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")

@@ -1,5 +1,6 @@
 """The live walk in a real browser: its sliders and buttons steer the simulation, and nothing else is loaded."""
 
+import socket
 import threading
 import time
 
@@ -10,7 +11,7 @@ from springfoot.evaluation.live_command import live_main
 from springfoot.evaluation.live_session import LiveSession
 from springfoot.studies.command import main
 
-pytest.importorskip("viser", reason="the extra live")
+viser = pytest.importorskip("viser", reason="the extra live")
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +74,29 @@ def test_only_this_machine_reaches_it_unless_told_otherwise(view):
     assert view._server.get_host() == "127.0.0.1"
 
 
+@pytest.mark.parametrize(
+    ("origin", "host", "comes_in"),
+    [
+        ("http://127.0.0.1:{port}", None, True),
+        (None, None, True),  # no browser
+        ("https://example.org", None, False),
+        ("http://127.0.0.1:1", None, False),
+        ("null", None, False),
+        ("http://example.org:{port}", "example.org:{port}", False),  # a name that leads here
+    ],
+)
+def test_no_other_page_of_the_browser_can_steer(view, origin, host, comes_in):
+    port = view._server.get_port()
+    sent = {"Origin": origin, "Host": host or "127.0.0.1:{port}"}
+    lines = [f"{name}: {value.format(port=port)}" for name, value in sent.items() if value]
+    lines += ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+    lines += ["Sec-WebSocket-Key: c3ByaW5nZm9vdCBmZWV0IQ==", f"Sec-WebSocket-Protocol: viser-v{viser.__version__}"]
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as connection:
+        connection.sendall("\r\n".join(["GET / HTTP/1.1", *lines, "", ""]).encode())
+        answer = connection.recv(1000).decode(errors="replace")
+    assert answer.split()[1] == ("101" if comes_in else "403")
+
+
 def test_the_command_says_where_and_ends_in_its_time(capsys):
     assert main(["live", "schedule", "--port", "0", "--seconds", "1"]) == 0
     said = capsys.readouterr().out.splitlines()
@@ -86,6 +110,7 @@ def test_the_command_says_where_and_ends_in_its_time(capsys):
         (["nonsense"], "no policy 'nonsense'"),
         (["schedule", "--port", "70000"], "port must be a whole number >= 0 and <= 65535, got 70000"),
         (["schedule", "--speed", "2.0"], "speed must be a finite number >= 0.6 and <= 1.8, got 2.0"),
+        (["schedule", "--push-newton", "300"], "live takes no push_newton: the button Push pushes"),
         (["schedule", "--seconds", "0"], "seconds must be a finite number > 0 s, got 0.0"),
     ],
 )

@@ -138,10 +138,24 @@ def test_who_falls_lies_a_while_and_walks_anew():
 
 
 def test_settings_begin_where_flags_say_and_pushes_come_by_hand_alone():
-    session = LiveSession(
-        "schedule", {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0}, "push_newton": 300.0}
-    )
+    own = {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0}}
+    session = LiveSession("schedule", own | {"push_newton": 0.0, "speed_range": None})
     assert walk(session, 20).stiffness[1, 0] == pytest.approx(400.0)
     assert session._settings.push_newton == 0.0
     with pytest.raises(SpringfootError, match="speed_interval and slope_range_deg must be None"):
         LiveSession("schedule", {"slope_range_deg": (-1.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "instead"),
+    [
+        ("push_newton", 300.0, "the button Push pushes"),
+        ("push_seconds", 0.2, "the button Push pushes for 0.1 s"),
+        ("episode_seconds", 5.0, "the walk has no end"),
+        ("height_range", (1.6, 1.8), "the slider height sets it"),
+        ("speed_range", (1.0, 1.4), "the slider speed sets it"),
+    ],
+)
+def test_settings_that_a_live_walk_would_ignore_are_refused(name, value, instead):
+    with pytest.raises(SpringfootError, match=f"^live takes no {name}: {instead}$"):
+        LiveSession("schedule", {name: value})

@@ -1,0 +1,48 @@
+"""Whose pages may steer a live walk: its own alone, of all that a browser has open.
+
+A browser lets any page open a websocket to this machine, and says in `Origin` whose page it is; viser does not look.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.asyncio import server as websockets
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+"""Names of this machine that no other machine's page can have."""
+
+
+def is_own_page(headers: Mapping[str, str], host: str) -> bool:
+    """Whether a request is of a page from the address it goes to, or of a program, which sends no `Origin`.
+
+    Where `host`, the address listened on, is this machine's alone, the page's must be, too: a name that leads here
+    (DNS rebinding) is not enough.
+    """
+    origin = headers.get("Origin")
+    if origin is None:
+        return True
+    page = urlsplit(origin)
+    return page.netloc == headers.get("Host") and (host not in LOOPBACK or page.hostname in LOOPBACK)
+
+
+@contextmanager
+def own_pages_only(host: str) -> Iterator[None]:
+    """A viser server that is made inside answers websockets of other pages with 403."""
+    serve = websockets.serve
+
+    def serve_own(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:
+        def process(connection: Any, request: Any) -> Any:
+            if is_own_page(request.headers, host):
+                return process_request(connection, request)
+            return connection.respond(HTTPStatus.FORBIDDEN, "This page is not of the live walk.\n")
+
+        return serve(*arguments, process_request=process, **options)
+
+    websockets.serve = serve_own  # type: ignore[assignment,misc]  # viser has no argument for it
+    try:
+        yield
+    finally:
+        websockets.serve = serve  # type: ignore[misc]
