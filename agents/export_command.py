@@ -1,5 +1,6 @@
 """The command that writes a policy for use without springfoot: `springfoot export`."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,4 +53,4 @@ def run_export(flags: ExportFlags) -> None:
     files = export_policy(read_policy(flags.policy), flags.out, flags.to)
     print(f"Results: {', '.join(map(str, files))}")
     if flags.to == "onnx":
-        print(f"Next:    springfoot evaluate {flags.out}")
+        print(f"Next:    springfoot evaluate {shlex.quote(str(flags.out))}")

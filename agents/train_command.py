@@ -1,6 +1,7 @@
 """The command that trains a policy or goes on with a run: `train.py`, `springfoot train`."""
 
 import dataclasses
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,9 +107,9 @@ def run_training(flags: TrainFlags) -> int:
         f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard;\n"
         "learning_curve.png, gallery.png)"
     )
-    print(f"Next:    springfoot evaluate {folder}")
+    print(f"Next:    springfoot evaluate {_word(folder)}")
     if interrupted:
-        print(f"Or:      springfoot train --resume {folder}")
+        print(f"Or:      springfoot train --resume {_word(folder)}")
     return stopped_by(record) if interrupted else 0
 
 
@@ -121,7 +122,7 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     print(f"\n{multi_seed.training_table(record)}\n")
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
     print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
-    print(f"Next:    springfoot study seeds {out}/seed-*")
+    print(f"Next:    springfoot study seeds {_word(out)}/seed-*")
     folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
     if begun := [folder for folder in folders if (folder / RUN).is_file()]:
         print(f"Or:      {_likewise('springfoot train --resume', begun)}")
@@ -131,7 +132,12 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
 def _likewise(words: str, folders: Sequence[Path]) -> str:
     """A command of the first of some folders, and the names of the others."""
     others = ", ".join(folder.name for folder in folders[1:])
-    return f"{words} {folders[0]}" + (f", then so with {others}" if others else "")
+    return f"{words} {_word(folders[0])}" + (f", then so with {others}" if others else "")
+
+
+def _word(folder: Path) -> str:
+    """The name of a folder as a shell reads it, spaces and all."""
+    return shlex.quote(str(folder))
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:

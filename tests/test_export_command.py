@@ -63,7 +63,7 @@ def test_what_cannot_be_exported_is_one_line_and_nothing_is_written(
 
 def test_the_command_says_what_it_wrote_and_how_to_go_on(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["export", "pretrained", "--to", "onnx", "--out", "deep/walk.onnx"]) == 0
+    assert main(["export", "pretrained", "--to", "onnx", "--out", "so deep/walk.onnx"]) == 0
     results, following = capsys.readouterr().out.splitlines()
-    assert results == f"Results: {Path('deep/walk.onnx')}, {Path('deep/walk.onnx.json')}"
-    assert following == f"Next:    springfoot evaluate {Path('deep/walk.onnx')}"
+    assert results == f"Results: {Path('so deep/walk.onnx')}, {Path('so deep/walk.onnx.json')}"
+    assert following == f"Next:    springfoot evaluate '{Path('so deep/walk.onnx')}'"
