@@ -1,13 +1,14 @@
-"""The body of a live walk in 3-D: mjviser draws the model, the ground runs below it, arrows are its ground forces.
+"""The body of a live walk in 3-D: its capsules and spheres, the ground that runs below it, arrows of its ground forces.
 
 The body stays in the middle of the picture, however far it walks: ground and forces are moved back by its place.
+Meshes are coarse, and lights cast no shadow and reflect nothing, so that a processor can draw it too: in a browser
+without a GPU that is what a picture costs (`python -m benchmarks.live_pictures`).
 """
 
-from copy import copy
-
+import mujoco
 import numpy as np
+import trimesh
 import viser
-from mjviser import ViserMujocoScene
 
 from springfoot.envs.physics.model import SIDES
 from springfoot.gait.arrays import NDArray
@@ -17,8 +18,13 @@ from .live_session import LiveSession
 FORCE_LENGTH = 0.55
 """Length of the arrow of one body weight [m]; chosen, as in walk.gif."""
 FORCE_COLOUR = (213, 94, 0)
-HIDDEN_GROUP = 3
-"""A group of geoms that mjviser does not show unless asked."""
+GROUND_COLOUR = (190, 190, 190)
+GROUND_LENGTH, GROUND_WIDTH, GROUND_CELL = 14.0, 4.0, 0.5
+"""Of the grid that runs below it [m]; a metre is a whole number of cells."""
+ROUND = 16
+"""Faces around a capsule; chosen, with half as many along each of its ends."""
+DAYLIGHT, SUN = 1.6, 2.2
+"""Intensities of the light from all sides and from one [-]; chosen by eye."""
 
 
 class LiveScene:
@@ -40,28 +46,60 @@ class LiveScene:
         away = np.array([x, 0.0, x * np.tan(slope)])
         data.xpos[:] -= away
         with self._server.atomic():
-            self._body.update_from_mjdata(data)
+            for body, frame in self._bodies.items():
+                frame.position, frame.wxyz = data.xpos[body], data.xquat[body]
             along = (-x / np.cos(slope)) % 1.0  # the grid repeats itself every metre
             self._ground.position = (along * np.cos(slope), 0.0, along * np.sin(slope))
             self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], away)
 
     def _begin(self) -> None:
-        self._model = self._session.model
-        drawn = copy(self._model)  # mjviser changes colours and sizes of what it draws
-        drawn.geom_group[[drawn.geom(f"ground_{side}").id for side in SIDES]] = HIDDEN_GROUP
-        self._feet = [drawn.body(f"foot_{side}").id for side in SIDES]
-        self._body = ViserMujocoScene(self._server, drawn, num_envs=1)
-        self._body.camera_tracking_enabled = False
+        model = self._model = self._session.model
+        self._feet = [model.body(f"foot_{side}").id for side in SIDES]
+        scene = self._server.scene
+        scene.configure_default_lights(False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/daylight", intensity=DAYLIGHT)
+        scene.add_light_directional("/sun", intensity=SUN, position=(2.0, -3.0, 4.0))
+        self._bodies = {body: scene.add_frame(_name(body), show_axes=False) for body in range(1, model.nbody)}
+        for geom in np.flatnonzero(model.geom_bodyid).tolist():
+            self._add_geom(geom)
         turn = -np.radians(self._session.wishes.slope_deg) / 2
-        self._ground = self._server.scene.add_grid(
+        self._ground = scene.add_line_segments(
             "/ground",
-            infinite_grid=True,
-            fade_distance=12.0,
+            _grid(),
+            GROUND_COLOUR,
+            thickness=0.7,
+            thickness_units="screen",
             wxyz=(np.cos(turn), 0.0, np.sin(turn), 0.0),
         )
-        self._forces = self._server.scene.add_arrows(
+        self._forces = scene.add_arrows(
             "/forces", np.zeros((2, 2, 3)), FORCE_COLOUR, shaft_radius=0.012, head_radius=0.03, head_length=0.06
         )
+
+    def _add_geom(self, geom: int) -> None:
+        """Draw a capsule or sphere of the model on its body."""
+        model = self._model
+        radius, half = model.geom_size[geom, :2]
+        name = f"{_name(model.geom_bodyid[geom])}/{geom}"
+        colour = tuple(model.geom_rgba[geom, :3].tolist())
+        place = {"wxyz": model.geom_quat[geom], "position": model.geom_pos[geom]}
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            mesh = trimesh.creation.capsule(2.0 * half, radius, count=(ROUND // 2, ROUND))
+            self._server.scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, **place)
+        else:
+            self._server.scene.add_icosphere(name, radius, colour, subdivisions=2, **place)
+
+
+def _name(body: int) -> str:
+    return f"/body/{body}"
+
+
+def _grid() -> NDArray:
+    """(K, 2, 3) lines along and across the ground [m]."""
+    along, across = GROUND_LENGTH / 2, GROUND_WIDTH / 2
+    xs, ys = np.arange(-along, along + GROUND_CELL, GROUND_CELL), np.arange(-across, across + GROUND_CELL, GROUND_CELL)
+    lines = [((x, -across, 0.0), (x, across, 0.0)) for x in xs] + [((-along, y, 0.0), (along, y, 0.0)) for y in ys]
+    return np.array(lines, np.float32)
 
 
 def _arrows(force: NDArray, feet: NDArray, away: NDArray) -> NDArray:
