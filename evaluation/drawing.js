@@ -40,12 +40,13 @@ function band(xs, mean, sd, X, Y) {
   return `M${upper.concat(at.reverse().map(k => `${X(xs[k]).toFixed(1)},${Y(mean[k] - sd[k]).toFixed(1)}`)).join("L")}Z`;
 }
 
-const WIDTH = 340, HEIGHT = 215, LEFT = 50, RIGHT = 10, TOP = 26, BOTTOM = 36;
+const LEAST_SPAN = 1e-4; // of an axis: less is nothing in all our units
+const WIDTH = 340, HEIGHT = 215, LEFT = 58, RIGHT = 10, TOP = 26, BOTTOM = 36;
 function frame(parent, title, xUnit, yUnit, xs, ys) {
   const figure = make(parent, "figure");
   const svg = draw(figure, "svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title} (${yUnit})` });
   let [low, high] = [Math.min(...ys), Math.max(...ys)];
-  if (!(high > low)) [low, high] = [(ys.length ? low : 0) - 1, (ys.length ? high : 0) + 1];
+  if (!(high - low > LEAST_SPAN)) [low, high] = [(ys.length ? low : 0) - 1, (ys.length ? high : 0) + 1];
   const margin = .05 * (high - low);
   [low, high] = [low - margin, high + margin];
   const X = x => LEFT + (x - xs[0]) / (xs[1] - xs[0]) * (WIDTH - LEFT - RIGHT);
@@ -55,7 +56,7 @@ function frame(parent, title, xUnit, yUnit, xs, ys) {
   draw(svg, "text", { x: -(HEIGHT - BOTTOM + TOP) / 2, y: 11, transform: "rotate(-90)", "text-anchor": "middle", class: "unit" }, yUnit);
   for (const tick of ticks(low, high, 4)) {
     draw(svg, "line", { x1: LEFT, x2: WIDTH - RIGHT, y1: Y(tick), y2: Y(tick), stroke: "var(--line)", "stroke-width": tick === 0 ? 1.4 : .6 });
-    draw(svg, "text", { x: LEFT - 5, y: Y(tick) + 4, "text-anchor": "end" }, String(tick));
+    draw(svg, "text", { x: LEFT - 5, y: Y(tick) + 4, "text-anchor": "end" }, tick && Math.abs(tick) < 1e-3 ? tick.toExponential() : String(tick));
   }
   for (const tick of ticks(xs[0], xs[1], 5)) draw(svg, "text", { x: X(tick), y: HEIGHT - BOTTOM + 15, "text-anchor": "middle" }, String(tick));
   return { svg, X, Y };

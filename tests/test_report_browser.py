@@ -13,6 +13,12 @@ CUT_OFF = """() => [...document.querySelectorAll("svg text")].filter(text => {
     || own.top < around.top - 1 || own.bottom > around.bottom + 1);
 }).map(text => text.textContent)"""
 """Words of the drawings that reach beyond them."""
+CROWDED = """() => [...document.querySelectorAll("svg text.unit[transform]")].flatMap(unit => {
+  const right = unit.getBoundingClientRect().right;
+  return [...unit.ownerSVGElement.querySelectorAll("text[text-anchor='end']:not(.unit)")].filter(
+    text => text.getBoundingClientRect().left < right).map(text => text.textContent);
+})"""
+"""Numbers of an axis that reach into its unit."""
 BROKEN = """() => [...document.querySelectorAll("td.number")].filter(cell => {
   const words = document.createRange(); words.selectNodeContents(cell);
   return new Set([...words.getClientRects()].map(line => line.top)).size > 1;
@@ -48,7 +54,7 @@ def opened(browser, page, width, **how):
 @pytest.mark.parametrize("width", [1280, 390])
 def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scrubber(chromium, page, width):
     tab, told, asked = opened(chromium, page, width)
-    assert tab.evaluate(CUT_OFF) == []
+    assert tab.evaluate(CUT_OFF) == [] and tab.evaluate(CROWDED) == []
     assert tab.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
     cursors, walkers = tab.locator(".cursor"), tab.locator("svg[data-frame]")
     assert walkers.count() == 2 and cursors.count() > 20
@@ -76,6 +82,17 @@ def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scr
     assert tab.evaluate(BROKEN) == []
     tab.close()
     assert told == [] and asked == [page.as_uri()]
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("ends", [(0.0, 5e-24), (0.0, 3e-4), (-1.2e-4, 1.1e-4), (-2e4, 2e4), (0.0, 0.0123)])
+def test_numbers_of_any_size_stand_on_an_axis(chromium, page, width, ends):
+    tab, told, _ = opened(chromium, page, width)
+    tab.evaluate(
+        "ends => frame(document.querySelector('.grid'), 'a title', '% of the stride', 'N·m', [0, 100], ends)", ends
+    )
+    assert tab.evaluate(CUT_OFF) == [] and tab.evaluate(CROWDED) == [] and told == []
+    tab.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
