@@ -117,6 +117,7 @@ class Session(BaseCallback):
         """
         if self._found is None:
             self._record["sessions"].append(session)
+            cut_events(self._out, {})  # of a training that was killed before it had a checkpoint
             return {}
         header, arrays = self._found
         require_same(self._out, header["fingerprint"], self._fingerprint)

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 from .arrays import NDArray
 from .body import HEIGHT_RANGE, REFERENCE_HEIGHT
 from .errors import SpringfootError, require_within
+from .json_file import MOST_JSON_BYTES
+from .text_table import read_bytes
 
 ANGLES = ("thigh", "knee", "ankle", "toe")
 """Curves that give the posture of a leg, from the hip down. Thigh is to the vertical: hip = thigh + trunk pitch."""
@@ -217,13 +219,13 @@ def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDAr
 def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
     """A file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
     try:
-        table = json.loads(Path(people).read_text(encoding="utf-8"))
+        table = json.loads(read_bytes(Path(people), MOST_JSON_BYTES))
         for kind in ("mean", "sd"):
             for name, rows in table[kind].items():
                 array = np.array(rows)
                 table[kind][name] = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
         _ = table["height_m"], table["conditions"], table["cop"]["coefficients"], table["foot"]["plateaus"]
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(
             f"{people} must be a file of people's data as human_harmonics.json of springfoot.gait: {error}"
         ) from None

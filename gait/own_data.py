@@ -18,7 +18,8 @@ from .cycle import CONTACT_THRESHOLD_BW, PERCENT
 from .errors import SpringfootError, require_count, require_within
 from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
 from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
-from .plausible import require_plausible
+from .plausible import AS_IT_IS, require_plausible
+from .plausible_legs import require_plausible_legs
 from .strides import MeasuredWalk, cut_strides, together
 from .text_table import Table, read_csv
 
@@ -32,6 +33,9 @@ ACCEPTED = {
 _PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
 COMFORTABLE_SPEED = 1.2
 """Speed of the people that curves of unknown speed are held against [m/s]; chosen."""
+SPEEDS_APART = 1.4
+"""Largest factor between a file's speed and that of its step length and stride time; chosen. Who limps here has
+steps of one foot that make 1.21, and mistakes make 2."""
 _MOST_COEFFICIENTS, _LARGEST = 64, 1e3
 
 
@@ -154,6 +158,8 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
     if toe_off is None and "grf_vertical" in mean:
         toe_off = float(PERCENT[mean["grf_vertical"] > CONTACT_THRESHOLD_BW].max(initial=0)) + 1
     strides = parameter("n")
+    if strides is not None and strides % 1:
+        raise SpringfootError(f"{table.name}: n must be a whole number of strides, got {strides:g}")
     own = OwnGait(
         name=table.name,
         strides=None if strides is None else round(strides),
@@ -197,6 +203,8 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: b
             raise SpringfootError(
                 f"{walk.name}: the {name} is behind at heel strike; are left and right, or a sign, interchanged?"
             )
+    if not trust_units:
+        require_plausible_legs(walk, side, mass, _people_at(walk.speed))
     duration = strides[:, 2] - strides[:, 0]
     stride_time = float(np.mean(duration))
     own = OwnGait(
@@ -212,6 +220,23 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: b
     return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
 
 
+def _require_one_speed(own: OwnGait) -> None:
+    """Refuse a speed that stride time and step length contradict."""
+    if own.speed and own.stride_time and own.step_length:
+        covered = 2 * own.step_length / own.stride_time
+        if not 1 / SPEEDS_APART < own.speed / covered < SPEEDS_APART:
+            raise SpringfootError(
+                f"{own.name}: two steps of {own.step_length:g} m in {own.stride_time:g} s are {covered:.2f} m/s, and "
+                f"the speed is {own.speed:g}: a stride's length, or a step's time? {AS_IT_IS}"
+            )
+
+
+def _people_at(speed: float | None) -> HumanGait:
+    """People at a speed, at a comfortable one if it is unknown or beyond what is accepted."""
+    low, high, _ = ACCEPTED["speed"]
+    return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
+
+
 def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
     """`own` with series fitted to curves (101,)."""
 
@@ -223,9 +248,8 @@ def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGai
 
     refuse_absurd(own.name, mean)
     if not trust_units:
-        low, high, _ = ACCEPTED["speed"]
-        speed = own.speed if own.speed and low <= own.speed <= high else COMFORTABLE_SPEED
-        require_plausible(own.name, mean, human_gait(speed))
+        require_plausible(own.name, mean, _people_at(own.speed), sd)
+        _require_one_speed(own)
     own = _checked(own)
     return _checked(replace(own, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
 

@@ -101,20 +101,32 @@ SHAPED = ("thigh", "hip", "knee", "ankle", "hip_moment", "ankle_moment", "grf_ve
 """Curves of which that is asked: right ones gain 0.38 at most, people's half a stride late 1.0 at least."""
 
 
-def require_plausible(name: str, mean: Mapping[str, NDArray], people: HumanGait) -> None:
+MOST_SPREAD = 2.0
+"""Largest standard deviation over the range of a curve, its own or people's; chosen. Who limps here has 1.02."""
+Curves = Mapping[str, NDArray]
+AS_IT_IS = "if it is right, trust_units takes it as it is"
+
+
+def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | None = None) -> None:
     """Raise `SpringfootError` for mean curves (101,) that no walk has, saying what was seen and what it may be.
 
     Args:
         name: of the file.
         mean: curve -> percent 0 to 100 of the stride, in the units of `HumanGait`.
         people: whose curves they are held against.
+        sd: spreads (101,) of some of the curves.
     """
     usual = {curve: people.mean(curve, PERCENT / 100) for curve in COLUMNS}
     for seen in _doubts(mean, usual):
-        raise SpringfootError(f"{name}: {seen}; if it is right, trust_units takes it as it is")
+        raise SpringfootError(f"{name}: {seen}; {AS_IT_IS}")
+    for curve, spread in (sd or {}).items():
+        if not 0 <= spread.min() <= spread.max() <= MOST_SPREAD * max(np.ptp(usual[curve]), np.ptp(mean[curve])):
+            raise SpringfootError(
+                f"{name}: {COLUMNS[curve]}_sd must lie from 0 to twice the range of its curve; {AS_IT_IS}"
+            )
 
 
-def _doubts(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterator[str]:
+def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
     """What is seen and guessed, the surest first; `usual` has all of people's curves."""
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
@@ -147,14 +159,14 @@ def _doubts(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterat
         yield f"{COLUMNS[curve]} is not like people's (r = {late[curve][0]:.2f}){guess}?"
 
 
-def _rough(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterator[str]:
+def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
     for curve, values in mean.items():
         jump = float(np.median(np.abs(np.diff(values, 2))))
         if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
             yield f"{COLUMNS[curve]} jumps up and down from percent to percent: noise? filter it, or take more strides"
 
 
-def _wrong_size(mean: Mapping[str, NDArray], sizes: Mapping[str, float]) -> Iterator[str]:
+def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
     for curve, size in sizes.items():
         kind, (low, high, _) = _kind(curve), CURVE_LIMITS[curve]
         if curve == "ankle_moment" and "grf_vertical" not in mean:
@@ -185,7 +197,7 @@ def _unit(kind: str, size: float) -> str:
     return unit if near else "another scale, or another joint's"
 
 
-def _moved(mean: Mapping[str, NDArray], usual: Mapping[str, NDArray]) -> Iterator[str]:
+def _moved(mean: Curves, usual: Curves) -> Iterator[str]:
     """Angles from another zero than ours."""
     for curve in (each for each in mean if each in _ALL_ANGLES):
         off = float(mean[curve].mean() - usual[curve].mean())
@@ -209,7 +221,7 @@ def _as_written(curve: str, values: NDArray) -> tuple[float, float]:
     return float(values.min()) * unit, float(values.max()) * unit
 
 
-def _at_another_time(late: Mapping[str, NDArray], backward: Mapping[str, NDArray]) -> Iterator[str]:
+def _at_another_time(late: Curves, backward: Curves) -> Iterator[str]:
     """The shift, or the running backward, by which every curve comes nearer to people's."""
     if len(late) < 2:
         return
@@ -232,7 +244,7 @@ def _at_another_time(late: Mapping[str, NDArray], backward: Mapping[str, NDArray
 _OPPOSITE = ": opposite"
 
 
-def _guess(curve: str, values: NDArray, usual: Mapping[str, NDArray], late: NDArray, backward: float) -> str:
+def _guess(curve: str, values: NDArray, usual: Curves, late: NDArray, backward: float) -> str:
     """What would make a curve most like people's."""
     at = LEAST_SHIFT + int(late[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
     others = [each for each in usual if each != curve and _kind(each) == _kind(curve)]
@@ -247,7 +259,7 @@ def _guess(curve: str, values: NDArray, usual: Mapping[str, NDArray], late: NDAr
     return max(gains, key=lambda each: gains[each])
 
 
-def _unborne(mean: Mapping[str, NDArray]) -> Iterator[str]:
+def _unborne(mean: Curves) -> Iterator[str]:
     """Forces that bear no body, and an ankle moment that is not theirs times a foot's lever."""
     if "grf_vertical" not in mean:
         return

@@ -190,7 +190,7 @@ def _smooth(angle: NDArray, tick: float) -> NDArray:
 
 def _bearing(force: NDArray) -> float:
     """About the body weight: the median of the forces beyond half of the largest."""
-    return float(np.median(force[force > 0.5 * force.max()])) if force.max() > 0 else 1.0
+    return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
 
 
 def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> None:

@@ -15,6 +15,8 @@ import numpy as np
 
 from .errors import SpringfootError
 from .foot_style import FootStyle
+from .json_file import MOST_JSON_BYTES
+from .text_table import read_bytes
 
 STYLES = Path(str(resources.files("springfoot.gait") / "least_work.json"))
 """The package's own file of styles."""
@@ -80,9 +82,9 @@ def _committed() -> dict[float, WalkStyle]:
 def styles_of(file: Path) -> dict[float, WalkStyle]:
     """Speed [m/s at 1.70 m] -> the style of a file; raises `SpringfootError` for one that has none."""
     try:
-        styles = json.loads(file.read_text(encoding="utf-8"))["styles"]
+        styles = json.loads(read_bytes(file, MOST_JSON_BYTES))["styles"]
         found = {float(speed): style_from(values) for speed, values in styles.items()}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(f"{file} is not a file of styles of walks: {error}") from None
     if not found:
         raise SpringfootError(f"{file} has no style of any walk")

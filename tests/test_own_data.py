@@ -51,6 +51,12 @@ def our_csv(path, legs=FILE_SIDES, **options):
     return write_table(path, columns)
 
 
+def table_of(path):
+    """The columns of a file of numbers."""
+    names = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+    return dict(zip(names, np.loadtxt(path, delimiter=",", skiprows=1).T, strict=True))
+
+
 def opensim(path, degrees=True, knee_sign=1.0, kind="angles", names="{}"):
     time, legs = walk()
     columns, unit = {"time": time}, 180 / np.pi if degrees else 1.0
@@ -257,6 +263,47 @@ def test_interchanged_legs_and_wrong_units_are_noticed(tmp_path):
     path.write_text(path.read_text().replace("inDegrees=yes", "inDegrees=no"))
     with pytest.raises(SpringfootError, match="degrees or radians"):
         read_gait(path)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"knee_flexion_deg_right": np.pi / 180}, "the right leg: knee_flexion_deg goes from"),
+        ({"ankle_dorsiflexion_deg_left": -1.0}, "the left leg: ankle_dorsiflexion_deg is opposite to people's"),
+        ({"grf_vertical_bw_right": -1.0}, "the right leg: the vertical force is below 0 where it bears"),
+    ],
+)
+def test_one_leg_in_other_units_or_signs_is_refused_though_the_mean_of_both_looks_right(tmp_path, wrong, words):
+    columns = table_of(our_csv(tmp_path / "mine.csv"))
+    for name, factor in wrong.items():
+        columns[name] = columns[name] * factor
+    path = write_table(tmp_path / "wrong.csv", columns)
+    with pytest.raises(SpringfootError, match=words):
+        read_gait(path)
+    read_gait(path, side="left" if "right" in words else "right")
+    read_gait(path, trust_units=True)
+
+
+def test_a_leg_that_was_not_measured_is_left_out(tmp_path):
+    columns = table_of(our_csv(tmp_path / "mine.csv"))
+    still = {name: values * (not name.endswith("_right")) for name, values in columns.items()}
+    assert read_gait(write_table(tmp_path / "one.csv", still)).strides == pytest.approx(12 / HUMAN.stride_time, abs=2)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"speed_m_s": 3.9}, "two steps of 0.68 m in 1.05 s are 1.30 m/s, and the speed is 3.9"),
+        ({"step_length_m": 2 * HUMAN.step_length}, "a stride's length, or a step's time?"),
+        ({"stride_time_s": HUMAN.stride_time / 2}, "a stride's length, or a step's time?"),
+        ({"n": 2.5}, "n must be a whole number of strides, got 2.5"),
+        ({"knee_flexion_deg_sd": -5.0}, "knee_flexion_deg_sd must lie from 0 to twice the range of its curve"),
+        ({"knee_flexion_deg_sd": 500.0}, "knee_flexion_deg_sd must lie from 0 to twice the range of its curve"),
+    ],
+)
+def test_numbers_beside_the_curves_that_contradict_them_are_refused(tmp_path, wrong, words):
+    with pytest.raises(SpringfootError, match=words):
+        read_gait(gait_csv(tmp_path / "mean.csv", **{name: np.full(101, value) for name, value in wrong.items()}))
 
 
 def test_reading_text_needs_no_c3d_library():

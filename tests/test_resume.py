@@ -181,8 +181,11 @@ def test_killed_before_the_first_checkpoint_it_begins_again(whole, tmp_path):
     (folder / "run.json").write_text(
         json.dumps(record | {"status": "running", "sessions": [], "evaluations": [], "timesteps": 0, "seconds": 0})
     )
+    for path in whole.glob(EVENTS):  # it had told of its first evaluation, which will be told again
+        shutil.copy(path, folder / f"{path.name}.killed")
     resume(folder)
     assert differences(whole, folder) == []
+    assert scalars(folder) == scalars(whole)
 
 
 def test_killed_before_its_record_a_folder_is_still_new(tmp_path):

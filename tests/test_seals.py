@@ -10,16 +10,19 @@ import pytest
 
 from springfoot.agents.schedule_files import schedule_file
 from springfoot.envs import BipedSettings
+from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.evaluation.array_file import read_arrays
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import load_recording, record
 from springfoot.evaluation.schedule_tables import write_schedules
 from springfoot.gait import SpringfootError
 from springfoot.gait.foot_file import read_foot
+from springfoot.gait.human import harmonics
 from springfoot.gait.json_file import MOST_JSON_BYTES, read_object
 from springfoot.gait.own_data import read_gait
 from springfoot.gait.seal import BLANK, require_whole, sealed
 from springfoot.gait.text_table import LONGEST_LINE, MOST_CELLS, MOST_TEXT_BYTES, read_csv
+from springfoot.gait.walk_style import styles_of
 
 READERS = {
     "stiffness_schedule.csv": lambda path: schedule_file(str(path), BipedSettings()),
@@ -118,6 +121,15 @@ def test_gigabytes_are_refused_unread(tmp_path, name, read, most):
     with pytest.raises(SpringfootError) as caught:
         read(path)
     assert str(caught.value) == f"{name} must have at most {most:,} bytes, has {GIGABYTES:,}"
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 50_000  # kB
+
+
+@pytest.mark.parametrize("read", [harmonics, styles_of, lambda path: leg_constants("planned", "fixed", file=path)])
+def test_gigabytes_in_place_of_data_of_the_package_are_refused_unread(tmp_path, read):
+    path = sparse(tmp_path / "a.json", GIGABYTES)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(SpringfootError, match=f"must have at most {MOST_JSON_BYTES:,} bytes, has {GIGABYTES:,}"):
+        read(path)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 50_000  # kB
 
 

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from springfoot.gait.errors import SpringfootError
+from springfoot.gait.json_file import MOST_JSON_BYTES
+from springfoot.gait.text_table import read_bytes
 
 TUNED_SPEED = 1.2
 """Speed [m/s] at 1.70 m of the constants whose name gives no speed."""
@@ -151,9 +153,9 @@ def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _constants_of(file: Path, name: str) -> dict[str, dict]:
     try:
-        table = json.loads(file.read_text(encoding="utf-8"))["constants"]
+        table = json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"]
         _ = constants_from(table[name])
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(f"{file} has no leg constants {name!r}: {error}") from None
     return table
 
