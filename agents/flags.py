@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from types import NoneType
+from types import MappingProxyType, NoneType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
@@ -96,19 +96,27 @@ _TRUST_FLAG = Annotated[
 
 
 def optional_flags(
-    name: str, settings: type, defaults: Any, leave_out: tuple[str, ...] = (), themes: Mapping[str, str] = THEMES
+    name: str,
+    settings: type,
+    defaults: Any,
+    leave_out: tuple[str, ...] = (),
+    themes: Mapping[str, str] = THEMES,
+    refused: Mapping[str, str] = MappingProxyType({}),
 ) -> type:
     """A dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
 
     The help of each flag is the docstring of the field, with its value in `defaults` (an instance). Fields that name a
     theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
-    `themes` has for it.
+    `themes` has for it. Of the fields that the command refuses, by name, the help says `refused`: what is there for it.
     """
     help_of, flags, themed = _field_help(settings), [], {theme: [] for theme in themes}
     hints, metadata = get_type_hints(settings), {item.name: item.metadata for item in dataclasses.fields(settings)}
     for item_name, kind in hints.items():
         if item_name not in leave_out:
-            annotation = _optional_flag(item_name, kind, help_of[item_name], getattr(defaults, item_name))
+            shown = help_of[item_name], f"(default: {_words(getattr(defaults, item_name))})"
+            if item_name in refused:
+                shown = f"Refused: {refused[item_name]}.", ""
+            annotation = _optional_flag(item_name, kind, *shown)
             its_group = themed.get(metadata[item_name].get("theme", ""), flags)
             its_group.append((item_name, annotation, NOT_GIVEN))
             if item_name in FILE_FLAGS:
@@ -125,10 +133,13 @@ def _flags_class(name: str, flags: list[tuple[str, Any, Any]], doc: str | None) 
     return dataclasses.make_dataclass(name, flags, frozen=True, kw_only=True, namespace=namespace)
 
 
-def _optional_flag(name: str, kind: Any, text: str, default: Any) -> Any:
-    """The annotation of a flag for a setting of this type, with its help and the default that is shown."""
-    shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
-    hint, parts = f"(default: {shown})", get_args(kind)
+def _words(default: Any) -> Any:
+    return " ".join(map(str, default)) if isinstance(default, tuple) else default
+
+
+def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
+    """The annotation of a flag for a setting of this type, with its help and the hint behind it."""
+    parts = get_args(kind)
     if name in FILE_FLAGS:
         how = spec(lambda words: words[0], "FILE")
     elif dict not in (get_origin(kind), *map(get_origin, parts)):
@@ -163,7 +174,7 @@ def _evaluated(theme: str) -> str:
     return f"{THEMES[theme]} Of these a trained policy brings {' and '.join(own) or 'nothing'} with it."
 
 
-SettingsFlags = optional_flags(
-    "SettingsFlags", BipedSettings, BipedSettings(), themes={theme: _evaluated(theme) for theme in THEMES}
-)
+EVALUATED = {theme: _evaluated(theme) for theme in THEMES}
+"""The help of each theme in an evaluation."""
+SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings(), themes=EVALUATED)
 """Every environment setting as an optional flag, of an evaluation, in groups by theme (dataclass for `tyro`)."""

@@ -8,11 +8,16 @@ from typing import Annotated
 import tyro
 
 from springfoot.agents.command_line import exit_code, parse
-from springfoot.agents.flags import SettingsFlags, given
+from springfoot.agents.flags import EVALUATED, given, optional_flags
+from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import MOST_COUNT, require_count, require_number
+
+from .live_session import ELSEWHERE, LiveSession
 
 MOST_PORT = 65535
 """Largest number of a port."""
+LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=ELSEWHERE)
+"""Every environment setting as an optional flag; those that live refuses say so."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,10 +38,8 @@ class LiveFlags:
     """Of the walk."""
     seconds: float | None = None
     """End after this time [s]; it goes on until Ctrl-C otherwise."""
-    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What the sliders begin with, and all else that is set. --push-newton, --push-seconds, --push-interval,
-    --episode-seconds, the ranges of height, mass, speed and slope and --speed-interval are refused: sliders and buttons
-    are there for them, and the walk has no end."""
+    environment: tyro.conf.OmitArgPrefixes[LiveSettings]  # type: ignore[valid-type]
+    """What the sliders begin with, and all else that is set."""
 
 
 def live_main(arguments: Sequence[str], program: str = "springfoot live") -> int:
@@ -53,7 +56,6 @@ def run_live(flags: LiveFlags) -> None:
         require_number("seconds", flags.seconds, 0.0, unit="s", above=True)
     if sys.stderr.isatty():
         print("starting…", file=sys.stderr, flush=True)
-    from .live_session import LiveSession
     from .live_view import LiveView  # not above: bad flags need not wait for viser
 
     view = LiveView(LiveSession(flags.policy, given(flags.environment), flags.seed), flags.host, flags.port)

@@ -48,6 +48,8 @@ ELSEWHERE = {
     "height_range": "the slider height sets it",
     "mass_range": "the slider mass sets it",
     "speed_range": "the slider speed sets it",
+    "speed_interval": "the slider speed sets it",
+    "slope_range_deg": "the slider slope sets it",
 }
 """Settings that a live walk does not take, and why."""
 LYING_SECONDS = 1.0
@@ -134,8 +136,6 @@ class LiveSession:
         own = {"speed_range": LIVE_SPEEDS, "height_range": LIVE_HEIGHTS, "mass_range": LIVE_MASSES, "push_newton": 0.0}
         asked = (given or {}) | own | {"episode_seconds": LONGEST_EPISODE}
         self._policy, self._settings = prepare(policy, asked, seed)
-        if self._settings.speed_interval is not None or self._settings.slope_range_deg is not None:
-            raise SpringfootError("live sets speed and slope itself: speed_interval and slope_range_deg must be None")
         self.name = policy
         self._seed = seed
         self._pushed, self._push_steps, self._lying = 0.0, 0, 0

@@ -1,14 +1,16 @@
 """The live walk in a real browser: its sliders and buttons steer the simulation, and nothing else is loaded."""
 
+import re
 import socket
 import threading
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from springfoot.evaluation.live_command import live_main
-from springfoot.evaluation.live_session import LiveSession
+from springfoot.evaluation.live_session import ELSEWHERE, LiveSession
 from springfoot.studies.command import main
 
 viser = pytest.importorskip("viser", reason="the extra live")
@@ -102,6 +104,15 @@ def test_the_command_says_where_and_ends_in_its_time(capsys):
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("Live at http://127.0.0.1:") and said[1].endswith("pictures a second")
     assert len(said) == 2
+
+
+def test_help_marks_every_flag_that_live_refuses_and_no_other(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit, match=r"^0$"):
+        live_main(["--help"])
+    flag, text = r"--[a-z][a-z-]+(?= )", capsys.readouterr().out
+    marked = {before for before, word in pairwise(re.findall(rf"{flag}|Refused: ", text)) if word == "Refused: "}
+    assert marked == {f"--{name.replace('_', '-')}" for name in ELSEWHERE}
 
 
 @pytest.mark.parametrize(

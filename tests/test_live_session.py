@@ -142,8 +142,6 @@ def test_settings_begin_where_flags_say_and_pushes_come_by_hand_alone():
     session = LiveSession("schedule", own | {"push_newton": 0.0, "speed_range": None})
     assert walk(session, 20).stiffness[1, 0] == pytest.approx(400.0)
     assert session._settings.push_newton == 0.0
-    with pytest.raises(SpringfootError, match="speed_interval and slope_range_deg must be None"):
-        LiveSession("schedule", {"slope_range_deg": (-1.0, 1.0)})
 
 
 @pytest.mark.parametrize(
@@ -154,6 +152,8 @@ def test_settings_begin_where_flags_say_and_pushes_come_by_hand_alone():
         ("episode_seconds", 5.0, "the walk has no end"),
         ("height_range", (1.6, 1.8), "the slider height sets it"),
         ("speed_range", (1.0, 1.4), "the slider speed sets it"),
+        ("speed_interval", 4.0, "the slider speed sets it"),
+        ("slope_range_deg", (-1.0, 1.0), "the slider slope sets it"),
     ],
 )
 def test_settings_that_a_live_walk_would_ignore_are_refused(name, value, instead):
