@@ -14,7 +14,7 @@ from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.arrays import NDArray
-from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts
+from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts
 
 from .animation import clip_of
 from .exports import opensim_forces
@@ -39,7 +39,10 @@ def figure_data(recording: Recording) -> dict[str, Any]:
     series = {name: values[first:last] for name, values in whole.items()}
     slope = tan(radians(settings.slope_deg))
     forces = {name: values[first:last] for name, values in opensim_forces(recording).items()}
-    percent = [_percent_of(whole, side, body)[first:last] for side in range(len(SIDES))]
+    contacts = [_contacts_of(whole, side, body) for side in range(len(SIDES))]
+    percent = [_percent_of(each.heel_strikes, len(whole["phase"]))[first:last] for each in contacts]
+    steps = np.unique(np.concatenate([each.heel_strikes for each in contacts]))
+    phase = np.append(whole["phase"], whole["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
     offsets, weight = contact_offsets(body), body.mass * GRAVITY
     settings_of_feet = settings.left_foot, settings.right_foot
     acting = {"px": 1.0, "vx": weight, "vy": weight}
@@ -73,19 +76,23 @@ def figure_data(recording: Recording) -> dict[str, Any]:
         "stiffness": shown_numbers(series["stiffness"].reshape(len(series["stiffness"]), -1)),
         "equilibrium": shown_numbers(np.degrees(series["equilibrium"]).reshape(len(series["equilibrium"]), -1)),
         "percent": shown_numbers(np.stack(percent, -1)),
-        "phase": shown_numbers(series["phase"]),
+        "step": shown_numbers(_percent_of(steps, len(whole["phase"]))[first:last]),
+        "phase": shown_numbers(phase % 1.0),
     }
 
 
-def _percent_of(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T,) percent of the stride of one foot at the end of each tick, NaN outside strides."""
+def _contacts_of(series: dict[str, NDArray], side: int, body: Body) -> Contacts:
     vertical = series["force"][:, side, :, 1].sum(axis=1)
-    strikes = find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY, first=TICK / 2).heel_strikes
-    time = TICK * np.arange(1, len(vertical) + 1)
+    return find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY, first=TICK / 2)
+
+
+def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
+    """(T,) percent from one of `strikes` [s] to the next at the end of each of `ticks`, NaN outside them."""
+    time = TICK * np.arange(1, ticks + 1)
     if len(strikes) < 2:
         return np.full(len(time), np.nan)
-    strides = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
-    return 100 * (strides % 1.0)
+    at = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
+    return 100 * (at % 1.0)
 
 
 def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:

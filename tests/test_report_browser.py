@@ -63,6 +63,8 @@ def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scr
         return [each.get_attribute("data-frame") for each in walkers.all()], cursors.first.get_attribute("data-percent")
 
     (begin, _), first = at()
+    for title in ("CoM height", "Left ankle, stiffness K"):  # where the stride begins, so do step and leg
+        assert float(tab.locator(f"svg[aria-label^='{title}'] .cursor").get_attribute("data-percent")) < 3.0
     tab.keyboard.press("ArrowRight")
     (after, _), second = at()
     assert (begin, after) == ("0", "1") and float(second) > float(first)

@@ -103,6 +103,11 @@ def test_its_figure_is_two_strides_from_a_left_heel_strike(page, walk):
     assert len(figure["base"]) * figure["seconds_a_frame"] == pytest.approx(2 * stride, rel=0.03)
     percent = np.array([frame[0] for frame in figure["percent"]], float)
     assert percent[0] == pytest.approx(0.0, abs=1.5) and (np.diff(percent) < 0).sum() == 1
+    step, phase = np.array(figure["step"], float), np.array(figure["phase"], float)
+    assert step[0] == pytest.approx(0.0, abs=3.0) and phase[0, 0] == pytest.approx(0.0, abs=0.03)  # as the stride
+    assert ((step >= 0) & (step <= 100)).all() and (np.diff(step) < 0).sum() == 3
+    late = (percent / 100 - phase[:, 0] + 0.5) % 1.0 - 0.5
+    assert np.abs(late).max() < 0.03  # the leg's phase runs with the stride
     force = np.array(figure["force"], float)  # (side, frame, (place, forward, up)), body weights
     assert force[..., 2].sum(axis=0).mean() == pytest.approx(1.0, abs=0.02)
     loaded = np.abs(force[0, :, 2] - 1.0) < 0.3
