@@ -134,7 +134,8 @@ def test_feet_are_drawn_by_what_they_are(chromium, page):
 def test_on_paper_the_page_is_black_on_white_without_its_buttons(chromium, page):
     tab, _, _ = opened(chromium, page, 1280, color_scheme="dark")
     tab.emulate_media(media="print")
-    assert not tab.locator(".controls").is_visible()
+    assert not tab.locator(".controls").is_visible() and not tab.get_by_text("Space plays").is_visible()
+    assert tab.get_by_text("Lines and bands").is_visible()  # which line is whose
     assert tab.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert tab.evaluate("getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
     tab.close()
