@@ -2,7 +2,7 @@
 and what adapting to either does."""
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 from typing import Any
 
@@ -98,13 +98,15 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
     return (
         f"![The best orthosis](weak.png)\n\n{table(head, lines)}\n\nIn each cell, of the springs that walk that fast "
         "without a fall, that with which muscles take least energy for a metre; in brackets, by how much the worst "
-        "takes more, and how many they are.\n\n"
+        "takes more, and how many they are. It is the stiffest of the map and the weakest, where a best one may lie "
+        f"beyond, in {at_the_ends(best, springs)}.\n\n"
         f"The spring of least energy where all walk equally fast, against {directions(best, 'best_Nm_deg')}.\n\n"
         "The same where all are asked for the same speed, and walk the slower the more a spring slows them, against "
         f"{directions(as_asked, 'best_Nm_deg')}.\n\n"
         f"The spring that slows the walk asked for least, against {directions(as_asked, 'fastest_Nm_deg')}.\n\n"
-        "ρ is Spearman's correlation over the cells, in brackets the mean at each level [N·m/deg]. Waterval et al. "
-        "found more with weakness, mass and speed, by energy. Energy at the speed asked for was looked at first, "
+        "ρ is Spearman's correlation over the cells, in brackets the mean at each level [N·m/deg] and, of pairs of "
+        "cells that differ in nothing else, in how many the spring is stiffer, softer or the same with more weakness, mass "
+        "or speed. Waterval et al. found more with weakness, mass and speed, by energy. Energy at the speed asked for was looked at first, "
         f"slowing second, equal speeds last. Without a spring someone falls in {fallen} of {len(alone)} cells. "
         f"{what_ran} of each of {len(springs)} springs of 0 to {springs[-1]:g} N·m/deg at rest at 0°, and each of "
         f"{len(asked)} speeds asked for, {asked[0]:g} to {asked[-1]:g} m/s, between which energy is linear in the "
@@ -115,7 +117,8 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
 
 
 def directions(best: Sequence[Row], column: str) -> str:
-    """Whether a stiffness of `best_springs` rises with weakness, mass and speed, in words."""
+    """Whether a stiffness of `best_springs` rises with weakness, mass and speed, in words: over all cells, and in pairs
+    of cells that differ in nothing else."""
     known = [row for row in best if row[column] is not None]
     told = []
     for name, label, sign in (("strength", "weakness", -1), ("mass_kg", "mass", 1), ("speed_m_s", "speed", 1)):
@@ -126,7 +129,23 @@ def directions(best: Sequence[Row], column: str) -> str:
         ranks = np.apply_along_axis(rankdata, 0, pairs)
         rho = f"ρ {np.corrcoef(ranks.T)[0, 1]:+.2f}" if varies else "ρ –"
         steps = ", ".join(f"{level:g}: {mean:.1f}" for level, mean in zip(levels, means, strict=True))
-        told.append(f"{label} {rho} ({steps})")
+        others = [other for other in OF_A_CELL if other != name]
+        alike = [
+            np.sign(more[column] - less[column])
+            for less, more in permutations(known, 2)
+            if sign * less[name] < sign * more[name] and all(less[other] == more[other] for other in others)
+        ]
+        counts = f"stiffer {alike.count(1)}, softer {alike.count(-1)}, same {alike.count(0)}"
+        told.append(f"{label} {rho} ({steps}; {len(alike)} pairs: {counts})")
+    return "; ".join(told)
+
+
+def at_the_ends(best: Sequence[Row], springs: Sequence[float]) -> str:
+    """In how many cells, at each speed, the best of the `springs` is the stiffest or the weakest of them, in words."""
+    told = []
+    for speed in sorted({row["speed_m_s"] for row in best}):
+        own = [row["best_Nm_deg"] for row in best if row["speed_m_s"] == speed]
+        told.append(f"{own.count(springs[-1])} and {own.count(springs[0])} of {len(own)} at {speed:g} m/s")
     return "; ".join(told)
 
 

@@ -12,7 +12,7 @@ from springfoot.evaluation.recording_feet import record_feet
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.studies.command import study_main
 from springfoot.studies.orthosis import EFFICIENCY, muscle_energy
-from springfoot.studies.orthosis_page import at_walked_speeds, best_springs, directions, weakest_cure
+from springfoot.studies.orthosis_page import at_the_ends, at_walked_speeds, best_springs, directions, weakest_cure
 
 
 def walk(foot, **given):
@@ -86,8 +86,13 @@ def test_directions_have_their_sign():
             energies = {spring: abs(spring - least) + 1 for spring in (0.0, 3.0, 6.0)}
             found += rows(energies, strength=strength, mass=mass)
     text = directions(best_springs(found), "best_Nm_deg")
-    assert "weakness ρ +1.00 (0.4: 0.0, 0.3: 3.0, 0.2: 6.0)" in text
-    assert "mass ρ +0.00 (50: 3.0, 80: 3.0)" in text
+    assert "weakness ρ +1.00 (0.4: 0.0, 0.3: 3.0, 0.2: 6.0; 6 pairs: stiffer 6, softer 0, same 0)" in text
+    assert "mass ρ +0.00 (50: 3.0, 80: 3.0; 3 pairs: stiffer 0, softer 0, same 3)" in text
+
+
+def test_cells_at_the_ends_of_the_map_are_counted():
+    best = [{"speed_m_s": 1.2, "best_Nm_deg": spring} for spring in (0.0, 3.0, 6.0, 6.0)]
+    assert at_the_ends(best, (0.0, 3.0, 6.0)) == "2 and 1 of 4 at 1.2 m/s"
 
 
 def test_a_cure_has_no_falls_with_any_stiffer_spring_of_its_rest_angle():
