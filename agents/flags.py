@@ -18,7 +18,7 @@ from springfoot.envs.feet import FOOT_SETTINGS
 from springfoot.envs.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.gait.errors import quoted
 from springfoot.gait.foot_file import read_foot
-from springfoot.gait.json_file import json_fault, read_object
+from springfoot.gait.json_file import json_fault, keys_once, read_object
 from springfoot.gait.own_data import read_gait
 
 from .flag_words import NOT_GIVEN, flag_of, spec
@@ -45,7 +45,7 @@ def _read_json(words: list[str]) -> dict[str, Any]:
             raise ValueError(f"must be JSON text in braces or the name of a JSON file, got {quoted(text)}")
         return read_object(Path(text), "setting in JSON")
     try:
-        value = json.loads(text)
+        value = json.loads(text, object_pairs_hook=keys_once)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"must be JSON, but {json_fault(error)}: {quoted(text)}") from None
     return value
@@ -77,8 +77,9 @@ def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
 
 
 def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
-    """The foot that a flag is given: as it is, or that of the file of that name."""
-    return read_foot(given) if isinstance(given, str) and Path(given).is_file() else given
+    """The foot that a flag is given: as it is, or that of the file of that name; no kind's name has a suffix."""
+    named = isinstance(given, str) and (Path(given).is_file() or Path(given).suffix)
+    return read_foot(given) if named else given
 
 
 FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]

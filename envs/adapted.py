@@ -20,11 +20,16 @@ LEGS = ("sound", "other")
 """The leg with the sound foot, and that with the foot to which the person has adapted."""
 
 
-def adapted_setting(name: str, value: Any) -> str | dict[str, dict[str, dict[str, Any]]]:
-    """`adapted` of a foot in its plain form; raises `SpringfootError` for what is none."""
+def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[str, dict[str, Any]]]:
+    """`adapted` of a foot of a kind in its plain form; raises `SpringfootError` for what is none.
+
+    Who is named has adapted to a foot of that kind; its numbers may be others.
+    """
     if isinstance(value, str):
         if value not in (known := committed_feet()):
             raise SpringfootError(f"{name}: adapted must be one of {', '.join(map(repr, known))}, got {quoted(value)}")
+        if (its := known[value]["kind"]) != kind:
+            raise SpringfootError(f"{name}: adapted {value!r} is a person on a foot of kind {its!r}, got kind {kind!r}")
         return value
     if not isinstance(value, Mapping) or not value:
         raise SpringfootError(

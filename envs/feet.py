@@ -10,7 +10,7 @@ from math import radians
 from typing import Any, NamedTuple
 
 from springfoot.gait.errors import SpringfootError, require_within
-from springfoot.gait.stiffness import StiffnessSchedule
+from springfoot.gait.stiffness import SPRINGS, StiffnessSchedule
 
 from .adapted import ADAPTED, adapted_setting
 from .physics.foot import LOCK, Feet, Foot, FootJoint, Spring
@@ -113,15 +113,20 @@ def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
             )
         plain["orthosis"] = _numbers(f"{name}: orthosis", "an orthosis", orthosis, ORTHOSIS_NUMBERS)
     if value.get(ADAPTED) is not None:
-        plain[ADAPTED] = adapted_setting(name, value[ADAPTED])
+        plain[ADAPTED] = adapted_setting(name, kind, value[ADAPTED])
     return kind if len(plain) == 1 else plain
 
 
 def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
     try:
-        return StiffnessSchedule.from_json(value).to_json()
+        schedule = StiffnessSchedule.from_json(value)
     except SpringfootError as error:
         raise SpringfootError(f"{name}: schedule: {error}") from None
+    for joint in SPRINGS:
+        its = SPRING_NUMBERS[f"{joint}_stiffness"]
+        for segment in getattr(schedule, joint):
+            require_within(f"{name}: schedule: {joint} K", segment.stiffness, (its.low, its.high), its.unit)
+    return schedule.to_json()
 
 
 def _table(name: str, value: Any) -> list[list[float]]:

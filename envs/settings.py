@@ -268,8 +268,9 @@ def settings_from(**values: Any) -> BipedSettings:
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    values = {name: plain(value) for name, value in values.items()}
-    values |= {name: foot_setting(name, values[name]) for name in FOOT_SETTINGS if name in values}
+    values = {
+        name: foot_setting(name, value) if name in FOOT_SETTINGS else plain(value) for name, value in values.items()
+    }
     if values.get("schedule") is not None:
         values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
     if values.get("human") is not None:

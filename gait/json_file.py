@@ -23,12 +23,22 @@ def read_object(path: Path, what: str) -> dict[str, Any]:
     content = read_bytes(path, MOST_JSON_BYTES)
     require_whole(path, content)
     try:
-        value = json.loads(content)
+        value = json.loads(content, object_pairs_hook=keys_once)
     except (ValueError, RecursionError) as error:
         raise SpringfootError(f"{path} is no {what}: it is not JSON, {json_fault(error)}") from None
     if not isinstance(value, dict):
         raise SpringfootError(f"{path} is no {what}: it must be an object in braces")
     return {name: each for name, each in value.items() if name != SEAL}
+
+
+def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object's keys and values as a dictionary; ValueError for a key that stands twice."""
+    values: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in values:
+            raise ValueError(f"{key!r:.40} stands twice in an object")
+        values[key] = value
+    return values
 
 
 def json_fault(error: Exception) -> str:

@@ -80,6 +80,7 @@ def test_every_committed_person_can_be_named(name):
     ("adapted", "told"),
     [
         ("nobody", "right_foot: adapted must be one of"),
+        ("passive", "right_foot: adapted 'passive' is a person on a foot of kind 'passive', got kind 'rigid'"),
         (3, "right_foot: adapted must be a name or a dictionary of speed -> sound and other, got 3"),
         ({}, "right_foot: adapted must be a name or a dictionary"),
         ({"fast": PERSON["1.2"]}, r"right_foot: adapted: speed must be in \[0.4, 2\] m/s, got nan"),

@@ -32,7 +32,8 @@ WRONG_KINDS: list[tuple[Any, str]] = [
     ("", f"right_foot must be one of {KIND_LIST}, got ''"),
     ("passive ", f"right_foot must be one of {KIND_LIST}, got 'passive '"),
     (None, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got None"),
-    (600, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got 600.0"),
+    (600, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got 600"),
+    ([], f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got []"),
     (True, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got True"),
     (nan, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got nan"),
     ({}, f"right_foot must be one of {KIND_LIST}, got None"),
@@ -131,6 +132,7 @@ def test_a_wrong_foot_is_refused_in_one_clear_line(foot, text):
     [
         ("rigd", "must be one of 'intact'"),
         ('{"kind": "rigd"}', "must be one of 'intact'"),
+        ("no-such-foot.json", "no file no-such-foot.json"),
         ('{"kind": "weak", "strength": 3}', "strength must be in [0.1, 0.6]"),
         ('{"kind": "weak", "orthosis": {"stiffness": 3}}', "an orthosis has no 'stiffness'"),
     ],

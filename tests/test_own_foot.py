@@ -147,6 +147,10 @@ def foot(**numbers: Any) -> dict[str, Any]:
         (foot(ankle_table=[[0, "x"], [9, -20]]), "ankle_table: torque must be in [-1000, 1000] N m, got 'x'"),
         (foot(ankle_table=LINE, ankle_deg=3), "give ankle_table or ankle_deg, not both"),
         ({"kind": "adaptive", "schedule": {"ankle": []}}, "schedule: a stiffness schedule must be an object with keys"),
+        (
+            {"kind": "adaptive", "schedule": {"ankle": [[0, 3001, 0]], "toe": [[0, 60, 0]]}},
+            "schedule: ankle K must be in [0, 3000] N m/rad, got 3001",
+        ),
         (SCHEDULE | {"ankle_deg": 3}, "give schedule or ankle_deg, not both"),
         ({"kind": "rigid", "ankle_table": LINE}, "a foot of kind 'rigid' has no 'ankle_table'"),
     ],
@@ -169,6 +173,7 @@ def test_a_wrong_table_is_refused_in_one_line(wrong, text):
         ("a.json", "{", "is not JSON, line 1, column 2: expecting property name enclosed in double quotes"),
         ("a.txt", "rigid", "is no foot (a JSON object, or a table in a file .csv): it is not JSON, line 1"),
         ("a.json", '{"ankle": [], "toe": []}', "schedule: ankle segments must ascend in phase"),
+        ("a.json", '{"kind": "rigid", "kind": "drop"}', "it is not JSON, 'kind' stands twice in an object"),
         ("a.json", '{"foot": "rigid"}', "right_foot must be one of 'intact'"),
     ],
 )
