@@ -35,7 +35,7 @@ from springfoot.gait.errors import SpringfootError, require_count, require_numbe
 
 from . import person_cost
 from .constants_file import ADAPTED_FEET, read_feet
-from .foot_walks import ASKED, PUSH_NEWTON, SCHEDULE, told_numbers, walked
+from .foot_walks import ABOUT_STOPS, PUSH_NEWTON, SCHEDULE, TOLD, walked
 from .person_search import Person, PersonSearch
 from .study import Answer, OnProgress, Study, without_places
 
@@ -129,19 +129,21 @@ class Adapt(Study):
         name = self.name or (kind_of(foot) if self.speed == TUNED_SPEED else f"{kind_of(foot)}, {self.speed:g} m/s")
         begin = self._begin(foot)
         lines, told, files = [], [], {}
-        walks = [["not adapted", *self._walked("pretrained", foot)]]
+        walks = []
         for search in self.searches:
             label = kept_name(name, search)
             person, own = self._search(begin, search, label, progress)
             lines += [[search, *line] for line in own]
             told.append(f"`{label}`: best {own[0][1]:.2f} to {own[-1][1]:.2f}, median {own[-1][2]:.2f}")
+            walks.append([f"{label}, not adapted", *self._walked("pretrained", person.foot)])
             walks.append([label, *self._walked(SCHEDULE[0], person.setting(self.speed))])
             files[f"foot-{search}.json"] = json.dumps(person.setting(self.speed), indent=1) + "\n"
-        head = ["", "falls", "speed m/s", *(each.label for each in ASKED), "ankle °", "toe °"]
+        head = ["", *(each.label for each in TOLD)]
         text = (
             f"{table(head, walks)}\n\n{self.episodes} episodes × {self.seconds:g} s; falls as shares, the last by "
-            f"±{PUSH_NEWTON:g} N; not adapted by `pretrained`, adapted by the schedule that was found.\n\nPrices of "
-            f"candidates (studies/person_cost.py): {'; '.join(told)}.\n\nWalk with what was found:\n\n"
+            f"±{PUSH_NEWTON:g} N; not adapted by `pretrained` on the same foot, adapted by the schedule found. "
+            f"{ABOUT_STOPS}\n\nPrices of candidates (studies/person_cost.py): {'; '.join(told)}.\n\n"
+            "Walk with what was found:\n\n"
         )
         text += "\n".join(f"  --right-foot {self.out or 'FOLDER'}/{file}" for file in files)
         files["generations.csv"] = csv_text(["search", "generation", "best", "median"], lines)
@@ -152,7 +154,7 @@ class Adapt(Study):
         given = {"right_foot": foot, "speed": self.speed, "episode_seconds": self.seconds}
         given |= SCHEDULE[1] if policy == SCHEDULE[0] else {}
         found = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
-        return [text_of(found[key], pattern) for key, pattern in told_numbers()]
+        return [text_of(found[each.key], each.pattern) for each in TOLD]
 
     def _begin(self, foot: str | dict[str, Any]) -> Person:
         if not self.start:

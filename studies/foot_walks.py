@@ -10,10 +10,12 @@ import numpy as np
 
 from springfoot.agents.files import write_atomically
 from springfoot.envs.feet import SPRING_NUMBERS
+from springfoot.envs.physics.model import JOINT_RANGE_DEG
 from springfoot.evaluation.metrics import Gait, measure
 from springfoot.evaluation.per_leg import asymmetry, leg_numbers
 from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
+from springfoot.evaluation.recording import TICK, Recording, record
+from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
 PUSH_NEWTON = 150.0
@@ -25,12 +27,18 @@ SCHEDULE = "untrained", {"action_mode": "residual"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
-    """A number that a designer asks for."""
+class Told:
+    """A number of a walk in a table: its name in the CSV files, the head of its column, its format."""
 
     key: str
     label: str
     pattern: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Told):
+    """A number that a designer asks for."""
+
     better: int
     """1 where more is better, -1 where less is."""
 
@@ -46,11 +54,21 @@ ASKED = (
 """What the study of prostheses compares, all of the right foot but the sound side's force."""
 
 
-def told_numbers() -> list[tuple[str, str]]:
-    """Key and format of the numbers that tables show of a walk, in their order."""
-    patterns = {each.key: each.pattern for each in ASKED} | {"falls": ".2f", "speed_m_s": ".2f"}
-    keys = ("falls", "speed_m_s", *(each.key for each in ASKED), "ankle_range_deg", "toe_range_deg")
-    return [(key, patterns.get(key, ".1f")) for key in keys]
+TOLD = (
+    Told(key="falls", label="falls", pattern=".2f"),
+    Told(key="speed_m_s", label="speed m/s", pattern=".2f"),
+    *ASKED,
+    Told(key="ankle_range_deg", label="ankle °", pattern=".1f"),
+    Told(key="toe_range_deg", label="toe °", pattern=".1f"),
+    Told(key="beyond_stop", label="at a stop", pattern=".1%"),
+)
+"""What tables show of a walk."""
+NAMES = [each.key for each in TOLD]
+"""Of those, part of what is kept under: where another number is told, walks are measured anew."""
+ABOUT_STOPS = (
+    "At a stop: share of time in which a joint of either leg is beyond its stop, which then carries load, in episodes "
+    "without a fall."
+)
 
 
 def numbers_of(gait: Gait) -> dict[str, float | None]:
@@ -84,7 +102,8 @@ def _sum(values: Any) -> float | None:
 def walked(
     policy: str, given: Mapping[str, Any], push_newton: float = PUSH_NEWTON, **how: Any
 ) -> dict[str, float | None]:
-    """`numbers_of` a policy's walk, and `falls_pushed` [0..1] of the same episodes pushed; `how` as for `record`.
+    """`numbers_of` a policy's walk, `beyond_stop`, and `falls_pushed` [0..1] of the same episodes pushed; `how` as for
+    `record`.
 
     Episodes in which it falls count until they fall.
     """
@@ -95,8 +114,16 @@ def walked(
         if push:
             found["falls_pushed"] = float(np.mean(recording.fall_reason != ""))
         else:
-            found |= numbers_of(measure(recording))
+            found |= {**numbers_of(measure(recording)), "beyond_stop": beyond_stop(recording)}
     return found
+
+
+def beyond_stop(recording: Recording) -> float | None:
+    """Share of time after `WARM_UP` in which a joint of either leg is beyond its stop, of the episodes without a fall;
+    None of no time."""
+    low, high = np.deg2rad(JOINT_RANGE_DEG).T
+    angle = recording.series["angle"][recording.fall_reason == "", round(WARM_UP / TICK) :]
+    return float(((angle < low) | (angle > high)).any((-2, -1)).mean()) if angle.size else None
 
 
 def for_body(foot: Mapping[str, Any], height: float, mass: float) -> dict[str, Any]:

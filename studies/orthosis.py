@@ -31,7 +31,7 @@ from springfoot.evaluation.recording_feet import record_feet
 from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.gait.errors import require_count
 
-from .foot_walks import SCHEDULE, UNSEARCHED, Kept, numbers_of, walked
+from .foot_walks import NAMES, SCHEDULE, UNSEARCHED, Kept, numbers_of, walked
 from .orthosis_page import at_walked_speeds, best_springs, draw_drop, draw_weak, drop_text, people_text, weak_text
 from .study import Answer, OnProgress, WalkingStudy
 
@@ -148,7 +148,7 @@ class Orthosis(WalkingStudy):
             )
             for person, policy, foot, given in walks:
                 given = {**given, "right_foot": foot, "episode_seconds": self.seconds}
-                key = [policy, given, committed_feet()[name], {**self.how, "threads": 0}, self.push_newton]
+                key = [policy, given, committed_feet()[name], {**self.how, "threads": 0}, self.push_newton, NAMES]
                 own = kept.get(
                     key, lambda p=policy, g=given: walked(p, g, self.push_newton, progress=progress, **self.how)
                 )

@@ -14,7 +14,7 @@ from scipy.stats import rankdata
 from springfoot.agents.markdown import MISSING, table, text_of
 from springfoot.evaluation.gait_figure import STYLE
 
-from .foot_walks import ASKED, told_numbers
+from .foot_walks import ABOUT_STOPS, TOLD
 from .intervals import share_interval
 
 Row = Mapping[str, Any]
@@ -105,9 +105,10 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
         f"{directions(as_asked, 'best_Nm_deg')}.\n\n"
         f"The spring that slows the walk asked for least, against {directions(as_asked, 'fastest_Nm_deg')}.\n\n"
         "ρ is Spearman's correlation over the cells, in brackets the mean at each level [N·m/deg] and, of pairs of "
-        "cells that differ in nothing else, in how many the spring is stiffer, softer or the same with more weakness, mass "
-        "or speed. Waterval et al. found more with weakness, mass and speed, by energy. Energy at the speed asked for was looked at first, "
-        f"slowing second, equal speeds last. Without a spring someone falls in {fallen} of {len(alone)} cells. "
+        "cells that differ in nothing else, in how many the spring is stiffer, softer or the same with more weakness, "
+        "mass or speed. Waterval et al. found more with weakness, mass and speed, by energy. Energy at the speed asked "
+        "for was looked at first, slowing second, equal speeds last. Without a spring someone falls in "
+        f"{fallen} of {len(alone)} cells. "
         f"{what_ran} of each of {len(springs)} springs of 0 to {springs[-1]:g} N·m/deg at rest at 0°, and each of "
         f"{len(asked)} speeds asked for, {asked[0]:g} to {asked[-1]:g} m/s, between which energy is linear in the "
         "speed walked; legs and stiffness of both feet as of sound feet. A calf's strength is a share of the largest "
@@ -189,7 +190,8 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
         + (
             f"\n\nShare that falls, undisturbed / pushed by ±{push_newton:g} N, and median toe clearance of the right "
             f"foot in mid-swing [mm]. {what_ran} of each, legs and stiffness of both feet as of sound feet; muscles "
-            "of the right ankle are slack in swing, the spring is there always. Weakest: none fell with it, nor with "
+            "of the right ankle are slack in swing, the spring is there always; clearance of walks that fell is of the "
+            "strides before. Weakest: none fell with it, nor with "
             f"any stiffer one of its rest angle; where 0 of {episodes} fell, up to {most:.0%} may fall (95 %, Wilson)."
         )
     )
@@ -197,12 +199,14 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
 
 def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
     """The section of people who adapted; nothing where there are none."""
-    head = ["right foot", "person", "falls", "speed m/s", *(each.label for each in ASKED), "ankle °", "toe °"]
+    head = ["right foot", "person", *(each.label for each in TOLD)]
     lines = [
-        [row["foot"], row["person"], *(_unless_all_fall(row, key, pattern) for key, pattern in told_numbers())]
-        for row in rows
+        [row["foot"], row["person"], *(_unless_all_fall(row, each.key, each.pattern) for each in TOLD)] for row in rows
     ]
-    note = f"{what_ran}, undisturbed and, for `falls, pushed`, pushed by ±{push_newton:g} N; without an orthosis."
+    note = (
+        f"{what_ran}, undisturbed and, for `falls, pushed`, pushed by ±{push_newton:g} N; without an orthosis. "
+        f"{ABOUT_STOPS}"
+    )
     return f"{table(head, lines)}\n\n{note}" if lines else ""
 
 

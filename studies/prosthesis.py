@@ -30,7 +30,7 @@ from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.errors import SpringfootError, require_count
 
 from .adapt import kept_name
-from .foot_walks import PUSH_NEWTON, SCHEDULE, UNSEARCHED, Kept, for_body, walked
+from .foot_walks import NAMES, PUSH_NEWTON, SCHEDULE, UNSEARCHED, Kept, for_body, walked
 from .prosthesis_page import ADAPTED_ALONE, NOT_ADAPTED, TOE_HELD, WITH_POLICY, draw, sections, share_rows
 from .study import Answer, OnProgress
 from .trainings import TrainingStudy
@@ -99,13 +99,14 @@ class Prosthesis(TrainingStudy):
         kept, rows = Kept(self.keep), []
         for row, policy, given in self._rows():
             how = self._how(row)
-            asked = [row, policy, _digest(policy, given), given, {**how, "threads": 0}, PUSH_NEWTON]
+            asked = [row, policy, _digest(policy, given), given, {**how, "threads": 0}, PUSH_NEWTON, NAMES]
             found = kept.get(asked, lambda p=policy, g=given, h=how: walked(p, g, progress=progress, **h))
             rows.append({**row, **found})
         shares = share_rows(rows)
         columns = list(rows[0])
         elsewhere = f"{self.episodes_elsewhere} episodes of each, of {self.seeds_elsewhere} seeds of the trainings"
-        text = sections(rows, shares, (self.what_ran, elsewhere), self.policies)
+        learned = f"{self.timesteps or STEPS:,} steps of 20 ms"
+        text = sections(rows, shares, (self.what_ran, elsewhere, learned), self.policies)
         files = {
             "prosthesis.csv": csv_text(columns, [[row[name] for name in columns] for row in rows]),
             "recovered.csv": csv_text(list(shares[0]), [list(each.values()) for each in shares]) if shares else "",
@@ -139,10 +140,9 @@ class Prosthesis(TrainingStudy):
                         continue
                     bare = for_body(without_person(feet[name]), height, mass)
                     worn = {**bare, ADAPTED: name}
-                    if kind != "adaptive":  # without its schedule nothing says what an adaptive one would do
-                        own = {**given, "right_foot": bare}
-                        for group in groups:
-                            yield _row(kind, NOT_ADAPTED, where, search, group), "pretrained", own
+                    own = {**given, "right_foot": bare}
+                    for group in groups:
+                        yield _row(kind, NOT_ADAPTED, where, search, group), "pretrained", own
                     own = {**given, **SCHEDULE[1], "right_foot": worn}
                     for group in groups:
                         yield _row(kind, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own
@@ -161,11 +161,16 @@ class Prosthesis(TrainingStudy):
         (height, mass), feet = BODIES[0], committed_feet()
         where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
         found = [(TOE_HELD, "", TOE_HELD), *(("passive", search, kept_name("passive", search)) for search in SEARCHES)]
+        given = {"speed": speed, "episode_seconds": self.seconds}
+        for group in range(self.groups):
+            yield _row("intact", NOT_ADAPTED, where, "", group), "pretrained", given
         for foot, search, name in found:
-            worn = {**without_person(feet[name]), ADAPTED: name}
-            given = {"speed": speed, "episode_seconds": self.seconds, **SCHEDULE[1], "right_foot": worn}
+            bare = without_person(feet[name])
+            own = {**given, "right_foot": bare}, {**given, **SCHEDULE[1], "right_foot": {**bare, ADAPTED: name}}
             for group in range(self.groups):
-                yield _row(foot, ADAPTED_ALONE, where, search, group), SCHEDULE[0], given
+                yield _row(foot, NOT_ADAPTED, where, search, group), "pretrained", own[0]
+            for group in range(self.groups):
+                yield _row(foot, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own[1]
 
     def _train(self) -> bool:
         jobs = []

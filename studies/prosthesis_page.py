@@ -12,7 +12,7 @@ from springfoot.agents.markdown import MISSING, table, text_of
 from springfoot.evaluation.gait_figure import STYLE
 from springfoot.gait.scores import mean_sd
 
-from .foot_walks import ASKED, PUSH_NEWTON, Asked, told_numbers
+from .foot_walks import ABOUT_STOPS, ASKED, PUSH_NEWTON, TOLD, Asked
 from .intervals import t_interval
 
 NOT_ADAPTED, ADAPTED_ALONE, WITH_POLICY = "not adapted", "adapted", "adapted, trained"
@@ -87,8 +87,8 @@ def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = Fa
     return found
 
 
-def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], policies: Path) -> dict[str, str]:
-    """Sections of the page; `ran` says what was walked at the first place and at the others."""
+def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, str], policies: Path) -> dict[str, str]:
+    """Sections of the page; `ran`: what was walked at the first place, at the others, how long was learned."""
     first = _place(rows[0])
     here = [row for row in rows if _place(row) == first]
     note = (
@@ -96,8 +96,8 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str], p
         "as shares of episodes; numbers of walks that fell are of the strides before. Mean ± SD over rows of the CSV: "
         "groups of the same episodes, or seeds of trainings. Not adapted: legs of two sound feet, stiffness by "
         "`pretrained`. Adapted: legs (and the foot's own numbers) of `springfoot study adapt`, stiffness as its search "
-        f"left it. Trained: the same, stiffness by policies trained for a short time on it ({policies}). Cost of "
-        "transport counts what a passive spring gives back as well."
+        f"left it. Trained: the same, stiffness by policies trained on it for {ran[2]} ({policies}). Cost of "
+        f"transport counts what a passive spring gives back as well. {ABOUT_STOPS}"
     )
     text = {"PROSTHESIS": f"![Feet](prosthesis.png)\n\n{_where(first)}\n\n{_walks_table(here)}\n\n{note}"}
     if against := _passive_against(here, "rigid"):
@@ -118,12 +118,12 @@ def _place(row: Row) -> tuple[float, ...]:
 
 
 def _walks_table(rows: Sequence[Row]) -> str:
-    head = ["foot", "person", "search", "rows", "falls", "speed m/s", *(each.label for each in ASKED)]
+    head = ["foot", "person", "search", "rows", *(each.label for each in TOLD)]
     lines = []
     for (foot, person, search), group in _groups(rows).items():
-        cells = [_mean(group, key, pattern) for key, pattern in told_numbers()]
+        cells = [_mean(group, each.key, each.pattern) for each in TOLD]
         lines.append([foot, person, str(search), str(len(group)), *cells])
-    return table([*head, "ankle °", "toe °"], lines)
+    return table(head, lines)
 
 
 def _groups(rows: Sequence[Row]) -> dict[tuple[str, str, Any], list[Row]]:
@@ -205,7 +205,8 @@ def _elsewhere(rows: Sequence[Row], ran: str) -> str:
         f"{table(head, lines)}\n\nMeans ± SD over searches, and seeds or groups of episodes; {ran}, but for the first "
         "place, which is that of the tables above. Legs were searched, and policies trained, at 1.2 m/s and 63 kg; at "
         "other speeds the legs are the committed ones of that speed, moved as far as the search moved them at 1.2 m/s; "
-        "other bodies wear springs as much stiffer as their mass × height is larger."
+        "the passive foot's springs are as much stiffer as a body's mass × height is larger, the rigid foot's toe is "
+        "the same on everybody."
     )
 
 

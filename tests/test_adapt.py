@@ -103,7 +103,7 @@ def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
     assert settings_from(right_foot=foot).right_foot == foot
     assert foot[ADAPTED]["1.2"].keys() == {"sound", "other"}
     told = capsys.readouterr().out
-    assert "| not adapted | 0.00 | " in told
+    assert "| passive, not adapted | 0.00 | " in told
     assert "| passive | " in told
     again = [*words, "--start", "passive", "--sigma", "1e-9", "--foot", "passive", "--name", "same", "--design", "1"]
     assert study_main([*again, "--out", str(tmp_path / "two")]) == 0

@@ -9,14 +9,16 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from springfoot.envs.adapted import ADAPTED, committed_feet
+from springfoot.envs.physics.model import JOINT_RANGE_DEG, KNEE, RIGHT
 from springfoot.evaluation.metrics import measure
 from springfoot.evaluation.per_leg import leg_numbers
 from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
+from springfoot.evaluation.recording import TICK, record
 from springfoot.evaluation.recording_feet import record_feet
+from springfoot.evaluation.stride_tally import WARM_UP
 from springfoot.studies.adapt import kept_name
 from springfoot.studies.command import study_main
-from springfoot.studies.foot_walks import ASKED, Kept, for_body, numbers_of, walked
+from springfoot.studies.foot_walks import NAMES, SCHEDULE, Kept, beyond_stop, for_body, numbers_of, walked
 from springfoot.studies.intervals import t_interval
 from springfoot.studies.prosthesis import SEARCHES, config_of
 from springfoot.studies.prosthesis_page import (
@@ -64,6 +66,18 @@ def test_a_walk_that_falls_has_its_falls_and_no_other_numbers():
     assert own["cost_of_transport"] is None or own["push_off_J_kg"] is None
 
 
+@pytest.mark.parametrize(("name", "least", "most"), [("rigid", 0.0, 0.0), (TOE_HELD, 0.05, 0.15)])
+def test_who_holds_the_toe_leans_on_the_stop_of_a_knee(name, least, most):
+    right = {"kind": "rigid", ADAPTED: name}
+    given = {**SHORT, **SCHEDULE[1], "right_foot": right, "speed": 1.05 if name == TOE_HELD else 1.2}
+    acting, settings = prepare(SCHEDULE[0], given)
+    recording = record(acting, settings, name=name, episodes=1, seed=500)
+    share = beyond_stop(recording)
+    assert share is not None and least <= share <= most
+    knee = recording.series["angle"][0, round(WARM_UP / TICK) :, RIGHT, KNEE]
+    assert np.mean(knee < np.deg2rad(JOINT_RANGE_DEG[KNEE][0])) == pytest.approx(share)
+
+
 def test_springs_of_a_foot_scale_with_the_body_and_angles_do_not():
     foot = {"kind": "passive", "ankle_stiffness": 600.0, "ankle_deg": 4.0, "toe_stiffness": 50.0}
     assert for_body(foot, 1.70, 63.0) == foot
@@ -80,8 +94,7 @@ def test_students_interval_is_that_of_the_t_test():
 
 def rows_of(passive, adaptive, intact) -> list[dict]:
     where = dict(zip(WHERE, (1.7, 63.0, 1.2), strict=True))
-    shown = {each.key: None for each in ASKED}
-    shown |= dict.fromkeys(("falls", "speed_m_s", "ankle_range_deg", "toe_range_deg"))
+    shown = dict.fromkeys(NAMES)
     own = [
         {"foot": "intact", "person": NOT_ADAPTED, "search": "", "seed": "", **where, **shown, "sound_peak_bw": intact}
     ]
@@ -121,14 +134,15 @@ def test_the_passive_foot_is_better_than_the_rigid_one_by_an_interval(rigid, wor
     rows = rows_of([1.5, 1.52, 1.48], [1.4, 1.41, 1.39], 1.3)
     worn = [row for row in rows if (row["foot"], row["person"]) == ("passive", ADAPTED_ALONE)]
     rows += [{**row, "foot": "rigid", "sound_peak_bw": peak} for row, peak in zip(worn, rigid, strict=True)]
-    text = sections(rows, [], ("3 episodes", "2 episodes"), tmp_path)["PROSTHESIS"]
+    text = sections(rows, [], ("3 episodes", "2 episodes", "9 steps"), tmp_path)["PROSTHESIS"]
     assert re.search(f"search 1: .*{word} in [0-9] \\([^)]*sound-side peak BW", text)
 
 
 def test_the_page_tells_every_row_and_what_is_missing(tmp_path):
     rows = rows_of([1.5, 1.52, 1.48], [1.4, 1.41, 1.39], 1.3)
-    text = sections(rows, share_rows(rows), ("3 episodes", "2 episodes"), tmp_path)
+    text = sections(rows, share_rows(rows), ("3 episodes", "2 episodes", "9 steps"), tmp_path)
     assert "| passive | adapted, trained | 1 | 3 | – | – | – | 1.50 ± 0.02 |" in text["PROSTHESIS"]
+    assert "trained on it for 9 steps" in text["PROSTHESIS"]
     assert "50% [" in text["RECOVERED"]
     assert "| push-off work J/kg | adapted, trained | 1 | 0 | – | – | – | – | no gap |" in text["RECOVERED"]
 
