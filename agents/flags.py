@@ -78,8 +78,9 @@ def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
 
 def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
     """The foot that a flag is given: as it is, or that of the file of that name; no kind's name has a suffix."""
-    named = isinstance(given, str) and (Path(given).is_file() or Path(given).suffix)
-    return read_foot(given) if named else given
+    if isinstance(given, str) and (Path(given).is_file() or Path(given).suffix):
+        return read_foot(given)
+    return given
 
 
 FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]
