@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -302,8 +303,9 @@ def test_a_leg_that_was_not_measured_is_left_out(tmp_path):
     ],
 )
 def test_numbers_beside_the_curves_that_contradict_them_are_refused(tmp_path, wrong, words):
+    changes: dict[str, Any] = {name: np.full(101, value) for name, value in wrong.items()}
     with pytest.raises(SpringfootError, match=words):
-        read_gait(gait_csv(tmp_path / "mean.csv", **{name: np.full(101, value) for name, value in wrong.items()}))
+        read_gait(gait_csv(tmp_path / "mean.csv", **changes))
 
 
 def test_reading_text_needs_no_c3d_library():
