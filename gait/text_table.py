@@ -112,6 +112,10 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
         raise SpringfootError(
             f"{name}, line {header}: must have at most {MOST_COLUMNS:,} columns, has {len(columns):,}"
         )
+    if len(columns) == 1 and (separator := next((each for each in ";\t" if each in names[0]), None)):
+        raise SpringfootError(
+            f"{name}, line {header}: cells must be separated by commas, with decimal points, got {separator!r}"
+        )
     if twice := next((column for column, times in Counter(columns).items() if times > 1), None):
         raise SpringfootError(f"{name}, line {header}: column {twice} stands twice")
     rows = []

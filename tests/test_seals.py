@@ -140,13 +140,15 @@ def test_gigabytes_in_place_of_data_of_the_package_are_refused_unread(tmp_path, 
         ("a,b\n" + "1," * LONGEST_LINE, f"line 2: more than {LONGEST_LINE:,} letters"),
         ("a,b,c\n" + "1,2,3\n" * (MOST_CELLS // 3 + 1), "line 1000002: more than 3,000,000 cells; leave out columns"),
         ("a,b,a\n1,2,3\n", "line 1: column a stands twice"),
+        ("a;b\n1,5;2,0\n", "line 1: cells must be separated by commas, with decimal points, got ';'"),
+        ("a\tb\n1\t2\n", "line 1: cells must be separated by commas, with decimal points, got '\\t'"),
         ("a,b\n", " has no data"),
         ("", " has no data"),
         ("a\0b", " is not a text file"),
         ("a,b\n1,\udcff\n", " is not a text file"),
         ('a,b\n"1,2\n', " is not a CSV file: unexpected end of data"),
     ],
-    ids=["columns", "line", "cells", "twice", "header", "empty", "NUL", "no UTF-8", "quote"],
+    ids=["columns", "line", "cells", "twice", "semicolons", "tabs", "header", "empty", "NUL", "no UTF-8", "quote"],
 )
 def test_a_table_of_the_wrong_shape_is_refused(tmp_path, text, said):
     path = tmp_path / "a.csv"
