@@ -268,9 +268,7 @@ def settings_from(**values: Any) -> BipedSettings:
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    values = {
-        name: foot_setting(name, value) if name in FOOT_SETTINGS else plain(value) for name, value in values.items()
-    }
+    values = {name: foot_setting(name, each) if name in FOOT_SETTINGS else plain(each) for name, each in values.items()}
     if values.get("schedule") is not None:
         values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
     if values.get("human") is not None:

@@ -85,10 +85,11 @@ def test_pretrained_is_the_mean_that_the_page_says():
     mean = mean_policy(policies, np.array([float(share.replace("−", "-")) for _, share in shares]))
     shipped = read_policy("pretrained")
     assert len(policies) == 11 and mean.settings == shipped.settings
-    for own, found in zip((*shipped.weights, *shipped.biases), (*mean.weights, *mean.biases), strict=True):
-        np.testing.assert_array_equal(own, found)
-    np.testing.assert_array_equal(shipped.observation_mean, mean.observation_mean)
-    np.testing.assert_array_equal(shipped.observation_variance, mean.observation_variance)
+    shipped_arrays = *shipped.weights, *shipped.biases, shipped.observation_mean, shipped.observation_variance
+    mean_arrays = *mean.weights, *mean.biases, mean.observation_mean, mean.observation_variance
+    for own, found in zip(shipped_arrays, mean_arrays, strict=True):
+        # OpenBLAS adds in another order on processors with AVX-512 than on that where it was made.
+        np.testing.assert_allclose(own, found, rtol=0.0, atol=8 * np.finfo(own.dtype).eps * np.abs(own).max())
 
 
 def test_a_search_writes_a_policy_and_the_shares_it_is_of(policies, tmp_path, capsys):
