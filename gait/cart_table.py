@@ -58,6 +58,33 @@ class HyperbolicPath:
         return self.polynomial(time, derivative) + self.rate**derivative * (growing + (-1) ** derivative * fading)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Bob:
+    """Rise and fall of the CoM about its mean height, the same in every step."""
+
+    step_time: float
+    """Duration of a step [s]."""
+    amplitude: float
+    """Of its cosine [m]: half of the rise and fall of one that has no second."""
+    lowest_at: float
+    """Time at which the cosine is lowest [s]."""
+    second: tuple[float, float] = (0.0, 0.0)
+    """Of the second harmonic, over `amplitude`: cosine and sine of twice the turn since `lowest_at` [-]."""
+
+    def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
+        """-amplitude (cos u + second[0] cos 2u + second[1] sin 2u), u = 2 pi (t - lowest_at) / T [m], or a time
+        derivative of it."""
+        turn = 2 * pi / self.step_time
+        # Each derivative of a cosine is a quarter turn ahead.
+        angle, ahead = turn * (np.asarray(time) - self.lowest_at), derivative * pi / 2
+        one = -self.amplitude * turn**derivative * np.cos(angle + ahead)
+        if self.second == (0.0, 0.0):
+            return one
+        c, s = self.second
+        scale = -self.amplitude * (2 * turn) ** derivative
+        return one + scale * (c * np.cos(2 * angle + ahead) + s * np.sin(2 * angle + ahead))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComMotion:
     """A CoM that repeats itself every step, one step further on; times [s] within a step, made by `periodic_com`."""
@@ -66,10 +93,8 @@ class ComMotion:
     """Duration of a step [s]."""
     height: float
     """Mean height above the floor [m]."""
-    amplitude: float
-    """Half of the CoM's rise and fall [m]."""
-    lowest_at: float
-    """Time of the lowest point [s]."""
+    bob: Bob
+    """Its rise and fall."""
     slope: float = 0.0
     """Slope of the ground [rad], uphill positive: x is along it, z at right angles to it."""
     path: PPoly | HyperbolicPath = field(repr=False)
@@ -79,15 +104,15 @@ class ComMotion:
 
     def position(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """(x, z) [m]."""
-        return self.path(time), self.height + _bob(time, self.step_time, self.amplitude, self.lowest_at)
+        return self.path(time), self.height + self.bob(time)
 
     def velocity(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """(forward, up) [m/s]."""
-        return self.path(time, 1), _bob(time, self.step_time, self.amplitude, self.lowest_at, 1)
+        return self.path(time, 1), self.bob(time, 1)
 
     def acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """(forward, up) [m/s^2]."""
-        return self.path(time, 2), _bob(time, self.step_time, self.amplitude, self.lowest_at, 2)
+        return self.path(time, 2), self.bob(time, 2)
 
     def pivot(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """The point (x, z) [m] through which the ground reaction force acts."""
@@ -104,8 +129,7 @@ def periodic_com(
     zmp_points: NDArray,
     step_length: float,
     height: float,
-    amplitude: float,
-    lowest_at: float,
+    bob: Bob,
     slope: float = 0.0,
     ahead: PPoly | None = None,
 ) -> ComMotion:
@@ -117,17 +141,16 @@ def periodic_com(
     else with an error below 1e-9 m. `ahead` [m] over time [s] is that of `ComMotion`: it stands beside x on the right.
     """
     if ahead is not None:
-        path = _stepped(zmp_times, zmp_points, step_length, height, amplitude, lowest_at, slope, ahead)
-    elif amplitude == 0:
+        path = _stepped(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
+    elif bob.amplitude == 0:
         lines = PPoly(np.stack([np.diff(zmp_points) / np.diff(zmp_times), zmp_points[:-1]]), zmp_times)
         path = closed_form(lines, step_length, height, slope)
     else:
-        path = _integrated(zmp_times, zmp_points, step_length, height, amplitude, lowest_at, slope)
+        path = _integrated(zmp_times, zmp_points, step_length, height, bob, slope)
     return ComMotion(
         step_time=float(zmp_times[-1]),
         height=height,
-        amplitude=amplitude,
-        lowest_at=lowest_at,
+        bob=bob,
         slope=slope,
         path=path,
         ahead=ahead,
@@ -170,8 +193,7 @@ def _integrated(
     zmp_points: NDArray,
     step_length: float,
     height: float,
-    amplitude: float,
-    lowest_at: float,
+    bob: Bob,
     slope: float,
 ) -> PPoly:
     """The path of `periodic_com` as the sum of one particular and two homogeneous solutions that is periodic."""
@@ -179,8 +201,8 @@ def _integrated(
     back, down = -gravity(slope)
 
     def pull(t: ArrayLike) -> NDArray:
-        z = height + _bob(t, step_time, amplitude, lowest_at)
-        return (down + _bob(t, step_time, amplitude, lowest_at, 2)) / z
+        z = height + bob(t)
+        return (down + bob(t, 2)) / z
 
     driven = np.array([1.0, 0.0, 0.0])  # columns: driven by ZMP and slope, from unit position, from unit velocity
 
@@ -214,8 +236,7 @@ def _stepped(
     zmp_points: NDArray,
     step_length: float,
     height: float,
-    amplitude: float,
-    lowest_at: float,
+    bob: Bob,
     slope: float,
     ahead: PPoly,
 ) -> PPoly:
@@ -232,8 +253,8 @@ def _stepped(
     t = np.append(np.concatenate(pieces), step_time)
 
     def equation(time: NDArray) -> NDArray:
-        z = height + _bob(time, step_time, amplitude, lowest_at)
-        pull = (down + _bob(time, step_time, amplitude, lowest_at, 2)) / z
+        z = height + bob(time)
+        pull = (down + bob(time, 2)) / z
         matrix = np.zeros((len(time), 3, 3))
         matrix[:, 0, 1], matrix[:, 1, 0] = 1.0, pull
         matrix[:, 1, 2] = pull * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
@@ -257,10 +278,3 @@ def _stepped(
     bernstein = [x[:-1], x[:-1] + h * v[:-1] / 5, x[:-1] + 2 * h * v[:-1] / 5 + h**2 * a[:-1] / 20]
     bernstein += [x[1:] - 2 * h * v[1:] / 5 + h**2 * a[1:] / 20, x[1:] - h * v[1:] / 5, x[1:]]
     return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))
-
-
-def _bob(t: ArrayLike, step_time: float, amplitude: float, lowest_at: float, derivative: int = 0) -> NDArray:
-    """-amplitude cos(2 pi (t - lowest_at) / step_time) or a time derivative of it."""
-    turn = 2 * pi / step_time
-    # Each derivative of a cosine is a quarter turn ahead.
-    return -amplitude * turn**derivative * np.cos(turn * (np.asarray(t) - lowest_at) + derivative * pi / 2)

@@ -5,7 +5,7 @@ upright trunk people's ZMP would take them from people's angles. What walks on p
 instead: same steps, time and height, over a ZMP that is where people's is.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,8 @@ class ComPlan:
     """The CoM over the time of a step, lowest in double support."""
     human: HumanGait
     """People's gait at this speed and height, or what `plan_walk` was given in its place."""
+    lean: float = 0.0
+    """Pitch of the trunk to where its CoM, with that of a load, is upright over the hip [rad], forward positive."""
 
     @property
     def slope(self) -> float:
@@ -96,8 +98,7 @@ def over_peoples_zmp(plan: ComPlan) -> ComPlan:
         np.array([zmp_to - plan.step_length, zmp_from, zmp_to]),
         plan.step_length,
         plan.motion.height,
-        plan.motion.amplitude,
-        min(double_support / 2, LOWEST * plan.step_time),
+        replace(plan.motion.bob, lowest_at=min(double_support / 2, LOWEST * plan.step_time)),
         plan.slope,
     )
     return ComPlan(

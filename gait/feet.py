@@ -27,8 +27,6 @@ QUICKEST_FOOT_FLAT = 0.02
 HEEL_ROCKER_POWER = 2
 """Power with which the pitch falls with what is left of the heel rocker; chosen: it ends without a jump of its rate."""
 
-VIA = (1 / 3, 2 / 3)
-"""Parts of the swing at which its via points lie; chosen."""
 MID_SWING = (0.3, 0.7)
 """Parts of the swing between which ball and heel must clear the floor: they leave and land on either side of it."""
 FLOOR_TOLERANCE = 0.003
@@ -182,7 +180,7 @@ class FootPath:
         way, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
         forward = start[0, 0] + way * (end[0, 0] - start[0, 0])
         via = np.stack([forward, up * self.body.length_scale + self.lift, pitch], -1)
-        knots = self.toe_off + np.array([0.0, *VIA, 1.0]) * (1 - self.toe_off)
+        knots = self.toe_off + np.linspace(0.0, 1.0, len(way) + 2) * (1 - self.toe_off)
         ends = ([(1, start[1]), (2, start[2])], [(1, end[1]), (2, end[2])])
         return make_interp_spline(knots, np.stack([start[0], *via, end[0]]), k=5, bc_type=ends)
 

@@ -15,7 +15,7 @@ from . import foot_style
 from .arrays import NDArray
 from .body import Body
 from .com_plan import PEOPLES_SHARE
-from .feet import VIA, feet_under_zmp
+from .feet import feet_under_zmp
 from .human import human_gait
 from .plan import LEAST_FULL_ROLL, WalkPlan, plan_walk
 from .posture import POSTURE_SAMPLES, STRAIGHTEST_KNEE, full_reach, legs_under_com
@@ -84,7 +84,7 @@ def use(values: NDArray) -> None:
     """Put other constants in the place of those at a roll of 1."""
     toe_power, roll_power, *via = map(float, values)
     foot_style.TOE_ROCKER_POWER, foot_style.ROLL_POWER = (foot_style.TOE_ROCKER_POWER[0], toe_power), roll_power
-    for name, pair in zip(("VIA_FORWARD", "VIA_UP", "VIA_PITCH"), np.reshape(via, (3, len(VIA))), strict=True):
+    for name, pair in zip(("VIA_FORWARD", "VIA_UP", "VIA_PITCH"), np.reshape(via, (3, -1)), strict=True):
         setattr(foot_style, name, (getattr(foot_style, name)[0], tuple(pair.tolist())))
 
 

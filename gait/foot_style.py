@@ -54,11 +54,11 @@ class FootStyle:
     """The heel rises with this power of the time since heel-off."""
     roll_power: float
     """The toe joint rises with this power of the time since the ZMP left the toe tip."""
-    via_forward: tuple[float, float]
+    via_forward: tuple[float, ...]
     """Place of the ankle at the via points of the swing, as parts of its way from toe-off to heel strike."""
-    via_up: tuple[float, float]
+    via_up: tuple[float, ...]
     """Height of the ankle above the floor there [m at 1.70 m]."""
-    via_pitch: tuple[float, float]
+    via_pitch: tuple[float, ...]
     """Pitch of the foot there [rad]."""
     heel_rise: tuple[float, float] | None = None
     """Share of the toe-off pitch that the foot has half-way from heel-off, and the rate of its pitch at toe-off over

@@ -31,19 +31,19 @@ def spinning_legs(
     step_length: float,
     knee: float,
     height: float | None = None,
+    lean: float = 0.0,
 ) -> tuple[ComMotion, LegPostures]:
     """The CoM and the legs whose angular momentum it knows, as high as leaves every knee flexed by `knee` [rad].
 
-    `legs_at` plans for a CoM `height` [m], which may be given, and a pivot; `still` is that of legs that do not turn.
-    Raises `SpringfootError` where they do not
-    settle.
+    `legs_at` plans for a CoM `height` [m], which may be given, and a pivot; `still` is that of legs that do not turn;
+    `lean` [rad] is that of the trunk. Raises `SpringfootError` where they do not settle.
     """
     reach, given = full_reach(body, knee), height
     height, ahead = 1.05 * body.leg_length if given is None else given, still
     for _ in range(ROUNDS):
         motion, legs = legs_at(height, ahead)
         lacking = float(legs.reach.max()) - reach if given is None else 0.0
-        before, ahead = ahead, pivot_ahead(body, motion, legs, step_length)
+        before, ahead = ahead, pivot_ahead(body, motion, legs, step_length, lean)
         moved = float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
         if abs(lacking) < PLAN_SETTLED and moved < PLAN_SETTLED:
             return motion, legs
@@ -53,8 +53,10 @@ def spinning_legs(
     raise SpringfootError("no CoM settles over these feet: legs too short, or a swing too violent, for this step")
 
 
-def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: float) -> CubicSpline:
-    """Forward from the CoM to the pivot [m] over the time of a step, trunk upright."""
+def pivot_ahead(
+    body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0
+) -> CubicSpline:
+    """Forward from the CoM to the pivot [m] over the time of a step, trunk held upright or at a `lean` [rad]."""
     stride_time, half = 2 * motion.step_time, POSTURE_SAMPLES // 2
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     angles = {name: getattr(legs, name) for name in ("thigh", "knee", "ankle", "toe")}
@@ -64,7 +66,8 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     com = np.stack(motion.position(np.mod(2 * phase, 1.0) * motion.step_time), -1)
     com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)
     own = spin_rate(body, leg, com)
-    upper = hypot(*body.upper_moment) * np.array([sin(motion.slope), cos(motion.slope)])  # upright over the hip
+    upright = motion.slope + lean
+    upper = hypot(*body.upper_moment) * np.array([sin(upright), cos(upright)])
     turning = own + np.roll(own, -half)
     mass = body.trunk_mass + body.carried_mass
     lever = mass * (leg.hip - com) + upper

@@ -18,7 +18,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from .arrays import NDArray
 from .body import GRAVITY, Body
-from .cart_table import ComMotion, periodic_com
+from .cart_table import Bob, ComMotion, periodic_com
 from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point
 from .errors import SpringfootError, require_within
 from .feet import FootPath, feet_under_zmp, refuse_swing_in_ground
@@ -172,19 +172,25 @@ def plan_walk(
     passed = zmp_from + np.array(way) * (zmp_to - zmp_from)
     zmp_points = np.array([zmp_to - step_length, zmp_from, *passed, zmp_to])
     feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance, style and style.foot)
+    lean = 0.0 if style is None else style.lean
 
+    bob = Bob(
+        step_time=step_time,
+        amplitude=com_amplitude,
+        lowest_at=double_support * (0.5 if style is None else style.lowest),
+        second=(0.0, 0.0) if style is None else style.rise_again,
+    )
     last: list[LegPostures] = []
 
     def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
-        lowest_at = double_support * (0.5 if style is None else style.lowest)
-        motion = periodic_com(zmp_times, zmp_points, step_length, height, com_amplitude, lowest_at, slope, ahead)
-        legs = legs_under_com(body, motion, feet, human, last[0] if last and ahead is not None else None)
+        motion = periodic_com(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
+        legs = legs_under_com(body, motion, feet, human, last[0] if last and ahead is not None else None, lean)
         last[:] = [legs]
         return motion, legs
 
     if style is not None:
         still = PPoly(np.zeros((1, 1)), np.array([0.0, step_time]))
-        motion, legs = spinning_legs(body, legs_at, still, step_length, style.knee, com_height)
+        motion, legs = spinning_legs(body, legs_at, still, step_length, style.knee, com_height, lean)
     else:
         motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
     refuse_impossible_legs(body, legs)
@@ -198,6 +204,7 @@ def plan_walk(
         motion=motion,
         feet=feet,
         human=human,
+        lean=lean,
         joint_table=_periodic(table),
         hip_table=_periodic(legs.hip, shift=np.array([2 * step_length, 0.0])),
     )

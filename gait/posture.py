@@ -55,10 +55,15 @@ class LegPostures:
 
 
 def legs_under_com(
-    body: Body, motion: ComMotion, feet: FootPath, human: HumanGait, near: LegPostures | None = None
+    body: Body,
+    motion: ComMotion,
+    feet: FootPath,
+    human: HumanGait,
+    near: LegPostures | None = None,
+    lean: float = 0.0,
 ) -> LegPostures:
     """The posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one; sooner found `near`
-    one.
+    one. `lean` [rad] is that of `ComPlan`.
 
     Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
     """
@@ -68,7 +73,15 @@ def legs_under_com(
     ankle, pitch, toe = _feet_over_stride(feet, human)
     half = POSTURE_SAMPLES // 2
     return legs_under(
-        body, com, ankle, pitch, toe, lambda leg: leg + np.roll(leg, half, axis=-1), motion.slope, near and near.hip.T
+        body,
+        com,
+        ankle,
+        pitch,
+        toe,
+        lambda leg: leg + np.roll(leg, half, axis=-1),
+        motion.slope,
+        near and near.hip.T,
+        lean,
     )
 
 
@@ -88,8 +101,10 @@ def legs_under(
     both: Callable[[NDArray], NDArray],
     slope: float = 0.0,
     near: NDArray | None = None,
+    lean: float = 0.0,
 ) -> LegPostures:
-    """The posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip.
+    """The posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip, but
+    for a `lean` [rad].
 
     `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
     length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2);
@@ -111,8 +126,8 @@ def legs_under(
             + foot_and_toe
         )
         com_from_hip = both(leg) / body.total_mass
-        com_from_hip[0] += trunk * sin(slope)
-        com_from_hip[1] += trunk * cos(slope)
+        com_from_hip[0] += trunk * sin(slope + lean)
+        com_from_hip[1] += trunk * cos(slope + lean)
         moved = np.abs(com - com_from_hip - hip).max()
         hip = com - com_from_hip
         if moved < 1e-12:

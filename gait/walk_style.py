@@ -38,6 +38,10 @@ class WalkStyle:
     """Parts of its travel that the ZMP has done a third and two thirds through single support; None: these parts."""
     lowest: float = 0.5
     """Part of double support after which the CoM is lowest."""
+    rise_again: tuple[float, float] = (0.0, 0.0)
+    """Second harmonic of the CoM's height (`cart_table.Bob`): cosine and sine over half of `rise` [-]."""
+    lean: float = 0.0
+    """Pitch at which the trunk is held [rad], forward positive, 0 with its CoM upright over the hip."""
     foot: FootStyle
     """How the feet roll and swing."""
 

@@ -8,7 +8,7 @@ range. The search begins at round numbers.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -39,6 +39,9 @@ CHOICES: dict[str, tuple[float, float, float, float]] = {
     "zmp_way_1": (0.4, 0.1, 0.02, 0.97),  # of its travel
     "zmp_way_2": (0.7, 0.1, 0.03, 0.98),
     "rise": (0.5, 0.2, 0.0, 2.0),  # of the compass gait
+    "rise_again_1": (0.0, 0.15, -1.0, 1.0),  # of half of the rise
+    "rise_again_2": (0.0, 0.15, -1.0, 1.0),
+    "lean": (0.0, 0.02, -0.2, 0.2),  # rad
     "knee": (0.1, 0.05, 0.02, 1.0),  # rad
     "heel_strike_pitch": (0.3, 0.1, 0.01, 1.0),  # rad
     "flat": (0.5, 0.15, 0.1, 1.0),  # of double support
@@ -48,16 +51,20 @@ CHOICES: dict[str, tuple[float, float, float, float]] = {
     "heel_rise_1": (0.3, 0.08, 0.05, 0.6),
     "heel_rise_2": (1.5, 0.4, 0.0, 4.0),
     "roll_power": (2.5, 0.5, 2.0, 9.0),  # below, the pitch's rate would jump
-    "via_forward_1": (1 / 3, 0.05, 0.0, 1.0),  # of the way of the ankle
-    "via_forward_2": (2 / 3, 0.05, 0.0, 1.0),
+    "via_forward_1": (0.25, 0.05, 0.0, 1.0),  # of the way of the ankle
+    "via_forward_2": (0.5, 0.05, 0.0, 1.0),
+    "via_forward_3": (0.75, 0.05, 0.0, 1.0),
     "via_up_1": (0.15, 0.03, 0.0, 1.0),  # m
-    "via_up_2": (0.10, 0.02, 0.0, 1.0),
+    "via_up_2": (0.12, 0.02, 0.0, 1.0),
+    "via_up_3": (0.1, 0.02, 0.0, 1.0),
     "via_pitch_1": (-0.5, 0.25, -2.0, 1.0),  # rad
-    "via_pitch_2": (0.0, 0.15, -2.0, 1.0),
+    "via_pitch_2": (-0.25, 0.15, -2.0, 1.0),
+    "via_pitch_3": (0.0, 0.15, -2.0, 1.0),
     "toe_swing": (0.0, 0.1, -0.3, 1.0),  # rad
 }
 """What is chosen: where the search begins, one unit of it, the least and the largest value."""
-PAIRS = ("via_forward", "via_up", "via_pitch", "heel_rise")
+GROUPS = {"via_forward": 3, "via_up": 3, "via_pitch": 3, "heel_rise": 2, "zmp_way": 2, "rise_again": 2}
+"""Of a style, the numbers that are chosen one by one."""
 LEAST_ADVANCE = 0.005
 """Least part of its travel that the ZMP does in the second third of single support [-]; chosen."""
 LEAST_CLEARANCE = 0.015
@@ -75,13 +82,12 @@ def style_at(vector: NDArray) -> WalkStyle:
     values = {}
     for (name, (start, unit, least, most)), step in zip(CHOICES.items(), vector, strict=True):
         values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
-    pairs = {name: [values.pop(f"{name}_1"), values.pop(f"{name}_2")] for name in PAIRS}
-    travel = [values.pop("zmp_from"), values.pop("zmp_to")]
-    way = [values.pop("zmp_way_1"), values.pop("zmp_way_2")]
+    groups = {name: [values.pop(f"{name}_{k + 1}") for k in range(count)] for name, count in GROUPS.items()}
+    travel, way = [values.pop("zmp_from"), values.pop("zmp_to")], groups["zmp_way"]
     way[1] = max(way[1], way[0] + LEAST_ADVANCE)
-    walk = {name: values.pop(name) for name in ("double_support", "lowest", "rise", "knee")}
-    foot = values | pairs | {"heel_radius": HEEL_RADIUS}
-    return style_from(walk | {"zmp_travel": travel, "zmp_way": way, "foot": foot})
+    both = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
+    walk = {field.name: both.pop(field.name) for field in fields(WalkStyle) if field.name in both}
+    return style_from(walk | {"foot": both})
 
 
 def vector_of(style: WalkStyle) -> NDArray:
@@ -89,10 +95,11 @@ def vector_of(style: WalkStyle) -> NDArray:
     values: dict[str, Any] = style.to_json()
     values |= values.pop("foot")
     values["zmp_from"], values["zmp_to"] = values.pop("zmp_travel")
-    for name in (*PAIRS, "zmp_way"):
-        if values.get(name) is None:
-            raise SpringfootError(f"a search cannot begin at a style without {name}")
-        values[f"{name}_1"], values[f"{name}_2"] = values.pop(name)
+    for name, count in GROUPS.items():
+        given = values.pop(name) or ()
+        if len(given) != count:
+            raise SpringfootError(f"a search cannot begin at a style with {len(given)} of {name}, it needs {count}")
+        values |= {f"{name}_{k + 1}": each for k, each in enumerate(given)}
     return np.array([(values[name] - start) / unit for name, (start, unit, *_) in CHOICES.items()])
 
 
@@ -109,9 +116,9 @@ def price(
     )
     try:
         plan = plan_walk(body, speed, style=style_at(vector))
+        effort = effort_of(plan, muscle)
     except SpringfootError:
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
-    effort = effort_of(plan, muscle)
     lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())
     low = max(0.0, -0.001 - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
     terms = effort.work, effort.activation, effort.rate

@@ -51,7 +51,7 @@ class Predict(WalkingStudy):
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
     """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
-    plan_generations: int = 160
+    plan_generations: int = 400
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
     """Generations of the second stage, leg constants of walks without pushes."""

@@ -167,7 +167,7 @@ class LegController:
         right: Sequence[tuple[LegConstants, ReferenceWalk]] = (),
     ):
         self._subjects = subjects
-        self._constants = np.array([_gains(c, walk.body, walk.plan.stride_time) for c, walk in rows], GAINS)
+        self._constants = np.array([_gains(c, walk) for c, walk in rows], GAINS)
         self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in (*rows, *right)]))
         subjects.rows["legs"]["right"] = len(rows) if right else 0
         self.phase = subjects.rows["legs"]["phase"]
@@ -184,13 +184,14 @@ class LegController:
         self.phase[ids] = leg_phases(left_phase)
 
 
-def _gains(c: LegConstants, body: Body, stride_time: float) -> tuple[float, ...]:
+def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
+    body, stride_time = walk.body, walk.plan.stride_time
     scale, time_scale = body.stiffness_scale, sqrt(body.length_scale)
     return (
         TOUCHDOWN_LOAD * body.total_mass * GRAVITY,
         CONTROL_WINDOW / (c.period_factor * stride_time),
         c.period_speed_gain / time_scale,
-        radians(c.trunk_pitch_deg) + body.trunk_lean,
+        radians(c.trunk_pitch_deg) + body.trunk_lean + walk.plan.lean,
         c.trunk_stiffness * scale,
         c.trunk_damping * scale * time_scale,
         c.speed_torque * scale / time_scale,
@@ -214,7 +215,7 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
         if joint == HIP:
-            target = target + body.trunk_lean  # hip = thigh to the vertical + pitch of the trunk
+            target = target + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
         feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
         drives.append(stiffness * target + feed)

@@ -78,5 +78,5 @@ def _start_curves(walk: ReferenceWalk) -> NDArray:
     period = first.period_factor * walk.plan.stride_time
     angles = [walk.human.mean(name, GRID) for name in ANGLES]
     rates = [walk.human.rate(name, GRID) / period for name in ANGLES]
-    pitch = np.deg2rad(first.trunk_pitch_deg) + walk.body.trunk_lean
+    pitch = np.deg2rad(first.trunk_pitch_deg) + walk.body.trunk_lean + walk.plan.lean
     return np.stack([*angles, *rates, np.full(len(GRID), pitch)], axis=-1)
