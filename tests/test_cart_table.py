@@ -6,7 +6,7 @@ from scipy.integrate import solve_bvp
 from scipy.interpolate import PPoly
 
 from springfoot.gait import GRAVITY
-from springfoot.gait.cart_table import closed_form, periodic_com, zmp
+from springfoot.gait.cart_table import Bob, closed_form, periodic_com, zmp
 
 TIMES, STEP = np.array([0.0, 0.066, 0.55]), 0.66
 POINTS = np.array([0.140 - STEP, -0.020, 0.140])
@@ -15,8 +15,9 @@ SLOPES = pytest.mark.parametrize("slope", [0.0, 0.05, -0.08])
 GRID = np.linspace(0.0, TIMES[-1], 10_001)
 
 
-def motion_over(slope, amplitude):
-    return periodic_com(TIMES, POINTS, STEP, HEIGHT, amplitude, LOWEST_AT, slope)
+def motion_over(slope, amplitude, second=(0.0, 0.0)):
+    bob = Bob(step_time=TIMES[-1], amplitude=amplitude, lowest_at=LOWEST_AT, second=second)
+    return periodic_com(TIMES, POINTS, STEP, HEIGHT, bob, slope)
 
 
 def test_zmp_of_a_body_at_rest_is_vertically_below_it():
@@ -26,10 +27,10 @@ def test_zmp_of_a_body_at_rest_is_vertically_below_it():
     assert zmp([0.0, 1.0], 0.9, [0.0, GRAVITY], [0.0, 0.0]) == pytest.approx([0.0, 0.1])
 
 
-@pytest.mark.parametrize("amplitude", [0.0, 0.02])
+@pytest.mark.parametrize("amplitude, second", [(0.0, (0.0, 0.0)), (0.02, (0.0, 0.0)), (0.02, (-0.1, 0.2))])
 @SLOPES
-def test_periodic_motion_has_the_zmp_it_was_made_for(slope, amplitude):
-    motion = motion_over(slope, amplitude)
+def test_periodic_motion_has_the_zmp_it_was_made_for(slope, amplitude, second):
+    motion = motion_over(slope, amplitude, second)
     assert np.abs(motion.zmp(GRID) - np.interp(GRID, TIMES, POINTS)).max() < 1e-6
 
 
@@ -52,6 +53,16 @@ def test_periodic_motion_is_the_solution_of_the_boundary_value_problem(slope, am
     solution = solve_bvp(dynamics, repeats, grid, guess, tol=1e-9, max_nodes=20_000)
     assert solution.success
     assert np.abs(motion.path(grid) - solution.sol(grid)[0]).max() < 1e-8
+
+
+def test_the_height_is_lowest_high_and_lowest_again_as_its_harmonics_say():
+    bob = Bob(step_time=2.0, amplitude=0.5, lowest_at=0.25, second=(0.2, -0.4))
+    # A quarter of a step after the lowest point of the cosine, twice the turn is half a turn.
+    assert bob([0.25, 0.75, 1.25]) == pytest.approx([-0.5 * 1.2, 0.5 * 0.2, 0.5 * 0.8])
+    times, step = np.linspace(0.0, 2.0, 7), 1e-5
+    for order in (1, 2):
+        slope = (bob(times + step, order - 1) - bob(times - step, order - 1)) / (2 * step)
+        np.testing.assert_allclose(bob(times, order), slope, atol=1e-7)
 
 
 @SLOPES

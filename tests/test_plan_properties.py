@@ -65,7 +65,7 @@ def assert_valid(plan: WalkPlan) -> None:
         assert jumps.max() < 20 * np.ptp(acceleration) / SAMPLES / min(plan.double_support / plan.step_time, 0.2) + 1e-9
     assert plan.com(1 - 1e-12)[0] - plan.com(0.0)[0] == pytest.approx(plan.step_length, abs=1e-8)
     np.testing.assert_allclose(plan.com_velocity(0.0), plan.com_velocity(1 - 1e-12), atol=1e-7)
-    if plan.motion.amplitude > 1e-6:
+    if plan.motion.bob.amplitude > 1e-6:
         assert PHASE[plan.com(PHASE)[1].argmin()] * plan.step_time < plan.double_support
 
     angles = plan.joint_angles(PHASE)

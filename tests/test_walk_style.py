@@ -31,12 +31,15 @@ def dynamics(plan):
     return motion, inverse_dynamics(plan.body, motion, load, plan.slope)
 
 
+@pytest.mark.parametrize("lean", [0.0, -0.05])
 @pytest.mark.parametrize("body", [Body(), Body(1.9, 90.0), Body(1.6, 55.0, carried_ratio=0.2)], ids=str)
-def test_the_hips_moments_hold_the_trunk_upright(body):
-    plan = plan_walk(body, 1.2, style=STYLE)
+def test_the_hips_moments_hold_the_trunk_upright_or_leaning(body, lean):
+    plan = plan_walk(body, 1.2, style=replace(STYLE, lean=lean))
     motion, loads = dynamics(plan)
     both = loads.moment["hip"] + np.roll(loads.moment["hip"], len(PHASE) // 2)
-    needed = -np.hypot(*body.upper_moment) * motion.hip_acceleration[:, 0]  # trunk and load lean upright over the hip
+    forward, up = motion.hip_acceleration.T
+    # Without a lean the CoM of trunk and load is upright over the hip.
+    needed = np.hypot(*body.upper_moment) * (np.sin(lean) * (up + GRAVITY) - np.cos(lean) * forward)
     assert np.sqrt(np.mean((both - needed) ** 2)) < 0.02 * np.abs(both).max()
     assert plan_walk(body, 1.2).motion.ahead is None
 
@@ -83,6 +86,14 @@ def test_a_style_takes_the_place_of_all_that_people_chose():
     other = plan_walk(Body(), 1.2, style=STYLE, human=noise)
     for name, curve in plan.joint_angles(PHASE).items():
         assert np.array_equal(curve, other.joint_angles(PHASE)[name]), name
+
+
+def test_a_swing_passes_its_via_points_however_many():
+    foot = replace(FOOT, via_forward=(0.22, 0.52, 0.82), via_up=(0.18, 0.12, 0.1), via_pitch=(-0.8, -0.3, 0.1))
+    feet = plan_walk(Body(), 1.2, style=replace(STYLE, foot=foot)).feet
+    at = feet.toe_off + np.arange(1, 4) / 4 * (1 - feet.toe_off)
+    np.testing.assert_allclose(feet.ankle(at)[1], foot.via_up, atol=1e-9)
+    np.testing.assert_allclose(feet.pitch(at), foot.via_pitch, atol=1e-9)
 
 
 def test_a_style_that_cannot_walk_is_refused():
