@@ -53,9 +53,7 @@ def spinning_legs(
     raise SpringfootError("no CoM settles over these feet: legs too short, or a swing too violent, for this step")
 
 
-def pivot_ahead(
-    body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0
-) -> CubicSpline:
+def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0) -> CubicSpline:
     """Forward from the CoM to the pivot [m] over the time of a step, trunk held upright or at a `lean` [rad]."""
     stride_time, half = 2 * motion.step_time, POSTURE_SAMPLES // 2
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES

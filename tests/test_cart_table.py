@@ -27,7 +27,7 @@ def test_zmp_of_a_body_at_rest_is_vertically_below_it():
     assert zmp([0.0, 1.0], 0.9, [0.0, GRAVITY], [0.0, 0.0]) == pytest.approx([0.0, 0.1])
 
 
-@pytest.mark.parametrize("amplitude, second", [(0.0, (0.0, 0.0)), (0.02, (0.0, 0.0)), (0.02, (-0.1, 0.2))])
+@pytest.mark.parametrize(("amplitude", "second"), [(0.0, (0.0, 0.0)), (0.02, (0.0, 0.0)), (0.02, (-0.1, 0.2))])
 @SLOPES
 def test_periodic_motion_has_the_zmp_it_was_made_for(slope, amplitude, second):
     motion = motion_over(slope, amplitude, second)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import GRAVITY, REFERENCE_MASS, Body
+from springfoot.gait.body import GRAVITY, REFERENCE_MASS
 
 from ..physics.kernel import kernel, part
 from ..physics.measurement import plant_of
