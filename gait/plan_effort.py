@@ -1,4 +1,5 @@
-"""What a plan costs a body: work and muscle excitation of its own inverse dynamics. It knows no walk of people's.
+"""What a stride costs a body, planned or simulated: work and muscle excitation of its moments. It knows no walk of
+people's.
 
 All terms are dimensionless, so that they keep their weights with body and speed.
 """
@@ -31,10 +32,13 @@ MOTION_RANGE_DEG = {"knee": (0.0, 135.0), "ankle": (-48.0, 18.0), "toe": (-30.0,
 """Least and largest angle [deg], dorsiflexion and toe up positive: ranges of motion of the American Academy of
 Orthopaedic Surgeons (1965)."""
 
+PER_DEGREE = 0.1
+"""Effort that a joint beyond its range counts for in a search [1/deg]; chosen."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class PlanEffort:
-    """The terms of one plan, both legs together."""
+class Effort:
+    """The terms of one stride, both legs together."""
 
     work: float
     """Metabolic energy of the work of hips, knees and ankles over body weight times distance [-]."""
@@ -66,17 +70,35 @@ AS_IS = Muscle()
 """Muscles as said."""
 
 
-def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> PlanEffort:
+def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
     """The effort of a plan."""
     body, phase = plan.body, np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
     angle, rate = (_joints(turns) for turns in (motion.turn, motion.rate))
-    toe = JOINTS.index("toe")
+    return effort_of_stride(body, angle, rate, moment, plan.stride_time, 2 * plan.step_length, muscle)
+
+
+def effort_of_stride(
+    body: Body,
+    angle: NDArray,
+    rate: NDArray | None,
+    moment: NDArray,
+    stride_time: float,
+    distance: float,
+    muscle: Muscle = AS_IS,
+) -> Effort:
+    """The effort of a stride of `distance` [m] in `stride_time` [s] whose legs do the same, half a stride apart.
+
+    `angle`, `rate` and `moment` (S, 4) are one leg's at hip (thigh to the vertical), knee, ankle and toe, evenly over
+    the stride: flexion and dorsiflexion positive [rad], [rad/s], extension and plantarflexion positive [N m]. Without
+    a `rate` it is the angle's.
+    """
+    tick, toe = stride_time / len(angle), JOINTS.index("toe")
+    rate = _change(angle, tick) if rate is None else rate
     moment = moment - muscle.tissue * passive_moments(body, angle)
     power = (-moment * rate)[:, :toe]
-    tick, distance = plan.stride_time / EFFORT_SAMPLES, 2 * plan.step_length
     pull = np.maximum(moment[:, _ANKLE], 0.0)
     power[:, _ANKLE] += muscle.tendon * pull * _change(pull, tick) / (TENDON * body.stiffness_scale)
     spent = (
@@ -90,7 +112,7 @@ def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> PlanEffort:
         own = bent[:, JOINTS.index(joint)]
         beyond += max(0.0, float(own.max()) - most) + max(0.0, least - float(own.min()))
     weight = _of_groups(VOLUME, moment) / np.mean(list(VOLUME.values()))
-    return PlanEffort(
+    return Effort(
         work=float(2 * spent / (body.total_mass * GRAVITY * distance)),
         activation=float(2 * np.mean(weight * activation**2, 0).sum()),
         rate=float(2 * ACTIVATION_TIME**2 * np.mean(weight * change**2, 0).sum()),

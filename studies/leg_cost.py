@@ -9,7 +9,7 @@ with and without pushes, and with springs that nobody tuned for it: constant sti
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from springfoot.gait.human import HumanGait
 from springfoot.gait.scores import force_features, stride_work, travel
 
 from .leg_walks import FOREIGN, SETTLED, foreign_springs, series, speed_of, walk
+from .walk_effort import effort_price
+
+Pays = Literal["likeness", "effort"]
+"""What an undisturbed walk pays for."""
 
 SCHEDULED, PUSHED, SET_OFF = 2, 3, 4
 """Walks of each candidate with the schedule: undisturbed, pushed, starting to walk."""
@@ -89,9 +93,12 @@ def cost(
     push: float,
     ease: float = 0.0,
     foreign: float = 1.0,
+    pays: Pays = "likeness",
+    impact: float = 1.0,
 ) -> NDArray:
     """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks with
-    springs that nobody tuned."""
+    springs that nobody tuned; an undisturbed walk `pays` for what it misses, or for its effort, and for its `impact` at
+    this price (`walk_effort`)."""
     springs, pushed_springs = foreign_springs(settings)
     walks = SCHEDULED + len(springs)
     settings = replace(settings, unevenness_m=UNEVENNESS)
@@ -108,8 +115,8 @@ def cost(
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
-            missed = misses(records, index, biped, SETTLED)
-            total[candidate] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / SCHEDULED
+            paid = _paid(records, index, biped, pays, impact)
+            total[candidate] += (FALL_COST if paid is None else paid) / SCHEDULED
     if settings.equilibrium == "planned" and settings.guide == "people":
         lines = replace(settings, **own_settings("thesis", settings))
         missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
@@ -128,6 +135,16 @@ def cost(
     missing = missing.reshape(len(candidates), walks)
     fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
     return total + FALL_COST * fallen
+
+
+def _paid(records: dict[str, NDArray], index: int, biped: Biped, pays: Pays, impact: float) -> float | None:
+    """What walk `index` pays; None if it takes too few strides."""
+    missed = misses(records, index, biped, SETTLED)
+    if missed is None:
+        return None
+    if pays == "likeness":
+        return float(np.linalg.norm(missed))
+    return effort_price(records, index, biped, SETTLED, missed, impact)
 
 
 def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:

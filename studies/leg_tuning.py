@@ -4,7 +4,8 @@
     springfoot study leg-tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
 
 Least squares on the same ruler may come first: they find the walk, the generations make it stand pushes. What a
-candidate pays stands in `leg_cost`. The result is a fit to people's curves, not a prediction.
+candidate pays stands in `leg_cost`. The result is a fit to people's curves, not a prediction; unless it follows the
+plan (`--guide plan`), or walks for least effort then (`--pays effort`).
 """
 
 import json
@@ -33,7 +34,7 @@ from springfoot.gait.walk_style import least_work
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .generic_constants import GENERIC, generic_constants
 from .kept_search import asked_of, generations
-from .leg_cost import REFINED_SECONDS, all_misses, cost
+from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
 from .study import Answer, OnProgress, Study
 
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
@@ -125,6 +126,10 @@ class LegTuning(Study):
     """Size of the pushes of the pushed walks [N]."""
     foreign: float = 1.0
     """Price of the walks with springs that nobody tuned; at 0 they count for nothing."""
+    pays: Pays = "likeness"
+    """What an undisturbed walk pays for: its distance from people, or the plan, or its own effort and impact."""
+    impact: float = 1.0
+    """Price of impact over that of effort, where walks pay for them."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
@@ -154,6 +159,9 @@ class LegTuning(Study):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
         require_number("foreign", self.foreign, 0)
+        require_number("impact", self.impact, 0)
+        if self.pays == "effort" and self.refinements:
+            raise SpringfootError(f"refinements must be 0 where a walk pays for effort, got {self.refinements}")
 
     @property
     def total(self) -> float:
@@ -199,7 +207,9 @@ class LegTuning(Study):
             ease = max(0.0, 1.0 - generation / self.ease) if self.ease else 0.0
             candidates = [search.constants(v) for v in vectors]
             seed = self.seed + 1000 * generation
-            return cost(settings, candidates, seed, self.threads, self.push_newton, ease, self.foreign)
+            return cost(
+                settings, candidates, seed, self.threads, self.push_newton, ease, self.foreign, self.pays, self.impact
+            )
 
         asked = asked_of(self) | {"from": asdict(begin), "style": self._style()}
         for generation, _, paid in generations(strategy, self.generations, price, self.log, asked):

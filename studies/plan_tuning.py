@@ -23,7 +23,7 @@ from springfoot.gait.body import HEEL_RADIUS, Body
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.human import human_gait
 from springfoot.gait.plan import WalkPlan, plan_walk
-from springfoot.gait.plan_effort import AS_IS, Muscle, PlanEffort, effort_of
+from springfoot.gait.plan_effort import AS_IS, PER_DEGREE, Effort, Muscle, effort_of
 from springfoot.gait.plan_gait import gait_of
 from springfoot.gait.walk_style import STYLES, WalkStyle, least_work, style_from
 
@@ -69,8 +69,8 @@ LEAST_ADVANCE = 0.005
 """Least part of its travel that the ZMP does in the second third of single support [-]; chosen."""
 LEAST_CLEARANCE = 0.015
 """Least height of ball and heel in mid-swing [m at 1.70 m]; chosen, to clear uneven ground."""
-PER_METRE_LOW, PER_DEGREE, PER_UNIT = 200.0, 0.1, 10.0
-"""What a swing foot too low costs, a joint beyond its range, and a choice outside its bounds squared; chosen."""
+PER_METRE_LOW, PER_UNIT = 200.0, 10.0
+"""What a swing foot too low costs, and a choice outside its bounds squared; chosen."""
 EVEN = (1.0, 1.0, 1.0)
 """Weights of the terms of effort: they weigh alike; chosen."""
 IMPOSSIBLE = 30.0
@@ -105,7 +105,7 @@ def vector_of(style: WalkStyle) -> NDArray:
 
 def price(
     body: Body, speed: float, vector: NDArray, weights: tuple[float, float, float] = EVEN, muscle: Muscle = AS_IS
-) -> tuple[float, WalkPlan | None, PlanEffort | None]:
+) -> tuple[float, WalkPlan | None, Effort | None]:
     """What the plan at a vector costs, the plan and its effort; none for a plan that cannot be.
 
     `weights` are those of work, activation and its rate.
@@ -199,7 +199,7 @@ class PlanTuning(Study):
             text += f"\n\n{prediction_table(columns, ('the plan',))}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
-    def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, PlanEffort | None]:
+    def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon)
         return price(body, self.speed, vector, self.weights, muscle)
 

@@ -1,4 +1,5 @@
-"""A walk from body, plan and physics by one command: plan, leg constants, policy, and how it walks.
+"""A walk from body, plan and physics by one command: plan, legs that follow it, legs of least effort, policy, and how
+it walks.
 
     springfoot study predict
 
@@ -40,27 +41,35 @@ FOUND = "found.json"
 SECTION = "PREDICTION"
 """Of a page."""
 STAGE_PUSH = 100.0
-"""Size of the pushes of the third stage, of the training and of the second half of the evaluation [N]; chosen."""
+"""Size of the pushes of the fifth stage, of the training and of the second half of the evaluation [N]; chosen."""
 FIRST_SPREAD, SECOND_SPREAD = 0.5, 0.3
-"""First spread of the second and third stage [units of the search]; chosen: the third has a walk to keep."""
+"""First spread of the second stage, and of those after it [units of the search]; chosen: these have a walk to keep."""
+
+STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "impact", "push"))
+"""Generations of the searches, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Predict(WalkingStudy):
-    """Predict a walk from nothing: a plan of least effort, leg constants that follow it, a policy; then evaluate."""
+    """Predict a walk from nothing: a plan of least effort, legs that follow it, and then walk by least effort
+    themselves, a policy; then evaluate."""
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
     """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
     plan_generations: int = 400
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
-    """Generations of the second stage, leg constants of walks without pushes."""
-    push_generations: int = 100
-    """Generations of the third stage, leg constants of walks with pushes."""
+    """Generations of the second stage, leg constants of walks near the plan, without pushes."""
+    effort_generations: int = 100
+    """Generations of the third stage, leg constants of walks of least effort."""
+    impact_generations: int = 200
+    """Generations of the fourth stage, leg constants of walks of least effort and impact."""
+    push_generations: int = 150
+    """Generations of the fifth stage, the same with pushes."""
     population: int = 20
     """Candidates in each generation."""
     timesteps: int = PRESETS["predict"].timesteps
-    """Steps of the fourth stage, the training of a policy (preset `predict`)."""
+    """Steps of the sixth stage, the training of a policy (preset `predict`)."""
     search_seed: int = 0
     """Seed of the searches and of the training."""
 
@@ -68,6 +77,8 @@ class Predict(WalkingStudy):
         **WalkingStudy.QUICK,
         "plan_generations": 1,
         "walk_generations": 1,
+        "effort_generations": 1,
+        "impact_generations": 1,
         "push_generations": 1,
         "population": 4,
         "timesteps": 8192,
@@ -77,7 +88,7 @@ class Predict(WalkingStudy):
     def check(self) -> None:
         """Refuse counts out of range."""
         super().check()
-        for name in ("plan_generations", "walk_generations", "push_generations", "timesteps"):
+        for name in (*STAGES, "timesteps"):
             require_count(name, getattr(self, name))
         require_count("population", self.population, 4)
         require_count("search_seed", self.search_seed, 0, 2**31 - 2)
@@ -85,7 +96,7 @@ class Predict(WalkingStudy):
     @property
     def total(self) -> float:
         """Generations of all searches."""
-        return self.plan_generations + self.walk_generations + self.push_generations
+        return sum(getattr(self, name) for name in STAGES)
 
     @property
     def folder(self) -> Path:
@@ -131,18 +142,34 @@ class Predict(WalkingStudy):
             command=without_places(self.command),
             log=self.folder / "walk.json",
         )
-        pushed = replace(
+        effort = replace(
             walk,
             start="",
-            push_newton=STAGE_PUSH,
-            generations=self.push_generations,
+            pays="effort",
+            impact=0.0,
+            generations=self.effort_generations,
             sigma=SECOND_SPREAD,
             seed=self.search_seed + 1,
+            log=self.folder / "effort.json",
+        )
+        impact = replace(
+            effort,
+            impact=1.0,
+            generations=self.impact_generations,
+            seed=self.search_seed + 2,
+            log=self.folder / "impact.json",
+        )
+        pushed = replace(
+            impact,
+            push_newton=STAGE_PUSH,
+            generations=self.push_generations,
+            seed=self.search_seed + 3,
             log=self.folder / "pushed.json",
         )
-        for name, search in (("plan", plan), ("walk", walk), ("walk, pushed", pushed)):
+        searches = {"plan": plan, "walk": walk, "effort": effort, "impact": impact, "pushed": pushed}
+        for name, search in searches.items():
             text = stage(name, lambda search=search: search.ask(progress)).text
-            (self.folder / f"{name.replace(', ', '-')}.txt").write_text(f"{text}\n", encoding="utf-8")
+            (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
         # More generations of a search make other constants, and those another policy.
         sets = read_constants(found)
         digest = hashlib.sha256(json.dumps([sets["styles"], sets["constants"]]).encode()).hexdigest()

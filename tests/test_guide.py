@@ -38,10 +38,11 @@ def test_people_scrambled_walk_the_same_bits(noise_file, more):
     assert digest(**more) == digest(**more, people_file=noise_file)
 
 
-def test_people_scrambled_cost_a_search_the_same(noise_file):
+@pytest.mark.parametrize("pays", ["likeness", "effort"])
+def test_people_scrambled_cost_a_search_the_same(noise_file, pays):
     candidates = [generic_constants(), leg_constants("planned", "people", guide="plan")]
     costs = [
-        cost(settings_from(**PLAN, people_file=file, episode_seconds=10.0), candidates, 0, 1, 0.0)
+        cost(settings_from(**PLAN, people_file=file, episode_seconds=10.0), candidates, 0, 1, 0.0, pays=pays)
         for file in (None, noise_file)
     ]
     assert costs[0].tobytes() == costs[1].tobytes()

@@ -1,0 +1,88 @@
+"""What a simulated walk pays in a search that knows no other walk: effort, impact, and what it leaves of its task.
+
+The plan says where to go, at which speed and in how long a step; how the legs do it is then free, and effort
+(`springfoot.gait.plan_effort`) is that of the walk itself. Effort, impact and steadiness are among the criteria that
+Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
+"""
+
+import numpy as np
+
+from springfoot.envs.biped_batch import Biped
+from springfoot.envs.physics.model import HIP, SIDES
+from springfoot.gait.arrays import NDArray
+from springfoot.gait.body import GRAVITY
+from springfoot.gait.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+from springfoot.gait.plan_effort import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_stride
+from springfoot.gait.scores import travel
+
+PER_EFFORT = 10.0
+"""Price of one unit of effort and impact; chosen, so that no walk pays as much as a fall."""
+HELD = {"speed": 0.01, "period": 0.02, "travel": 0.01, "unsteady": 0.05}
+"""What counts as one: of the speed [m/s], of the plan's stride time [-], of the sole's way on the floor in a stance
+[m], of the SD of the vertical force over strides [body weights]; chosen."""
+PER_HELD, PER_MISS = 0.3, 0.03
+"""Price of one of these, and of one tolerance that the walk is off its plan; chosen: the plan then says which way to
+walk, and hardly how."""
+
+
+def effort_price(
+    record: dict[str, NDArray], index: int, biped: Biped, settled: float, missed: NDArray, impact: float = 1.0
+) -> float | None:
+    """What walk `index` of a record of `leg_walks.series` pays in strides that begin after `settled` [s]; None if it
+    takes too few. `missed` is how far it is off its plan [tolerances] (`leg_cost.misses`), `impact` the price of impact
+    over that of effort."""
+    found = effort_and_impact(record, index, biped, settled)
+    if found is None:
+        return None
+    effort, landing, held = found
+    paid = effort.total + PER_DEGREE * effort.beyond_range + impact * landing
+    off = [PER_HELD * held[name] / HELD[name] for name in HELD]
+    return PER_EFFORT * paid + float(np.linalg.norm([*off, *(PER_MISS * missed)]))
+
+
+def impact_of(force: NDArray, tick: float) -> float:
+    """Mean square of `ACTIVATION_TIME` times the rate of a foot's force (T, 2) [body weights], both feet together."""
+    change = np.gradient(force, tick, axis=0)
+    return float(2 * ACTIVATION_TIME**2 * (change**2).sum(-1).mean())
+
+
+def effort_and_impact(
+    record: dict[str, NDArray], index: int, biped: Biped, settled: float
+) -> tuple[Effort, float, dict[str, float]] | None:
+    """Effort of the mean stride and impact (`impact_of`), means of both legs, and what `HELD` holds, in its units."""
+    body, tick = biped.body, Biped.tick_dt
+    weight = body.total_mass * GRAVITY
+    speed = np.gradient(record["com"][:, index, 0], tick)
+    efforts, impacts, periods, travels, spreads, speeds = [], [], [], [], [], []
+    for side in range(len(SIDES)):
+        angle, torque, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
+        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
+        if len(strides) < 2:
+            return None
+        turned = angle.copy()
+        turned[:, HIP] -= record["pitch"][:, index]
+        series = np.column_stack([turned, -torque, force[:, 1] / weight, speed])
+        curves = on_percent(series, strides[:, 0], strides[:, 2], tick)
+        mean = curves.mean(0)[: len(PERCENT) - 1]
+        joints = angle.shape[-1]
+        periods.append(float(np.mean(strides[:, 2] - strides[:, 0])))
+        speeds.append(float(mean[:, -1].mean()))
+        efforts.append(
+            effort_of_stride(
+                body, mean[:, :joints], None, mean[:, joints : 2 * joints], periods[-1], speeds[-1] * periods[-1]
+            )
+        )
+        spreads.append(float(np.sqrt(curves[..., 2 * joints].var(0).mean())))
+        first, last = (strides[[0, -1], [0, 2]] / tick).astype(int)
+        impacts.append(impact_of(force[first : last + 1] / weight, tick))
+        for start, leave, _ in np.floor(strides / tick).astype(int):
+            sole = slice(start, leave + 1), index, side
+            travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
+    effort = Effort(**{name: float(np.mean([getattr(each, name) for each in efforts])) for name in vars(efforts[0])})
+    held = {
+        "speed": float(np.mean(speeds)) - biped.settings.speed,
+        "period": float(np.mean(periods)) / (2 * biped.plan.step_time) - 1,
+        "travel": float(np.mean(travels)),
+        "unsteady": float(np.mean(spreads)),
+    }
+    return effort, float(np.mean(impacts)), held
