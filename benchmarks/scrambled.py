@@ -3,14 +3,15 @@
     python -m benchmarks.scrambled
 
 Everything in people's file but speeds, step lengths and times is replaced by noise. Then what candidates pay and the
-constants after generations of a search from `generic` constants, the weights of a training, and the series of episodes
+constants after generations of a search near the plan from `generic` constants, and of one of least effort from the
+package's, the weights of a training, and the series of episodes
 of `predicted` are compared with those of the package's file, bit by bit.
 """
 
 import json
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import tyro
 from springfoot.agents.config import PRESETS
 from springfoot.agents.policy import read_policy
 from springfoot.agents.training import train
+from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.evaluation.policies import prepare
 from springfoot.evaluation.recording import record
 from springfoot.gait.human import PEOPLE_FILE
@@ -79,7 +81,11 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
         log=folder / "paid.json",
     )
     search.ask(lambda progress: None)
-    paid = json.loads((folder / "paid.json").read_text(encoding="utf-8"))["paid"]
+    walking = folder / "walking.json"
+    known = {"predicted": asdict(leg_constants("planned", "people", guide="plan"))}
+    write_constants(walking, {"constants": known, "found_by": {}})
+    replace(search, start="", pays="effort", constants=walking, log=folder / "effort.json").ask(lambda progress: None)
+    paid = [json.loads((folder / name).read_text(encoding="utf-8"))["paid"] for name in ("paid.json", "effort.json")]
     preset = PRESETS["predict"]
     settings = replace(preset.environment, people_file=file)
     train(replace(preset, timesteps=how.timesteps, threads=1, environment=settings), folder / "run")
@@ -88,7 +94,7 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
     walked = record(*prepare("predicted", given), name="predicted", episodes=how.episodes, threads=1)
     return {
         "what candidates pay": json.dumps(paid).encode(),
-        "constants": json.dumps(read_constants(constants)["constants"]).encode(),
+        "constants": json.dumps([read_constants(each)["constants"] for each in (constants, walking)]).encode(),
         "weights": b"".join(np.ascontiguousarray(each).tobytes() for each in (*policy.weights, *policy.biases)),
         "series": b"".join(np.ascontiguousarray(values).tobytes() for values in walked.series.values()),
     }

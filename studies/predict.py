@@ -41,11 +41,11 @@ FOUND = "found.json"
 SECTION = "PREDICTION"
 """Of a page."""
 STAGE_PUSH = 100.0
-"""Size of the pushes of the fifth stage, of the training and of the second half of the evaluation [N]; chosen."""
+"""Size of the pushes of the fourth stage, of the training and of the second half of the evaluation [N]; chosen."""
 FIRST_SPREAD, SECOND_SPREAD = 0.5, 0.3
 """First spread of the second stage, and of those after it [units of the search]; chosen: these have a walk to keep."""
 
-STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "impact", "push"))
+STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push"))
 """Generations of the searches, in their order."""
 
 
@@ -56,20 +56,18 @@ class Predict(WalkingStudy):
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
     """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
-    plan_generations: int = 400
+    plan_generations: int = 300
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
     """Generations of the second stage, leg constants of walks near the plan, without pushes."""
-    effort_generations: int = 100
-    """Generations of the third stage, leg constants of walks of least effort."""
-    impact_generations: int = 200
-    """Generations of the fourth stage, leg constants of walks of least effort and impact."""
+    effort_generations: int = 250
+    """Generations of the third stage, leg constants of walks of least effort and impact."""
     push_generations: int = 150
-    """Generations of the fifth stage, the same with pushes."""
+    """Generations of the fourth stage, the same with pushes."""
     population: int = 20
     """Candidates in each generation."""
     timesteps: int = PRESETS["predict"].timesteps
-    """Steps of the sixth stage, the training of a policy (preset `predict`)."""
+    """Steps of the fifth stage, the training of a policy (preset `predict`)."""
     search_seed: int = 0
     """Seed of the searches and of the training."""
 
@@ -78,7 +76,6 @@ class Predict(WalkingStudy):
         "plan_generations": 1,
         "walk_generations": 1,
         "effort_generations": 1,
-        "impact_generations": 1,
         "push_generations": 1,
         "population": 4,
         "timesteps": 8192,
@@ -146,27 +143,19 @@ class Predict(WalkingStudy):
             walk,
             start="",
             pays="effort",
-            impact=0.0,
             generations=self.effort_generations,
             sigma=SECOND_SPREAD,
             seed=self.search_seed + 1,
             log=self.folder / "effort.json",
         )
-        impact = replace(
-            effort,
-            impact=1.0,
-            generations=self.impact_generations,
-            seed=self.search_seed + 2,
-            log=self.folder / "impact.json",
-        )
         pushed = replace(
-            impact,
+            effort,
             push_newton=STAGE_PUSH,
             generations=self.push_generations,
-            seed=self.search_seed + 3,
+            seed=self.search_seed + 2,
             log=self.folder / "pushed.json",
         )
-        searches = {"plan": plan, "walk": walk, "effort": effort, "impact": impact, "pushed": pushed}
+        searches = {"plan": plan, "walk": walk, "effort": effort, "pushed": pushed}
         for name, search in searches.items():
             text = stage(name, lambda search=search: search.ask(progress)).text
             (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
