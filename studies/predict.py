@@ -42,9 +42,9 @@ SECTION = "PREDICTION"
 """Of a page."""
 STAGE_PUSH = 100.0
 """Size of the pushes of the fourth stage, of the training and of the second half of the evaluation [N]; chosen."""
-FIRST_SPREAD, SECOND_SPREAD = 0.5, 0.3
-"""First spread of the second stage, and of those after it [units of the search]; chosen: these have a walk to keep."""
-
+FIRST_SPREAD, EFFORT_SPREAD, PUSHED_SPREAD = 0.5, 0.6, 0.3
+"""First spread of the second, third and fourth stage [units of the search]; chosen: the third leaves the plan's walk, and
+from a narrower spread it stays in a dearer one; the fourth has a walk to keep."""
 STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push"))
 """Generations of the searches, in their order."""
 
@@ -60,7 +60,7 @@ class Predict(WalkingStudy):
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
     """Generations of the second stage, leg constants of walks near the plan, without pushes."""
-    effort_generations: int = 250
+    effort_generations: int = 400
     """Generations of the third stage, leg constants of walks of least effort and impact."""
     push_generations: int = 150
     """Generations of the fourth stage, the same with pushes."""
@@ -144,7 +144,7 @@ class Predict(WalkingStudy):
             start="",
             pays="effort",
             generations=self.effort_generations,
-            sigma=SECOND_SPREAD,
+            sigma=EFFORT_SPREAD,
             seed=self.search_seed + 1,
             log=self.folder / "effort.json",
         )
@@ -152,6 +152,7 @@ class Predict(WalkingStudy):
             effort,
             push_newton=STAGE_PUSH,
             generations=self.push_generations,
+            sigma=PUSHED_SPREAD,
             seed=self.search_seed + 2,
             log=self.folder / "pushed.json",
         )

@@ -20,7 +20,7 @@ PER_EFFORT = 10.0
 HELD = {"speed": 0.01, "period": 0.02, "travel": 0.01, "unsteady": 0.05}
 """What counts as one: of the speed [m/s], of the plan's stride time [-], of the sole's way on the floor in a stance
 [m], of the SD of the vertical force over strides [body weights]; chosen."""
-PER_HELD, PER_MISS = 0.3, 0.03
+PER_HELD, PER_MISS = 0.3, 0.01
 """Price of one of these, and of one tolerance that the walk is off its plan; chosen: the plan then says which way to
 walk, and hardly how."""
 
