@@ -43,8 +43,8 @@ SECTION = "PREDICTION"
 STAGE_PUSH = 100.0
 """Size of the pushes of the fourth stage, of the training and of the second half of the evaluation [N]; chosen."""
 FIRST_SPREAD, EFFORT_SPREAD, PUSHED_SPREAD = 0.5, 0.6, 0.3
-"""First spread of the second, third and fourth stage [units of the search]; chosen: the third leaves the plan's walk, and
-from a narrower spread it stays in a dearer one; the fourth has a walk to keep."""
+"""First spread of the second, third and fourth stage [units of the search]; chosen: the third leaves the walk that was
+planned, and from a narrower spread it stays in a dearer one; the fourth has a walk to keep."""
 STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push"))
 """Generations of the searches, in their order."""
 
