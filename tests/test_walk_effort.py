@@ -75,8 +75,9 @@ def test_impact_is_the_mean_square_of_the_forces_rate():
 def test_a_walk_is_measured_as_it_was_simulated():
     missing, biped, ticks = walk(SETTINGS, [LEGS], [0], 1, foreign=())
     record = series(biped, ticks)
-    effort, impact, held = effort_and_impact(record, 0, biped, SETTLED)
-    assert missing[0] == 0.0
+    measured, missed = effort_and_impact(record, 0, biped, SETTLED), misses(record, 0, biped, SETTLED)
+    assert missing[0] == 0.0 and measured is not None and missed is not None
+    effort, impact, held = measured
     assert held["speed"] == pytest.approx(0.0, abs=0.05) and held["period"] == pytest.approx(0.0, abs=0.03)
     # Over strides that repeat themselves hip, knee and ankle do little net work, and the energy is that of their work.
     own = record["work"][:, 0, :, :3].sum((0, 1))
@@ -84,9 +85,8 @@ def test_a_walk_is_measured_as_it_was_simulated():
     spent = own[:, 0].sum() / MUSCLE_EFFICIENCY[0] + np.abs(own[:, 1]).sum() / MUSCLE_EFFICIENCY[1]
     assert effort.work < 1.1 * spent / (BODY.mass * GRAVITY * way)  # tissue and tendon give some of it
     assert effort.work > 0.4 * spent / (BODY.mass * GRAVITY * way)
-    missed = misses(record, 0, biped, SETTLED)
     paid = effort_price(record, 0, biped, SETTLED, missed)
-    assert paid > 10 * (effort.total + impact)
+    assert paid is not None and paid > 10 * (effort.total + impact)
     assert effort_price(record, 0, biped, 6.0, missed) is None
 
 
