@@ -165,7 +165,9 @@ def plan_walk(
         com_height = require_within("com_height", com_height, (0.5 * body.height, 0.7 * body.height), "m")
 
     roll = _roll(body, human, double_support, step_time, step_length) if style is None else 1.0
-    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, between(ZMP_TRAVEL, roll) if style is None else style.zmp_travel)
+    # Along a foot that is longer than its body's share the ZMP of a style goes as far as along that share.
+    along = between(ZMP_TRAVEL, roll) if style is None else np.array(style.zmp_travel) * body.foot_ratio
+    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, along)
     way = [] if style is None or style.zmp_way is None else style.zmp_way
     on_way = double_support + np.arange(1, len(way) + 1) / (len(way) + 1) * (step_time - double_support)
     zmp_times = np.array([0.0, double_support, *on_way, step_time])

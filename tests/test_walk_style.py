@@ -9,7 +9,7 @@ from springfoot.gait import GRAVITY, Body, SpringfootError, foot_force, human_ga
 from springfoot.gait.foot_style import FootStyle
 from springfoot.gait.kinetics import planned_leg
 from springfoot.gait.leg import JOINTS, inverse_dynamics
-from springfoot.gait.walk_style import WalkStyle
+from springfoot.gait.walk_style import WalkStyle, least_work
 
 PHASE = np.arange(200) / 200
 FOOT = FootStyle(
@@ -99,3 +99,9 @@ def test_a_swing_passes_its_via_points_however_many():
 def test_a_style_that_cannot_walk_is_refused():
     with pytest.raises(SpringfootError, match="legs too short"):
         plan_walk(Body(), 1.9, style=replace(STYLE, knee=1.2))
+
+
+def test_the_zmp_of_a_style_goes_as_far_along_a_longer_foot():
+    own, longer = (plan_walk(Body(foot_ratio=ratio), 1.2, style=least_work(1.2)) for ratio in (1.0, 1.05))
+    # In the frame of the step single support ends as the other foot lands.
+    assert longer.zmp(1.0 - 1e-9) == pytest.approx(1.05 * own.zmp(1.0 - 1e-9), abs=1e-6)
