@@ -17,7 +17,7 @@ from springfoot.gait.scores import travel
 
 PER_EFFORT = 10.0
 """Price of one unit of effort and impact; chosen, so that no walk pays as much as a fall."""
-HELD = {"speed": 0.01, "period": 0.02, "travel": 0.01, "unsteady": 0.05}
+TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "travel": 0.01, "unsteady": 0.05}
 """What counts as one: of the speed [m/s], of the plan's stride time [-], of the sole's way on the floor in a stance
 [m], of the SD of the vertical force over strides [body weights]; chosen."""
 PER_HELD, PER_MISS = 0.3, 0.01
@@ -36,7 +36,7 @@ def effort_price(
         return None
     effort, landing, held = found
     paid = effort.total + PER_DEGREE * effort.beyond_range + impact * landing
-    off = [PER_HELD * held[name] / HELD[name] for name in HELD]
+    off = [PER_HELD * held[name] / TASK_TOLERANCE[name] for name in TASK_TOLERANCE]
     return PER_EFFORT * paid + float(np.linalg.norm([*off, *(PER_MISS * missed)]))
 
 
@@ -49,7 +49,7 @@ def impact_of(force: NDArray, tick: float) -> float:
 def effort_and_impact(
     record: dict[str, NDArray], index: int, biped: Biped, settled: float
 ) -> tuple[Effort, float, dict[str, float]] | None:
-    """Effort of the mean stride and impact (`impact_of`), means of both legs, and what `HELD` holds, in its units."""
+    """Effort of the mean stride and impact (`impact_of`), means of both legs, and what `TASK_TOLERANCE` holds, in its units."""
     body, tick = biped.body, Biped.tick_dt
     weight = body.total_mass * GRAVITY
     speed = np.gradient(record["com"][:, index, 0], tick)
