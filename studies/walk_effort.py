@@ -49,7 +49,8 @@ def impact_of(force: NDArray, tick: float) -> float:
 def effort_and_impact(
     record: dict[str, NDArray], index: int, biped: Biped, settled: float
 ) -> tuple[Effort, float, dict[str, float]] | None:
-    """Effort of the mean stride and impact (`impact_of`), means of both legs, and what `TASK_TOLERANCE` holds, in its units."""
+    """Effort of the mean stride and impact (`impact_of`), means of both legs, and what `TASK_TOLERANCE` holds, in its
+    units."""
     body, tick = biped.body, Biped.tick_dt
     weight = body.total_mass * GRAVITY
     speed = np.gradient(record["com"][:, index, 0], tick)
