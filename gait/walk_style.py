@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,13 @@ from .text_table import read_bytes
 
 STYLES = Path(str(resources.files("springfoot.gait") / "least_work.json"))
 """The package's own file of styles."""
+
+PAIRS = ("zmp_travel", "rise_again", "heel_rise")
+"""Of a style, what is two numbers."""
+ROWS = ("zmp_way", "via_forward", "via_up", "via_pitch")
+"""Of a style, what is any number of numbers."""
+OPTIONAL = ("zmp_way", "heel_rise", "flat", "heel_off", "toe_swing")
+"""Of a style, what may be None."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,9 +59,26 @@ class WalkStyle:
 
 
 def style_from(values: Mapping[str, Any]) -> WalkStyle:
-    """The style of JSON values (lists for tuples)."""
+    """The style of JSON values (lists for tuples); raises `ValueError`, `TypeError` or `KeyError` for others."""
     own = dict(values)
-    return WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
+    style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
+    for name, value in (asdict(style) | asdict(style.foot)).items():
+        if name == "foot" or (value is None and name in OPTIONAL):
+            continue
+        many = name in PAIRS or name in ROWS
+        each = value if many and isinstance(value, tuple) else (value,)
+        if not all(_is_finite(x) for x in each) or (name in PAIRS and len(each) != 2):
+            what = "2 finite numbers" if name in PAIRS else "finite numbers" if many else "a finite number"
+            raise ValueError(f"{name} must be {what}, got {value!r}")
+        if many and not isinstance(value, tuple):
+            raise ValueError(f"{name} must be a list of numbers, got {value!r}")
+    if len({len(each) for each in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:
+        raise ValueError("via_forward, via_up and via_pitch must be equally many")
+    return style
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:

@@ -1,5 +1,6 @@
 """A plan of another style knows the angular momentum of its legs, so that its own moments hold the trunk upright."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from springfoot.gait import GRAVITY, Body, SpringfootError, foot_force, human_ga
 from springfoot.gait.foot_style import FootStyle
 from springfoot.gait.kinetics import planned_leg
 from springfoot.gait.leg import JOINTS, inverse_dynamics
-from springfoot.gait.walk_style import WalkStyle, least_work
+from springfoot.gait.walk_style import WalkStyle, least_work, styles_of
 
 PHASE = np.arange(200) / 200
 FOOT = FootStyle(
@@ -105,3 +106,23 @@ def test_the_zmp_of_a_style_goes_as_far_along_a_longer_foot():
     own, longer = (plan_walk(Body(foot_ratio=ratio), 1.2, style=least_work(1.2)) for ratio in (1.0, 1.05))
     # In the frame of the step single support ends as the other foot lands.
     assert longer.zmp(1.0 - 1e-9) == pytest.approx(1.05 * own.zmp(1.0 - 1e-9), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "value", "said"),
+    [
+        ("walk", "lean", "x", "lean must be a finite number, got 'x'"),
+        ("walk", "rise", float("nan"), "rise must be a finite number, got nan"),
+        ("walk", "knee", None, "knee must be a finite number, got None"),
+        ("walk", "rise_again", [1.0], r"rise_again must be 2 finite numbers, got \(1.0,\)"),
+        ("foot", "via_pitch", 0.5, "via_pitch must be a list of numbers, got 0.5"),
+        ("foot", "via_up", [0.1], "via_forward, via_up and via_pitch must be equally many"),
+    ],
+)
+def test_a_style_that_cannot_be_is_told_in_one_line(tmp_path, place, name, value, said):
+    style = least_work(1.2).to_json()
+    (style if place == "walk" else style["foot"])[name] = value
+    path = tmp_path / "styles.json"
+    path.write_text(json.dumps({"styles": {"1.2": style}}), encoding="utf-8")
+    with pytest.raises(SpringfootError, match=f"styles.json is not a file of styles of walks: {said}"):
+        styles_of(path)
