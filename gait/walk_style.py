@@ -22,11 +22,11 @@ from .text_table import read_bytes
 STYLES = Path(str(resources.files("springfoot.gait") / "least_work.json"))
 """The package's own file of styles."""
 
-PAIRS = ("zmp_travel", "rise_again", "heel_rise")
+STYLE_PAIRS = ("zmp_travel", "rise_again", "heel_rise")
 """Of a style, what is two numbers."""
-ROWS = ("zmp_way", "via_forward", "via_up", "via_pitch")
+STYLE_ROWS = ("zmp_way", "via_forward", "via_up", "via_pitch")
 """Of a style, what is any number of numbers."""
-OPTIONAL = ("zmp_way", "heel_rise", "flat", "heel_off", "toe_swing")
+STYLE_OPTIONAL = ("zmp_way", "heel_rise", "flat", "heel_off", "toe_swing")
 """Of a style, what may be None."""
 
 
@@ -63,12 +63,12 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
     own = dict(values)
     style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
     for name, value in (asdict(style) | asdict(style.foot)).items():
-        if name == "foot" or (value is None and name in OPTIONAL):
+        if name == "foot" or (value is None and name in STYLE_OPTIONAL):
             continue
-        many = name in PAIRS or name in ROWS
+        many = name in STYLE_PAIRS or name in STYLE_ROWS
         each = value if many and isinstance(value, tuple) else (value,)
-        if not all(_is_finite(x) for x in each) or (name in PAIRS and len(each) != 2):
-            what = "2 finite numbers" if name in PAIRS else "finite numbers" if many else "a finite number"
+        if not all(_is_finite(x) for x in each) or (name in STYLE_PAIRS and len(each) != 2):
+            what = "2 finite numbers" if name in STYLE_PAIRS else "finite numbers" if many else "a finite number"
             raise ValueError(f"{name} must be {what}, got {value!r}")
         if many and not isinstance(value, tuple):
             raise ValueError(f"{name} must be a list of numbers, got {value!r}")
