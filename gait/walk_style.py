@@ -10,24 +10,20 @@ from functools import cache
 from importlib import resources
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from .errors import SpringfootError
+from .errors import SpringfootError, as_float
 from .foot_style import FootStyle
 from .json_file import MOST_JSON_BYTES
 from .text_table import read_bytes
 
 STYLES = Path(str(resources.files("springfoot.gait") / "least_work.json"))
 """The package's own file of styles."""
-
-STYLE_PAIRS = ("zmp_travel", "rise_again", "heel_rise")
-"""Of a style, what is two numbers."""
-STYLE_ROWS = ("zmp_way", "via_forward", "via_up", "via_pitch")
-"""Of a style, what is any number of numbers."""
-STYLE_OPTIONAL = ("zmp_way", "heel_rise", "flat", "heel_off", "toe_swing")
-"""Of a style, what may be None."""
+PAIR = tuple[float, float]
+"""The type of what is two numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,23 +58,25 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
     """The style of JSON values (lists for tuples); raises `ValueError`, `TypeError` or `KeyError` for others."""
     own = dict(values)
     style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
-    for name, value in (asdict(style) | asdict(style.foot)).items():
-        if name == "foot" or (value is None and name in STYLE_OPTIONAL):
-            continue
-        many = name in STYLE_PAIRS or name in STYLE_ROWS
-        each = value if many and isinstance(value, tuple) else (value,)
-        if not all(_is_finite(x) for x in each) or (name in STYLE_PAIRS and len(each) != 2):
-            what = "2 finite numbers" if name in STYLE_PAIRS else "finite numbers" if many else "a finite number"
-            raise ValueError(f"{name} must be {what}, got {value!r}")
-        if many and not isinstance(value, tuple):
-            raise ValueError(f"{name} must be a list of numbers, got {value!r}")
+    for part in (style, style.foot):
+        for name, hint in get_type_hints(type(part)).items():
+            value, kinds = getattr(part, name), get_args(hint) if isinstance(hint, UnionType) else (hint,)
+            if not any(_is_a(kind, value) for kind in kinds):
+                what = (
+                    "a finite number" if float in kinds else "2 finite numbers" if PAIR in kinds else "finite numbers"
+                )
+                raise ValueError(f"{name} must be {what}, got {value!r}")
     if len({len(each) for each in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:
         raise ValueError("via_forward, via_up and via_pitch must be equally many")
     return style
 
 
-def _is_finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+def _is_a(kind: Any, value: Any) -> bool:
+    """Whether a value is of a field's type, and its numbers are finite."""
+    if get_origin(kind) is tuple:
+        own = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
+        return own and all(isfinite(as_float(each)) for each in value)
+    return isfinite(as_float(value)) if kind is float else isinstance(value, kind)
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:

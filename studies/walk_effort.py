@@ -1,8 +1,8 @@
 """What a simulated walk pays in a search that knows no other walk: effort, impact, and what it leaves of its task.
 
 The plan says where to go, at which speed and in how long a step; how the legs do it is then free, and effort
-(`springfoot.gait.plan_effort`) is that of the walk itself. Effort, impact and steadiness are among the criteria that
-Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
+(`springfoot.gait.plan_effort`) is that of the walk itself. Cost of transport, muscles' activity and impact are among
+the criteria that Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
 """
 
 import numpy as np

@@ -115,7 +115,7 @@ def test_the_zmp_of_a_style_goes_as_far_along_a_longer_foot():
         ("walk", "rise", float("nan"), "rise must be a finite number, got nan"),
         ("walk", "knee", None, "knee must be a finite number, got None"),
         ("walk", "rise_again", [1.0], r"rise_again must be 2 finite numbers, got \(1.0,\)"),
-        ("foot", "via_pitch", 0.5, "via_pitch must be a list of numbers, got 0.5"),
+        ("foot", "via_pitch", 0.5, "via_pitch must be finite numbers, got 0.5"),
         ("foot", "via_up", [0.1], "via_forward, via_up and via_pitch must be equally many"),
     ],
 )
