@@ -10,6 +10,7 @@ import numpy as np
 from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import foot_curves, foot_feed
 from springfoot.envs.control.foot_springs import stiffness_of
+from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.leg_controller import leg_curves
 from springfoot.envs.control.reference_walk import rows
 from springfoot.gait.errors import SpringfootError
@@ -31,15 +32,20 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     numbers: list[Any] = []
     for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
         curves = (leg_curves(legs, walk), *foot_curves(biped.settings, legs, walk))
-        numbers += [*asdict(legs).values(), *(curve[::50] for curve in curves)]
+        numbers += [*_used(legs).values(), *(curve[::50] for curve in curves)]
         if (feed := foot_feed(biped.settings, legs, walk)) is not None:
             numbers.append(feed[::50])
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
-        "legs": _digest(asdict(biped.constants[0]), *numbers),
+        "legs": _digest(_used(biped.constants[0]), *numbers),
     }
+
+
+def _used(legs: LegConstants) -> dict[str, Any]:
+    """The constants; a `swing_place_gain` of 0 is none, so that policies from before there was one walk on."""
+    return {name: value for name, value in asdict(legs).items() if value or name != "swing_place_gain"}
 
 
 def require_same(name: object, stored: Mapping[str, str], current: Mapping[str, str]) -> None:

@@ -21,39 +21,20 @@ from tqdm import tqdm
 
 from springfoot.agents.files import csv_text
 from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name
-from springfoot.envs.control.leg_controller import KNOTS
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings import BipedSettings, Feedforward, Guide
 from springfoot.gait.arrays import NDArray
 from springfoot.gait.errors import SpringfootError, require_count, require_number
-from springfoot.gait.human import HumanGait, human_gait
 from springfoot.gait.plan import Cadence
-from springfoot.gait.stiffness import LOWEST_STIFFNESS
 from springfoot.gait.walk_style import least_work
 
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .generic_constants import GENERIC, generic_constants
 from .kept_search import asked_of, generations
 from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
+from .leg_search import Search
 from .study import Answer, OnProgress, Study
 
-KNOT_STEP, GAIN_STEP = 2.0, 0.15
-"""One unit of the search: degrees of a knot, relative change of a gain."""
-ADDITIVE_STEP = {
-    "toe_flat_deg": 3.0,
-    "trunk_pitch_deg": 1.0,
-    "swing_speed_gain": 0.05,
-    "speed_torque": 15.0,
-    "period_speed_gain": 0.03,
-}
-"""One unit of the search for constants that may change sign or vanish, in their own units."""
-LEAD_STEP = 0.005
-"""One unit of the search for what a whole target of hip, knee or ankle comes earlier [stride]. Along knots one by one a
-search does not find it: half a percent at hip and knee takes a degree off the knee of the planned walk at 1.2 m/s."""
-LED = {"hip_knots_deg": "thigh", "knee_knots_deg": "knee", "ankle_knots_deg": "ankle"}
-"""People's curves that come earlier, by their knots."""
-LEAST = {"ankle_schedule": LOWEST_STIFFNESS[0], "toe_schedule": LOWEST_STIFFNESS[1]}
-"""Least value of a constant [N m/rad]."""
 DIFFERENCE = 0.08
 """Step of the refinement's differences [units of the search]; chosen: less drowns in what a walk changes by itself."""
 STEEPEST = 5.0
@@ -64,36 +45,6 @@ LONGEST_STEP = 1.5
 """Largest change of a constant in one of its steps [units of the search]; chosen."""
 KEPT = 0.17
 """What a constant pays in the refinement for each unit that it leaves its start [tolerances]."""
-
-
-class Search:
-    """Constants as a vector of unit steps from where the search began; the last three are leads of whole targets."""
-
-    def __init__(self, start: LegConstants, speed: float = TUNED_SPEED, human: HumanGait | None = None):
-        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in asdict(start).items()}
-        human = human or human_gait(speed)
-        self._led = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
-        self.size = sum(value.size for value in self._start.values()) + len(LED)
-
-    def constants(self, vector: NDArray) -> LegConstants:
-        """The constants at a vector (size,)."""
-        values, place = {}, 0
-        leads = dict(zip(LED, vector[-len(LED) :], strict=True))
-        for name, start in self._start.items():
-            step = vector[place : place + start.size]
-            place += start.size
-            if name in LED:
-                value = start + KNOT_STEP * step + leads[name] * self._led[name]
-            elif name == "neutral_deg":
-                value = start + KNOT_STEP * step
-            elif name in ADDITIVE_STEP:
-                value = start + ADDITIVE_STEP[name] * step
-            else:
-                value = start * np.exp(GAIN_STEP * step)
-            if name in LEAST:
-                value = np.maximum(value, LEAST[name])  # an action sets no less
-            values[name] = [float(round(x, 5)) for x in value] if start.size > 1 else float(round(value[0], 5))
-        return constants_from(values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,6 +75,8 @@ class LegTuning(Study):
     """Generations over which the foot's equilibrium goes from the planned one to its own: 0, at once."""
     push_newton: float = 150.0
     """Size of the pushes of the pushed walks [N]."""
+    pushed_from: int = 0
+    """Generation from which on there are pushed walks."""
     foreign: float = 1.0
     """Price of the walks with springs that nobody tuned; at 0 they count for nothing."""
     pays: Pays = "likeness"
@@ -154,7 +107,7 @@ class LegTuning(Study):
         """Refuse counts out of range."""
         for count, least in (
             *(("generations", 1), ("population", 2), ("refinements", 0)),
-            *(("threads", 1), ("seed", 0), ("ease", 0)),
+            *(("threads", 1), ("seed", 0), ("ease", 0), ("pushed_from", 0)),
         ):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
@@ -198,7 +151,7 @@ class LegTuning(Study):
         if self.refinements:
             begin, misses = self._refined(begin, settings, lambda better: self._keep(name, better), progress)
             told = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
-        search = Search(begin, self.speed, human)
+        search = Search(begin, self.speed, human, placing=self.guide == "plan")
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
@@ -206,10 +159,9 @@ class LegTuning(Study):
         def price(generation: int, vectors: list[NDArray]) -> NDArray:
             ease = max(0.0, 1.0 - generation / self.ease) if self.ease else 0.0
             candidates = [search.constants(v) for v in vectors]
+            push = self.push_newton if generation >= self.pushed_from else 0.0
             seed = self.seed + 1000 * generation
-            return cost(
-                settings, candidates, seed, self.threads, self.push_newton, ease, self.foreign, self.pays, self.impact
-            )
+            return cost(settings, candidates, seed, self.threads, push, ease, self.foreign, self.pays, self.impact)
 
         asked = asked_of(self) | {"from": asdict(begin), "style": self._style()}
         for generation, _, paid in generations(strategy, self.generations, price, self.log, asked):
@@ -238,7 +190,8 @@ class LegTuning(Study):
         Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
         the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
         """
-        search = Search(start, settings.speed, reference_walk_at(settings, settings.speed, [start]).human)
+        human = reference_walk_at(settings, settings.speed, [start]).human
+        search = Search(start, settings.speed, human, placing=self.guide == "plan")
 
         def missed(vectors: NDArray) -> list[NDArray | None]:
             found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)

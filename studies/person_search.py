@@ -13,7 +13,7 @@ from springfoot.envs.feet import KINDS, SPRING_NUMBERS, foot_of, kind_of
 from springfoot.envs.physics.foot import INTACT, Feet
 from springfoot.gait.arrays import NDArray
 
-from .leg_tuning import GAIN_STEP, LED, Search
+from .leg_search import GAIN_STEP, LED, Search
 
 OF_MUSCLES = ("ankle_knots_deg", "toe_flat_deg", "ankle_schedule", "toe_schedule")
 """Constants that a leg whose ankle and toe are devices does not read."""

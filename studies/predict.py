@@ -41,10 +41,10 @@ FOUND = "found.json"
 SECTION = "PREDICTION"
 """Of a page."""
 STAGE_PUSH = 100.0
-"""Size of the pushes of the fourth stage, of the training and of the second half of the evaluation [N]; chosen."""
-FIRST_SPREAD, EFFORT_SPREAD, PUSHED_SPREAD = 0.5, 0.6, 0.3
-"""First spread of the second, third and fourth stage [units of the search]; chosen: the third leaves the walk that was
-planned, and from a narrower spread it stays in a dearer one; the fourth has a walk to keep."""
+"""Size of the pushes of the third stage, of the training and of the second half of the evaluation [N]; chosen."""
+FIRST_SPREAD, EFFORT_SPREAD = 0.5, 0.6
+"""First spread of the second and third stage [units of the search]; chosen: the third leaves the walk that was planned,
+and from a narrower spread it stays in a dearer one."""
 STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push"))
 """Generations of the searches, in their order."""
 
@@ -63,11 +63,11 @@ class Predict(WalkingStudy):
     effort_generations: int = 400
     """Generations of the third stage, leg constants of walks of least effort and impact."""
     push_generations: int = 150
-    """Generations of the fourth stage, the same with pushes."""
+    """Generations by which the third stage goes on with pushes."""
     population: int = 20
     """Candidates in each generation."""
     timesteps: int = PRESETS["predict"].timesteps
-    """Steps of the fifth stage, the training of a policy (preset `predict`)."""
+    """Steps of the fourth stage, the training of a policy (preset `predict`)."""
     search_seed: int = 0
     """Seed of the searches and of the training."""
 
@@ -143,20 +143,14 @@ class Predict(WalkingStudy):
             walk,
             start="",
             pays="effort",
-            generations=self.effort_generations,
+            push_newton=STAGE_PUSH,
+            pushed_from=self.effort_generations,
+            generations=self.effort_generations + self.push_generations,
             sigma=EFFORT_SPREAD,
             seed=self.search_seed + 1,
             log=self.folder / "effort.json",
         )
-        pushed = replace(
-            effort,
-            push_newton=STAGE_PUSH,
-            generations=self.push_generations,
-            sigma=PUSHED_SPREAD,
-            seed=self.search_seed + 2,
-            log=self.folder / "pushed.json",
-        )
-        searches = {"plan": plan, "walk": walk, "effort": effort, "pushed": pushed}
+        searches = {"plan": plan, "walk": walk, "effort": effort}
         for name, search in searches.items():
             text = stage(name, lambda search=search: search.ask(progress)).text
             (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")

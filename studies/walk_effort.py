@@ -1,8 +1,8 @@
 """What a simulated walk pays in a search that knows no other walk: effort, impact, and what it leaves of its task.
 
-The plan says where to go, at which speed and in how long a step; how the legs do it is then free, and effort
-(`springfoot.gait.plan_effort`) is that of the walk itself. Cost of transport, muscles' activity and impact are among
-the criteria that Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
+The plan says where the CoM goes over the feet, at which speed and in how long a step; how the legs do it is then free,
+and effort (`springfoot.gait.plan_effort`) is that of the walk itself. Cost of transport, muscles' activity and impact
+are among the criteria that Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
 """
 
 import numpy as np
@@ -17,9 +17,10 @@ from springfoot.gait.scores import travel
 
 PER_EFFORT = 10.0
 """Price of one unit of effort and impact; chosen, so that no walk pays as much as a fall."""
-TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "travel": 0.01, "unsteady": 0.05}
-"""What counts as one: of the speed [m/s], of the plan's stride time [-], of the sole's way on the floor in a stance
-[m], of the SD of the vertical force over strides [body weights]; chosen."""
+TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "travel": 0.01, "unsteady": 0.05}
+"""What counts as one: of the speed [m/s], of the plan's stride time [-], of the CoM's place over the foot, root mean
+square over the stride [m], of the sole's way on the floor in a stance [m], of the SD of the vertical force over the
+strides of both legs [body weights]; chosen."""
 PER_HELD, PER_MISS = 0.3, 0.01
 """Price of one of these, and of one tolerance that the walk is off its plan; chosen: the plan then says which way to
 walk, and hardly how."""
@@ -54,7 +55,8 @@ def effort_and_impact(
     body, tick = biped.body, Biped.tick_dt
     weight = body.total_mass * GRAVITY
     speed = np.gradient(record["com"][:, index, 0], tick)
-    efforts, impacts, periods, travels, spreads, speeds = [], [], [], [], [], []
+    ahead = record["com"][:, index, 0] - record["planned_com"][:, index, 0]
+    efforts, impacts, periods, travels, forces, speeds, places = [], [], [], [], [], [], []
     for side in range(len(SIDES)):
         angle, torque, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
         strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
@@ -62,18 +64,19 @@ def effort_and_impact(
             return None
         turned = angle.copy()
         turned[:, HIP] -= record["pitch"][:, index]
-        series = np.column_stack([turned, -torque, force[:, 1] / weight, speed])
+        series = np.column_stack([turned, -torque, force[:, 1] / weight, ahead, speed])
         curves = on_percent(series, strides[:, 0], strides[:, 2], tick)
         mean = curves.mean(0)[: len(PERCENT) - 1]
         joints = angle.shape[-1]
         periods.append(float(np.mean(strides[:, 2] - strides[:, 0])))
         speeds.append(float(mean[:, -1].mean()))
+        places.append(float(np.sqrt(np.mean(mean[:, -2] ** 2))))
         efforts.append(
             effort_of_stride(
                 body, mean[:, :joints], None, mean[:, joints : 2 * joints], periods[-1], speeds[-1] * periods[-1]
             )
         )
-        spreads.append(float(np.sqrt(curves[..., 2 * joints].var(0).mean())))
+        forces.append(curves[..., 2 * joints])
         first, last = (strides[[0, -1], [0, 2]] / tick).astype(int)
         impacts.append(impact_of(force[first : last + 1] / weight, tick))
         for start, leave, _ in np.floor(strides / tick).astype(int):
@@ -83,7 +86,8 @@ def effort_and_impact(
     held = {
         "speed": float(np.mean(speeds)) - biped.settings.speed,
         "period": float(np.mean(periods)) / (2 * biped.plan.step_time) - 1,
+        "place": float(np.mean(places)),
         "travel": float(np.mean(travels)),
-        "unsteady": float(np.mean(spreads)),
+        "unsteady": float(np.sqrt(np.concatenate(forces).var(0).mean())),
     }
     return effort, float(np.mean(impacts)), held

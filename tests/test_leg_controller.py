@@ -1,6 +1,7 @@
 """The leg constants and the phase."""
 
 import json
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -13,6 +14,7 @@ from springfoot.envs.control.leg_constants import constants_at, constants_from, 
 from springfoot.envs.control.leg_controller import knot_curve
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.physics.model import HIP, LEFT, RIGHT
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import SpringfootError
 
@@ -91,6 +93,21 @@ def test_plateaus_are_flat():
     for value, start, end in zip((10, 20, 30, 40, 50), PLATEAUS[::2], PLATEAUS[1::2], strict=True):
         inside = (start <= GRID) & (end >= GRID)
         np.testing.assert_allclose(curve[inside], value)
+
+
+def test_the_swing_hip_turns_with_the_coms_place_over_the_stance_foot():
+    own = leg_constants("planned", "people", guide="plan")
+    variants = [replace(own, swing_place_gain=gain) for gain in (0.0, 0.8)]
+    biped = Biped(BipedSettings(guide="plan", height=1.9, mass=80.0), 2, legs=variants, variant=np.arange(2))
+    biped.reset(np.arange(2), [3, 3], start=0.25)  # the left foot in mid-stance
+    ticks, measured = [], biped.measurement
+    ahead = measured.com[0, 0] - measured.ankle[0, LEFT, 0] - float(biped.plan.com(0.5)[0])
+    biped.on_tick = ticks.append
+    biped.step(np.zeros((2, 4)))
+    turned = np.diff(ticks[0].equilibrium[:, :, HIP], axis=0)[0]
+    assert abs(ahead) > 0.001
+    assert turned[RIGHT] == pytest.approx(0.8 / (1.9 / 1.7) * ahead, rel=1e-3)
+    assert turned[LEFT] == 0.0
 
 
 def test_the_phase_waits_for_a_late_foot_and_starts_anew_with_it():

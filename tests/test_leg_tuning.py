@@ -16,6 +16,7 @@ from springfoot.gait.human import human_gait
 from springfoot.studies import leg_cost
 from springfoot.studies import leg_tuning as tuning
 from springfoot.studies.command import study_main
+from springfoot.studies.leg_search import LEAD_STEP, LED, Search
 from springfoot.studies.leg_walks import SECONDS
 
 COMMITTED = leg_constants("planned", "people")
@@ -30,24 +31,32 @@ def constants(tmp_path):
 
 
 def test_the_search_begins_at_its_start_and_steps_in_the_constants_own_units():
-    search = tuning.Search(COMMITTED)
+    search = Search(COMMITTED)
     assert search.constants(np.zeros(search.size)) == COMMITTED
-    stepped = search.constants(np.append(np.ones(search.size - len(tuning.LED)), np.zeros(len(tuning.LED))))
+    stepped = search.constants(np.append(np.ones(search.size - len(LED)), np.zeros(len(LED))))
     assert stepped.knee_knots_deg == pytest.approx(np.array(COMMITTED.knee_knots_deg) + 2.0, abs=1e-5)
     assert stepped.hip_stiffness == pytest.approx(np.array(COMMITTED.hip_stiffness) * exp(0.15), rel=1e-6)
     assert stepped.trunk_pitch_deg == pytest.approx(COMMITTED.trunk_pitch_deg + 1.0, abs=1e-5)
+
+
+def test_only_a_body_that_follows_its_plan_places_its_foot_by_the_com():
+    placed = leg_constants("planned", "people", guide="plan")
+    search = Search(placed, placing=True)
+    assert search.constants(np.zeros(search.size)) == placed
+    assert search.size == Search(placed).size + 1
+    assert Search(COMMITTED).constants(np.ones(Search(COMMITTED).size)).swing_place_gain == 0.0
 
 
 @pytest.mark.parametrize(
     ("place", "joint", "curve"), [(-3, "hip", "thigh"), (-2, "knee", "knee"), (-1, "ankle", "ankle")]
 )
 def test_one_step_brings_the_whole_target_of_a_joint_earlier(place, joint, curve):
-    search = tuning.Search(COMMITTED)
+    search = Search(COMMITTED)
     vector = np.zeros(search.size)
     vector[place] = 1.0
     led, human, name = search.constants(vector), human_gait(tuning.TUNED_SPEED), f"{joint}_knots_deg"
     added = np.array(getattr(led, name)) - getattr(COMMITTED, name)
-    earlier = human.mean(curve, KNOTS + tuning.LEAD_STEP) - human.mean(curve, KNOTS)
+    earlier = human.mean(curve, KNOTS + LEAD_STEP) - human.mean(curve, KNOTS)
     assert added == pytest.approx(np.rad2deg(earlier), abs=0.2)  # to first order; the knee moves 1.5 deg
     assert replace(led, **{name: getattr(COMMITTED, name)}) == COMMITTED
 
@@ -56,7 +65,7 @@ def test_the_planned_set_is_made_of_two_searches_as_its_note_says():
     sets = tuning.read_constants(tuning.CONSTANTS)["front"]
     two = [sets[name] for name in ("planned, targets later", "planned, less hip work")]
     mean = {name: np.mean([each[name] for each in two], axis=0).tolist() for name in two[0]}
-    search = tuning.Search(constants_from(mean))
+    search = Search(constants_from(mean))
     vector = np.zeros(search.size)
     vector[-2] = 0.8
     made = asdict(search.constants(vector))

@@ -90,6 +90,21 @@ def test_a_walk_is_measured_as_it_was_simulated():
     assert effort_price(record, 0, biped, 6.0, missed) is None
 
 
+def test_a_limp_is_unsteady_and_a_walk_off_its_plan_is_out_of_place():
+    _, biped, ticks = walk(SETTINGS, [LEGS], [0], 1, foreign=())
+    record = series(biped, ticks)
+    force, com = record["force"].copy(), record["com"].copy()
+    force[:, 0, 0, 1] *= 0.8  # the left foot carries less than the right, in every stride
+    com[..., 0] += 0.3
+    level, limping, ahead = (
+        effort_and_impact(record | changed, 0, biped, SETTLED) for changed in ({}, {"force": force}, {"com": com})
+    )
+    assert level is not None and limping is not None and ahead is not None
+    assert limping[2]["unsteady"] > level[2]["unsteady"] + 0.03
+    assert ahead[2]["place"] == pytest.approx(0.3, abs=1.5 * level[2]["place"])
+    assert ahead[2]["speed"] == pytest.approx(level[2]["speed"], abs=1e-9)
+
+
 def test_no_walk_pays_as_much_as_a_fall():
     limp = replace(LEGS, hip_stiffness=(20.0, 20.0), knee_stiffness=(20.0, 20.0))
     own, fallen = cost(SETTINGS, [LEGS, limp], 0, 1, 0.0, pays="effort")

@@ -19,7 +19,7 @@ from .leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_
 
 HELD_BY_SOUND = (
     *("period_factor", "period_speed_gain", "trunk_pitch_deg", "trunk_stiffness", "trunk_damping", "speed_torque"),
-    "swing_speed_gain",
+    *("swing_speed_gain", "swing_place_gain"),
 )
 """Constants of phase, trunk and speed, which both legs share: the sound leg's."""
 _LEAST = dict.fromkeys(("hip_stiffness", "knee_stiffness", "ankle_schedule", "toe_schedule"), 1.0)

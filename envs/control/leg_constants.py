@@ -58,6 +58,9 @@ class LegConstants:
     """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
     toe_schedule: float
     """Fixed toe stiffness [N m/rad]."""
+    swing_place_gain: float = 0.0
+    """Shift of the swing hip's target for each m that the CoM is farther ahead of the stance ankle than planned; only a
+    body that follows its plan has it [rad/m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -76,6 +76,7 @@ def _follow(constants, rows):
         gain.trunk_damping = scale.torque * scale.time * _between(low.trunk_damping, high.trunk_damping, weight)
         gain.speed_torque = scale.torque / scale.time * _between(low.speed_torque, high.speed_torque, weight)
         gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / scale.time
+        gain.place_gain = _between(low.place_gain, high.place_gain, weight) / scale.length
 
 
 @part
@@ -105,9 +106,10 @@ def drive(rows, bodies, state, table, incline) -> None:
         too_fast = _too_fast(m, rows[i])
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
         on_trunk = trunk + gain.speed_torque * too_fast
-        aim = gain.swing_gain * too_fast
         for side in range(2):
             stance, hip, knee = curves[side, 0], torque * curves[side, 1], torque * curves[side, 2]
+            ahead = m.com[0] - m.ankle[1 - side, 0]  # the drive knows how far it should be
+            aim = gain.swing_gain * too_fast + gain.place_gain * ahead
             own = stance * on_trunk + (1.0 - stance) * hip * aim
             control[side, HIP, 0], control[side, HIP, 1] = hip, torque * curves[side, 3] + own
             control[side, KNEE, 0], control[side, KNEE, 1] = knee, torque * curves[side, 4]
@@ -196,6 +198,7 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
         c.trunk_damping * scale * time_scale,
         c.speed_torque * scale / time_scale,
         c.swing_speed_gain / time_scale,
+        c.swing_place_gain / body.length_scale,
     )
 
 
@@ -216,6 +219,8 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
         if joint == HIP:
             target = target + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
+            ahead = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
+            target = target - (1.0 - stance) * constants.swing_place_gain / body.length_scale * ahead
         feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
         drives.append(stiffness * target + feed)
