@@ -11,7 +11,7 @@ from springfoot.envs.biped_batch import Biped
 from springfoot.envs.control.equilibrium import foot_curves, foot_feed
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.leg_controller import leg_curves
+from springfoot.envs.control.leg_controller import PLANNED_PLACE, leg_curves
 from springfoot.envs.control.reference_walk import rows
 from springfoot.gait.errors import SpringfootError
 
@@ -25,13 +25,14 @@ _MODEL_NUMBERS = (
 def fingerprint(biped: Biped) -> dict[str, str]:
     """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
 
-    The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed.
+    The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed; the
+    planned CoM is told by its speed.
     Numbers count to six significant digits, so that compilers and processors agree.
     """
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
     numbers: list[Any] = []
     for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
-        curves = (leg_curves(legs, walk), *foot_curves(biped.settings, legs, walk))
+        curves = (leg_curves(legs, walk)[:, :PLANNED_PLACE], *foot_curves(biped.settings, legs, walk))
         numbers += [*_used(legs).values(), *(curve[::50] for curve in curves)]
         if (feed := foot_feed(biped.settings, legs, walk)) is not None:
             numbers.append(feed[::50])

@@ -53,7 +53,7 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
             `CONTROL_ROW`; (N,) of `TASK_ROW`; (W, N, side, contact, 2) contact forces in the step's W windows [N].
         physics: `Physics` of the simulation, as a plain tuple.
         tables: curves over the stride, each of a `PhaseTable`: rest angles (R, SAMPLES, 2, 2) [rad] and fixed stiffness
-            (R, SAMPLES, 2, 2) [N m/rad] of ankle and toe; `leg_curves` (R, SAMPLES, 2, 6); `slope_table`
+            (R, SAMPLES, 2, 2) [N m/rad] of ankle and toe; `leg_curves` (R, SAMPLES, 2, 7); `slope_table`
             (1, SAMPLES, 2, 4); `FootLines` as a plain tuple; `REFERENCE` (R, SAMPLES, 2, C).
         springs: (1,) of `SPRING_OPTIONS`.
         factor: (N, 4) what the actions make of the stiffness [-].

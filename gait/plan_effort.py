@@ -1,5 +1,5 @@
-"""What a stride costs a body, planned or simulated: work and muscle excitation of its moments. It knows no walk of
-people's.
+"""What a stride costs a body, planned or simulated: work and muscle excitation of its moments, acceleration of its
+joints. It knows no walk of people's.
 
 All terms are dimensionless, so that they keep their weights with body and speed.
 """
@@ -32,6 +32,9 @@ MOTION_RANGE_DEG = {"knee": (0.0, 135.0), "ankle": (-48.0, 18.0), "toe": (-30.0,
 """Least and largest angle [deg], dorsiflexion and toe up positive: ranges of motion of the American Academy of
 Orthopaedic Surgeons (1965)."""
 
+PRICES = (1.0, 1.0, 1.0, 3.0)
+"""What a search pays for a unit of work, activation, its rate, and acceleration; chosen: energy and squared excitation
+weigh alike, and acceleration is no more than they are. Without it a foot may swing up and down for nothing."""
 PER_DEGREE = 0.1
 """Effort that a joint beyond its range counts for in a search [1/deg]; chosen."""
 
@@ -47,13 +50,21 @@ class Effort:
     rate: float
     """Sum over joints of the mean squared `ACTIVATION_TIME` times rate of the activation [-]. A first-order muscle's
     mean squared excitation is the sum of this and `activation`."""
+    acceleration: float
+    """Sum over hip, knee and ankle of the mean squared `ACTIVATION_TIME`^2 times angular acceleration [-]; joint
+    accelerations cost in the simulations of Falisse et al., J. R. Soc. Interface 16 (2019) 20190402, too."""
     beyond_range: float
     """Sum over joints of the largest angle beyond `MOTION_RANGE_DEG` [deg]."""
 
     @property
     def total(self) -> float:
-        """What a search pays: energy and squared excitation, which weigh alike; chosen."""
-        return self.work + self.activation + self.rate
+        """What a search pays at `PRICES`."""
+        return float(np.dot(PRICES, self.terms))
+
+    @property
+    def terms(self) -> tuple[float, float, float, float]:
+        """What has a price: work, activation, its rate, acceleration."""
+        return self.work, self.activation, self.rate, self.acceleration
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +108,7 @@ def effort_of_stride(
     """
     tick, toe = stride_time / len(angle), JOINTS.index("toe")
     rate = _change(angle, tick) if rate is None else rate
+    acceleration = _change(rate[:, :toe], tick)
     moment = moment - muscle.tissue * passive_moments(body, angle)
     power = (-moment * rate)[:, :toe]
     pull = np.maximum(moment[:, _ANKLE], 0.0)
@@ -116,6 +128,7 @@ def effort_of_stride(
         work=float(2 * spent / (body.total_mass * GRAVITY * distance)),
         activation=float(2 * np.mean(weight * activation**2, 0).sum()),
         rate=float(2 * ACTIVATION_TIME**2 * np.mean(weight * change**2, 0).sum()),
+        acceleration=float(2 * ACTIVATION_TIME**4 * np.mean(acceleration**2, 0).sum()),
         beyond_range=beyond,
     )
 

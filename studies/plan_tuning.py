@@ -23,7 +23,7 @@ from springfoot.gait.body import HEEL_RADIUS, Body
 from springfoot.gait.errors import SpringfootError, require_count, require_number
 from springfoot.gait.human import human_gait
 from springfoot.gait.plan import WalkPlan, plan_walk
-from springfoot.gait.plan_effort import AS_IS, PER_DEGREE, Effort, Muscle, effort_of
+from springfoot.gait.plan_effort import AS_IS, PER_DEGREE, PRICES, Effort, Muscle, effort_of
 from springfoot.gait.plan_gait import gait_of
 from springfoot.gait.walk_style import STYLES, WalkStyle, least_work, style_from
 
@@ -71,8 +71,6 @@ LEAST_CLEARANCE = 0.015
 """Least height of ball and heel in mid-swing [m at 1.70 m]; chosen, to clear uneven ground."""
 PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 """What a swing foot too low costs, and a choice outside its bounds squared; chosen."""
-EVEN = (1.0, 1.0, 1.0)
-"""Weights of the terms of effort: they weigh alike; chosen."""
 IMPOSSIBLE = 30.0
 """What a plan that cannot be costs, besides how far its choices are from the start; chosen."""
 
@@ -104,11 +102,11 @@ def vector_of(style: WalkStyle) -> NDArray:
 
 
 def price(
-    body: Body, speed: float, vector: NDArray, weights: tuple[float, float, float] = EVEN, muscle: Muscle = AS_IS
+    body: Body, speed: float, vector: NDArray, weights: tuple[float, ...] = PRICES, muscle: Muscle = AS_IS
 ) -> tuple[float, WalkPlan | None, Effort | None]:
     """What the plan at a vector costs, the plan and its effort; none for a plan that cannot be.
 
-    `weights` are those of work, activation and its rate.
+    `weights` are those of work, activation, its rate, and acceleration.
     """
     outside = sum(
         max(0.0, least - start - unit * x, start + unit * x - most) ** 2
@@ -121,8 +119,12 @@ def price(
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
     lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())
     low = max(0.0, -0.001 - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
-    terms = effort.work, effort.activation, effort.rate
-    paid = float(np.dot(weights, terms)) + PER_METRE_LOW * low + PER_DEGREE * effort.beyond_range + PER_UNIT * outside
+    paid = (
+        float(np.dot(weights, effort.terms))
+        + PER_METRE_LOW * low
+        + PER_DEGREE * effort.beyond_range
+        + PER_UNIT * outside
+    )
     return paid, plan, effort
 
 
@@ -140,8 +142,8 @@ class PlanTuning(Study):
     """First spread, in units of the search."""
     seed: int = 0
     """Seed of the search."""
-    weights: tuple[float, float, float] = EVEN
-    """Weights of work, of activation and of its rate."""
+    weights: tuple[float, float, float, float] = PRICES
+    """Weights of work, of activation, of its rate, and of acceleration."""
     tissue: float = 1.0
     """Factor on passive moments of tissue."""
     tendon: float = 1.0

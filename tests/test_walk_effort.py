@@ -15,6 +15,7 @@ from springfoot.gait.leg import JOINTS
 from springfoot.gait.plan_effort import (
     ACTIVATION_TIME,
     MUSCLE_EFFICIENCY,
+    PRICES,
     STRENGTH,
     VOLUME,
     Muscle,
@@ -40,7 +41,7 @@ def test_a_moment_at_rest_costs_its_squared_activation_and_rate():
     moment[:, JOINTS.index("knee")] = share * STRENGTH["knee"][0] * BODY.mass * GRAVITY * BODY.height
     found = effort_of_stride(BODY, angle, None, moment, time, 1.3, BARE)
     weight = VOLUME["knee"][0] / np.mean(list(VOLUME.values()))
-    assert found.work == 0.0 and found.beyond_range == 0.0
+    assert found.work == found.acceleration == found.beyond_range == 0.0
     assert found.activation == pytest.approx(2 * weight * (0.3**2 + 0.2**2 / 2), rel=1e-9)
     assert found.rate == pytest.approx(2 * weight * (ACTIVATION_TIME * 0.2 * 2 * np.pi / time) ** 2 / 2, rel=1e-4)
 
@@ -54,6 +55,9 @@ def test_work_costs_its_metabolic_energy_over_weight_and_distance():
     found = effort_of_stride(BODY, angle, None, torque, time, distance, BARE)
     spent = moment * 0.8 * (1 / MUSCLE_EFFICIENCY[0] + 1 / MUSCLE_EFFICIENCY[1])
     assert found.work == pytest.approx(2 * spent / (BODY.mass * GRAVITY * distance), rel=1e-4)
+    expected = (0.4 * (ACTIVATION_TIME * 2 * np.pi / time) ** 2) ** 2  # both legs, half of the peak's square each
+    assert found.acceleration == pytest.approx(expected, rel=1e-4)
+    assert found.total == pytest.approx(np.dot(PRICES, found.terms))
 
 
 def test_of_a_plans_own_stride_it_is_the_plans():
@@ -63,6 +67,7 @@ def test_of_a_plans_own_stride_it_is_the_plans():
     moment = np.stack([moments[joint] for joint in JOINTS], -1)
     own = effort_of_stride(BODY, angle, None, moment, plan.stride_time, 2 * plan.step_length)
     assert own.total == pytest.approx(effort_of(plan).total, rel=0.03)
+    assert own.acceleration == pytest.approx(effort_of(plan).acceleration, rel=0.1)
 
 
 def test_impact_is_the_mean_square_of_the_forces_rate():

@@ -37,8 +37,11 @@ TOUCHDOWN_PHASE = 0.80
 SLOWEST = -0.1
 """Error of the speed below which gains see no more of it [m/s]; chosen: a body that sets off, or that its springs keep
 slow, is far slower than the plan for many steps, and with all of its error the legs would trip it."""
-PLANNED_SPEED = 5
-"""Column of `leg_curves`."""
+FARTHEST = 0.1
+"""Error of the CoM's place over the stance foot beyond which gains see no more of it [m at 1.70 m]; chosen, as
+`SLOWEST`."""
+PLANNED_SPEED, PLANNED_PLACE = 5, 6
+"""Columns of `leg_curves`."""
 HOLD = 0.001
 """A leg's phase waits at 1 minus this until its foot touches down; chosen, small against a window's 0.009."""
 
@@ -77,6 +80,7 @@ def _follow(constants, rows):
         gain.speed_torque = scale.torque / scale.time * _between(low.speed_torque, high.speed_torque, weight)
         gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / scale.time
         gain.place_gain = _between(low.place_gain, high.place_gain, weight) / scale.length
+        gain.farthest = scale.length * _between(low.farthest, high.farthest, weight)
 
 
 @part
@@ -93,7 +97,7 @@ def drive(rows, bodies, state, table, incline) -> None:
         rows: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
         state: (N, numbers) MuJoCo's, whose `control` is filled.
-        table: (R, SAMPLES, 2, 6) of `leg_curves`, of a `PhaseTable`.
+        table: (R, SAMPLES, 2, 7) of `leg_curves`, of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) of `slope_table`.
     """
     curves, inclined, level = np.empty((2, table.shape[-1])), np.empty(4), np.zeros(1, PLACE)[0]
@@ -108,8 +112,8 @@ def drive(rows, bodies, state, table, incline) -> None:
         on_trunk = trunk + gain.speed_torque * too_fast
         for side in range(2):
             stance, hip, knee = curves[side, 0], torque * curves[side, 1], torque * curves[side, 2]
-            ahead = m.com[0] - m.ankle[1 - side, 0]  # the drive knows how far it should be
-            aim = gain.swing_gain * too_fast + gain.place_gain * ahead
+            ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
+            aim = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
             own = stance * on_trunk + (1.0 - stance) * hip * aim
             control[side, HIP, 0], control[side, HIP, 1] = hip, torque * curves[side, 3] + own
             control[side, KNEE, 0], control[side, KNEE, 1] = knee, torque * curves[side, 4]
@@ -199,12 +203,13 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
         c.speed_torque * scale / time_scale,
         c.swing_speed_gain / time_scale,
         c.swing_place_gain / body.length_scale,
+        FARTHEST * body.length_scale,
     )
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 6) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], and the planned
-    CoM's forward speed over its mean."""
+    """(SAMPLES, 7) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], the planned CoM's
+    forward speed over its mean, and how far it is ahead of the other leg's ankle [m]."""
     body, human = walk.body, walk.human
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
@@ -219,10 +224,9 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
         if joint == HIP:
             target = target + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
-            ahead = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
-            target = target - (1.0 - stance) * constants.swing_place_gain / body.length_scale * ahead
         feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
         drives.append(stiffness * target + feed)
     planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
-    return np.stack([*columns, *drives, planned_speed], axis=-1)
+    planned_place = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
+    return np.stack([*columns, *drives, planned_speed, planned_place], axis=-1)

@@ -75,6 +75,7 @@ GAINS = np.dtype(
         ("speed_torque", float),  # [N s]
         ("swing_gain", float),  # [rad s/m]
         ("place_gain", float),  # [rad/m]
+        ("farthest", float),  # [m]
     ]
 )
 """Constants of one body's legs, scaled to it."""
