@@ -117,7 +117,7 @@ feet: install
 
 # Each stage is kept in runs/predict: after a stop the same command goes on.
 predict: install
-	$(BIN)/springfoot study predict --search-seed 1 --page docs/prediction.md
+	$(BIN)/springfoot study predict --page docs/prediction.md
 
 bench: install
 	$(BIN)/python -m benchmarks.bench
