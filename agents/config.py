@@ -91,7 +91,7 @@ PREDICTED = replace(
     push_newton=100.0,
     guide="plan",
     action_mode="residual",
-    reward_weights={"pose": 0.0, "grf": 0.0, "effort": -4.0},
+    reward_weights={"pose": 0.0, "grf": 0.0, "effort": -2.0},
 )
 """The task of a body that follows its own plan: its action is a factor on the schedule found with its leg constants;
 it is paid for CoM, speed and ZMP of the plan and pays for effort; angles and forces count nothing."""
