@@ -130,6 +130,20 @@ def test_a_search_at_another_price_is_kept_beside_the_constants_that_walk(consta
     assert set(after["front"]["planned, --foreign 0"]) == set(asdict(COMMITTED))
 
 
+def test_a_search_pushes_from_a_generation_on(constants):
+    own = constants.read_bytes()
+
+    def paid(name, *words):
+        constants.write_bytes(own)  # a search begins at what is there, and replaces it
+        words = ["--guide", "plan", "--population", "2", "--threads", "1", "--generations", "2", *words]
+        out = constants.parent / name
+        assert run(*words, "--constants", constants, "--out", out) == 0
+        return [float(row["best"]) for row in csv.DictReader((out / "generations.csv").read_text().splitlines())]
+
+    never, later = paid("never", "--push-newton", 0), paid("later", "--push-newton", 400, "--pushed-from", 1)
+    assert later[0] == never[0] and later[1] > never[1] + leg_cost.FALL_COST / 3
+
+
 def test_a_quick_search_writes_no_constants(constants, capsys):
     before = constants.read_text()
     assert run("--quick", "--generations", "150", "--constants", constants, "--out", constants.parent / "out") == 0
