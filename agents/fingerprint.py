@@ -26,13 +26,14 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
 
     The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed; the
-    planned CoM is told by its speed.
+    planned place of the CoM counts where a gain reads it.
     Numbers count to six significant digits, so that compilers and processors agree.
     """
     model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
     numbers: list[Any] = []
     for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
-        curves = (leg_curves(legs, walk)[:, :PLANNED_PLACE], *foot_curves(biped.settings, legs, walk))
+        read = slice(None) if legs.swing_place_gain else slice(PLANNED_PLACE)
+        curves = (leg_curves(legs, walk)[:, read], *foot_curves(biped.settings, legs, walk))
         numbers += [*_used(legs).values(), *(curve[::50] for curve in curves)]
         if (feed := foot_feed(biped.settings, legs, walk)) is not None:
             numbers.append(feed[::50])

@@ -33,7 +33,8 @@ LEAST = {"ankle_schedule": LOWEST_STIFFNESS[0], "toe_schedule": LOWEST_STIFFNESS
 class Search:
     """Constants as a vector of unit steps from where the search began; the last three are leads of whole targets.
 
-    With `placing` one of them is the `swing_place_gain`, which a body that follows people has not.
+    `names` (size,) tells which constant a place moves; with `placing` one of them is the `swing_place_gain`, which a
+    body that follows people has not.
     """
 
     def __init__(
@@ -48,7 +49,8 @@ class Search:
         self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in sought.items()}
         human = human or human_gait(speed)
         self._led = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
-        self.size = sum(value.size for value in self._start.values()) + len(LED)
+        self.names = tuple(name for name, value in self._start.items() for _ in value) + tuple(LED)
+        self.size = len(self.names)
 
     def constants(self, vector: NDArray) -> LegConstants:
         """The constants at a vector (size,)."""

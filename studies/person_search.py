@@ -1,6 +1,6 @@
 """The person who adapts to a foot, and the foot's own numbers, as a vector that a search moves."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from springfoot.envs.feet import KINDS, SPRING_NUMBERS, foot_of, kind_of
 from springfoot.envs.physics.foot import INTACT, Feet
 from springfoot.gait.arrays import NDArray
 
-from .leg_search import GAIN_STEP, LED, Search
+from .leg_search import GAIN_STEP, Search
 
 OF_MUSCLES = ("ankle_knots_deg", "toe_flat_deg", "ankle_schedule", "toe_schedule")
 """Constants that a leg whose ankle and toe are devices does not read."""
@@ -59,7 +59,10 @@ class PersonSearch:
         kind = kind_of(start.foot)
         device = foot_of(start.foot).ankle.device is not None
         skipped = [NEVER, NEVER + HELD_BY_SOUND + (OF_MUSCLES if device else ())]
-        self._free = [_free(start.sound, left_out) for left_out in skipped]
+        self._free = [
+            np.array([name not in left_out for name in legs.names])
+            for legs, left_out in zip(self._legs, skipped, strict=True)
+        ]
         self._numbers = tuple(KINDS[kind]) if design else ()
         self._numbers = tuple(name for name in self._numbers if name in SPRING_NUMBERS and name != "damping_time")
         self.size = sum(int(free.sum()) for free in self._free) + len(self._numbers)
@@ -89,12 +92,6 @@ class PersonSearch:
             value = usual + ANGLE_STEP[name] * step if name in ANGLE_STEP else usual * np.exp(GAIN_STEP * step)
             foot[name] = round(float(np.clip(value, known.low, known.high)), 3)
         return foot
-
-
-def _free(constants: LegConstants, left_out: Sequence[str]) -> NDArray:
-    """Which places of a `Search` vector may move, bool."""
-    moves = [np.full(np.size(value), name not in left_out) for name, value in asdict(constants).items()]
-    return np.concatenate([*moves, [knots not in left_out for knots in LED]])
 
 
 def _listed(values: Mapping[str, Any]) -> dict[str, Any]:

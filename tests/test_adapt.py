@@ -44,7 +44,9 @@ def test_legs_share_phase_and_trunk_and_a_device_keeps_what_only_muscles_read(ki
     search = PersonSearch(begin, 1.2, design=0.0)
     person = search.person(0.3 * np.random.default_rng(0).standard_normal(search.size))
     for name in HELD_BY_SOUND:
-        assert getattr(person.other, name) == getattr(person.sound, name) != getattr(begin.sound, name)
+        assert getattr(person.other, name) == getattr(person.sound, name)
+        stays = name == "swing_place_gain"  # who follows people has none
+        assert (getattr(person.sound, name) == getattr(begin.sound, name)) == stays
     kept = [getattr(person.other, name) == getattr(begin.other, name) for name in OF_MUSCLES]
     assert kept == [kind == "rigid"] * len(OF_MUSCLES)
     assert person.foot == kind
