@@ -124,7 +124,7 @@ class BipedSettings:
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
     decisions: Decisions = field(default="50hz", metadata=_SPRINGS)
     """When stiffness is decided: in every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
-    strike and at people's foot flat, heel-off and toe-off, the action being held between them (event)."""
+    strike and at the foot flat, heel-off and toe-off of the guide, the action being held between them (event)."""
     stiffness_joints: StiffnessJoints = field(default="both", metadata=_SPRINGS)
     """Joints whose stiffness the action decides; the other has the fixed schedule, and its actions are read as 0."""
     ankle_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[0], 800.0), metadata=_SPRINGS)

@@ -94,6 +94,7 @@ def series(biped: Biped, ticks: Sequence[Tick]) -> dict[str, NDArray]:
     return {
         "com": np.stack([m.com for m in measured]),
         "planned_com": np.stack([tick.com_reference for tick in ticks]),
+        "phase": np.stack([tick.phase for tick in ticks]),
         "material": np.stack([contact_material(biped.body, m.contact, m.base, m.angle) for m in measured]),
         "load": np.stack([m.force[..., 1] for m in measured]),
         "pitch": np.stack([m.base[:, 2] for m in measured]),

@@ -60,9 +60,9 @@ class Predict(WalkingStudy):
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
     """Generations of the second stage, leg constants of walks near the plan, without pushes."""
-    effort_generations: int = 400
+    effort_generations: int = 300
     """Generations of the third stage, leg constants of walks of least effort and impact."""
-    push_generations: int = 150
+    push_generations: int = 300
     """Generations by which the third stage goes on with pushes."""
     population: int = 20
     """Candidates in each generation."""

@@ -17,11 +17,11 @@ from springfoot.gait.scores import travel
 
 PER_EFFORT = 10.0
 """Price of one unit of effort and impact; chosen, so that no walk pays as much as a fall."""
-TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "travel": 0.01, "unsteady": 0.05}
+TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "skipped": 0.01, "travel": 0.01, "unsteady": 0.05}
 """What counts as one: of the speed [m/s], of the plan's stride time [-], of the CoM's place over the foot, root mean
-square over the stride [m], of the sole's way on the floor in a stance [m], of the SD of the vertical force over the
-strides of both legs [body weights]; chosen."""
-PER_HELD, PER_MISS = 0.3, 0.01
+square over the stride [m], of the planned way that a leg skips as its foot lands [m], of the sole's way on the floor in
+a stance [m], of the SD of the vertical force over the strides of both legs [body weights]; chosen."""
+PER_HELD, PER_MISS = 0.6, 0.01
 """Price of one of these, and of one tolerance that the walk is off its plan; chosen: the plan then says which way to
 walk, and hardly how."""
 
@@ -56,7 +56,7 @@ def effort_and_impact(
     weight = body.total_mass * GRAVITY
     speed = np.gradient(record["com"][:, index, 0], tick)
     ahead = record["com"][:, index, 0] - record["planned_com"][:, index, 0]
-    efforts, impacts, periods, travels, forces, speeds, places = [], [], [], [], [], [], []
+    efforts, impacts, periods, travels, forces, speeds, places, landings = [], [], [], [], [], [], [], []
     for side in range(len(SIDES)):
         angle, torque, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
         strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
@@ -82,11 +82,14 @@ def effort_and_impact(
         for start, leave, _ in np.floor(strides / tick).astype(int):
             sole = slice(start, leave + 1), index, side
             travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
+        for _, leave, land in np.floor(strides / tick).astype(int):
+            landings.append(record["phase"][leave:land, index, side].max())
     effort = Effort(**{name: float(np.mean([getattr(each, name) for each in efforts])) for name in vars(efforts[0])})
     held = {
         "speed": float(np.mean(speeds)) - biped.settings.speed,
         "period": float(np.mean(periods)) / (2 * biped.plan.step_time) - 1,
         "place": float(np.mean(places)),
+        "skipped": (1.0 - float(np.mean(landings))) * 2 * biped.plan.step_length,
         "travel": float(np.mean(travels)),
         "unsteady": float(np.sqrt(np.concatenate(forces).var(0).mean())),
     }

@@ -101,13 +101,15 @@ def test_a_limp_is_unsteady_and_a_walk_off_its_plan_is_out_of_place():
     force, com = record["force"].copy(), record["com"].copy()
     force[:, 0, 0, 1] *= 0.8  # the left foot carries less than the right, in every stride
     com[..., 0] += 0.3
-    level, limping, ahead = (
-        effort_and_impact(record | changed, 0, biped, SETTLED) for changed in ({}, {"force": force}, {"com": com})
-    )
-    assert level is not None and limping is not None and ahead is not None
+    changes = {}, {"force": force}, {"com": com}, {"phase": 0.9 * record["phase"]}
+    level, limping, ahead, early = (effort_and_impact(record | each, 0, biped, SETTLED) for each in changes)
+    assert level is not None and limping is not None and ahead is not None and early is not None
     assert limping[2]["unsteady"] > level[2]["unsteady"] + 0.03
     assert ahead[2]["place"] == pytest.approx(0.3, abs=1.5 * level[2]["place"])
     assert ahead[2]["speed"] == pytest.approx(level[2]["speed"], abs=1e-9)
+    way = 2 * biped.plan.step_length
+    assert 0.0 <= level[2]["skipped"] < 0.1 * way
+    assert 1.0 - early[2]["skipped"] / way == pytest.approx(0.9 * (1.0 - level[2]["skipped"] / way))
 
 
 def test_no_walk_pays_as_much_as_a_fall():

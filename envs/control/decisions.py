@@ -14,7 +14,7 @@ from .phase_table import GRID
 
 
 def gait_events(human: HumanGait) -> NDArray:
-    """(4,) stride phases of people's heel strike, foot flat, heel-off and toe-off, from their angle curves."""
+    """(4,) stride phases of the guide's heel strike, foot flat, heel-off and toe-off, from its angle curves."""
     ankle = ankle_events(GRID, human.mean("ankle", GRID), human.toe_off)
     toe = toe_events(GRID, human.mean("toe", GRID), human.toe_off)
     return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], human.toe_off])
