@@ -1,5 +1,5 @@
-"""A walk from body, plan and physics by one command: plan, legs that follow it, legs of least effort, policy, and how
-it walks.
+"""A walk from body, plan and physics by one command: plan, legs that follow it, legs of least effort at three speeds,
+policy, and how it walks.
 
     springfoot study predict
 
@@ -25,6 +25,7 @@ from springfoot.agents.multi_seed import is_finished
 from springfoot.agents.ownership import owned
 from springfoot.agents.policy import RUN
 from springfoot.agents.run_record import read_record
+from springfoot.envs.control.leg_constants import constants_name
 from springfoot.envs.settings import BipedSettings
 from springfoot.gait.errors import SpringfootError, require_count
 
@@ -41,12 +42,16 @@ FOUND = "found.json"
 SECTION = "PREDICTION"
 """Of a page."""
 STAGE_PUSH = 100.0
-"""Size of the pushes of the third stage, of the training and of the second half of the evaluation [N]; chosen."""
+"""Size of the pushes of the third and fourth stage, of the training and of the second half of the evaluation [N];
+chosen."""
 FIRST_SPREAD, EFFORT_SPREAD = 0.5, 0.6
 """First spread of the second and third stage [units of the search]; chosen: the third leaves the walk that was planned,
 and from a narrower spread it stays in a dearer one."""
-STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push"))
-"""Generations of the searches, in their order."""
+OTHER_SPEEDS, OTHER_SPREAD, OTHER_UNPUSHED = (0.9, 1.5), 0.3, 60
+"""Of the fourth stage: its speeds [m/s], first spread, and generations without pushes; chosen: constants of 1.2 m/s
+alone fall at 1.4."""
+STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push", "other"))
+"""Generations of the searches, in their order; the last for each of `OTHER_SPEEDS`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,10 +69,13 @@ class Predict(WalkingStudy):
     """Generations of the third stage, leg constants of walks of least effort and impact."""
     push_generations: int = 300
     """Generations by which the third stage goes on with pushes."""
+    other_generations: int = 100
+    """Generations of the fourth stage, leg constants of a slower and of a faster walk of least effort, from those of
+    1.2 m/s; of each."""
     population: int = 20
     """Candidates in each generation."""
     timesteps: int = PRESETS["predict"].timesteps
-    """Steps of the fourth stage, the training of a policy (preset `predict`)."""
+    """Steps of the fifth stage, the training of a policy (preset `predict`)."""
     search_seed: int = 0
     """Seed of the searches and of the training."""
 
@@ -77,6 +85,7 @@ class Predict(WalkingStudy):
         "walk_generations": 1,
         "effort_generations": 1,
         "push_generations": 1,
+        "other_generations": 1,
         "population": 4,
         "timesteps": 8192,
     }
@@ -93,7 +102,7 @@ class Predict(WalkingStudy):
     @property
     def total(self) -> float:
         """Generations of all searches."""
-        return sum(getattr(self, name) for name in STAGES)
+        return sum(getattr(self, name) for name in STAGES) + (len(OTHER_SPEEDS) - 1) * self.other_generations
 
     @property
     def folder(self) -> Path:
@@ -151,6 +160,16 @@ class Predict(WalkingStudy):
             log=self.folder / "effort.json",
         )
         searches = {"plan": plan, "walk": walk, "effort": effort}
+        for speed in OTHER_SPEEDS:
+            searches[f"effort-{speed:g}"] = replace(
+                effort,
+                speed=speed,
+                start=constants_name("planned", "people", guide="plan"),
+                pushed_from=OTHER_UNPUSHED,
+                generations=self.other_generations,
+                sigma=OTHER_SPREAD,
+                log=self.folder / f"effort-{speed:g}.json",
+            )
         for name, search in searches.items():
             text = stage(name, lambda search=search: search.ask(progress)).text
             (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
