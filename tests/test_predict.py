@@ -30,7 +30,11 @@ def test_all_stages_run_and_a_second_time_nothing_is_done_again(tmp_path, monkey
         before = kept
     assert pages[0] == pages[1] and "<!-- PREDICTION BEGIN -->" in pages[0]
     found = json.loads((tmp_path / "runs-quick" / "found.json").read_text(encoding="utf-8"))
-    assert list(found["styles"]) == ["1.2"] and list(found["constants"]) == ["predicted", "predicted, 0.9 m/s", "predicted, 1.5 m/s"]
+    assert list(found["styles"]) == ["1.2"] and list(found["constants"]) == [
+        "predicted",
+        "predicted, 0.9 m/s",
+        "predicted, 1.5 m/s",
+    ]
     capsys.readouterr()
     assert study_main(["predict", "--quick", "--runs", "runs", "--search-seed", "1"]) == 2
     assert "is of a search with other settings" in capsys.readouterr().err
