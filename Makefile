@@ -133,7 +133,7 @@ extremes: install
 ROOT_FILES = $(wildcard package/*.py) package/py.typed
 build/typing/made: Makefile $(ROOT_FILES)
 	rm -rf build/typing && mkdir -p build/typing/springfoot build/typing/mujoco-stubs
-	ln -s $(addprefix ../../../,$(ROOT_FILES) gait envs agents evaluation studies) build/typing/springfoot/
+	ln -s $(addprefix ../../../,$(ROOT_FILES) files gait envs agents evaluation studies cli) build/typing/springfoot/
 	echo partial > build/typing/mujoco-stubs/py.typed
 	printf '%s\n' 'from typing import Any' 'def __getattr__(name: str) -> Any: ...' > build/typing/mujoco-stubs/__init__.pyi
 	@touch $@

@@ -7,7 +7,7 @@ from springfoot.terminal import at_terminal
 
 def main() -> int:
     """Evaluate; its imports take a while, in which Ctrl-C and SIGTERM end it all the same."""
-    from springfoot.evaluation.evaluate_command import evaluate_main
+    from springfoot.cli.evaluate import evaluate_main
 
     return evaluate_main()
 

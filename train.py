@@ -7,7 +7,7 @@ from springfoot.terminal import at_terminal
 
 def main() -> int:
     """Train; its imports take a while, in which Ctrl-C and SIGTERM end it all the same."""
-    from springfoot.agents.train_command import train_main
+    from springfoot.cli.train import train_main
 
     return train_main()
 

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 from springfoot.extras import naming_extras
 
 with naming_extras():
-    from .baselines import BASELINES, PolicyFunction, baseline
-    from .config import PRESETS, TrainingConfig
-    from .conversion import policy_from_mlp, policy_from_sb3
-    from .export import export_policy
-    from .foreign_policy import ForeignPolicy
-    from .policy import Policy, load_policy, read_policy, save_policy
+    from .policies.baselines import BASELINES, PolicyFunction, baseline
+    from .policies.conversion import policy_from_mlp, policy_from_sb3
+    from .policies.export import export_policy
+    from .policies.foreign import ForeignPolicy
+    from .policies.policy import Policy, load_policy, read_policy, save_policy
+    from .training.config import PRESETS, TrainingConfig
 
 if TYPE_CHECKING:
-    from .multi_seed import train_seeds
-    from .sb3_vec_env import SegmentedFootBipedVecEnv
-    from .training import resume, train
+    from .training.multi_seed import train_seeds
+    from .training.sb3_vec_env import SegmentedFootBipedVecEnv
+    from .training.training import resume, train
 
 __all__ = [
     "BASELINES",
@@ -43,10 +43,10 @@ __all__ = [
 ]
 
 _NEEDS_TORCH = {
-    "SegmentedFootBipedVecEnv": "sb3_vec_env",
-    "resume": "training",
-    "train": "training",
-    "train_seeds": "multi_seed",
+    "SegmentedFootBipedVecEnv": "training.sb3_vec_env",
+    "resume": "training.training",
+    "train": "training.training",
+    "train_seeds": "training.multi_seed",
 }
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists

@@ -17,8 +17,8 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from springfoot.agents.command_line import exit_code
-from springfoot.agents.config import PRESETS
+from springfoot.agents.training.config import PRESETS
+from springfoot.command_line import exit_code
 
 from . import environments, learning
 from .timing import Case, Figures, load, machine, measure

@@ -13,7 +13,7 @@ import gymnasium as gym
 import numpy as np
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
 
-from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 
 from .timing import Case
 from .walking import SEED, STEP, Walk, vector

@@ -19,10 +19,10 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from springfoot.agents.command_line import exit_code
+from springfoot.command_line import exit_code
 from springfoot.envs import SegmentedFootBipedVector
-from springfoot.envs.feet import KINDS
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.envs.settings.feet import KINDS
+from springfoot.errors import SpringfootError, require_count
 
 ENVIRONMENTS, STEPS = 32, 1000
 """Environments side by side, and steps of each, in one setting."""

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import save
 
-from springfoot.agents.checkpoint import STATE_KEY, read_checkpoint
-from springfoot.agents.config import TrainingConfig, config_to_json
-from springfoot.agents.foreign_policy import contract_path, onnx_policy
-from springfoot.agents.policy import RUN, find_policy, read_policy
-from springfoot.agents.run_record import read_record
-from springfoot.agents.schedule_files import schedule_file
-from springfoot.agents.tensor_file import DIGEST, read_tensors, write_tensors
-from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import Recording, load_recording, record
-from springfoot.evaluation.schedule_tables import finite_states, write_schedules
-from springfoot.gait.cycle import PERCENT
-from springfoot.gait.errors import SpringfootError
-from springfoot.gait.foot_file import read_foot
-from springfoot.gait.human import COLUMNS, human_gait
-from springfoot.gait.json_file import read_object
-from springfoot.gait.own_data import OwnGait, read_gait
+from springfoot.agents.policies.foreign import contract_path, onnx_policy
+from springfoot.agents.policies.policy import RUN, find_policy, read_policy
+from springfoot.agents.policies.schedules import schedule_file
+from springfoot.agents.training.checkpoint import STATE_KEY, read_checkpoint
+from springfoot.agents.training.config import TrainingConfig, config_to_json
+from springfoot.agents.training.run_record import read_record
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import Recording, load_recording, record
+from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
+from springfoot.files.json_file import read_object
+from springfoot.files.tensor_file import DIGEST, read_tensors, write_tensors
+from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.people.human import COLUMNS, human_gait
+from springfoot.gait.people.own_data import OwnGait, read_gait
+from springfoot.gait.springs.foot_file import read_foot
 
 TASK = BipedSettings()
 
@@ -246,7 +246,7 @@ def _onnx(folder: Path) -> tuple[bytes, ...]:
     try:
         import onnx  # noqa: F401  # an extra
 
-        from springfoot.agents.export import export_policy
+        from springfoot.agents.policies.export import export_policy
     except ImportError:
         return ()
     export_policy(read_policy("pretrained"), folder / "walk.onnx", "onnx")

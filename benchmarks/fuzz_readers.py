@@ -23,8 +23,8 @@ import tyro
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from springfoot.agents.command_line import exit_code
-from springfoot.gait.errors import SpringfootError, require_number
+from springfoot.command_line import exit_code
+from springfoot.errors import SpringfootError, require_number
 
 from .fuzz_files import Reader, readers
 

@@ -16,11 +16,11 @@ import mujoco
 import numpy as np
 import tyro
 
-from springfoot.agents.command_line import exit_code
+from springfoot.command_line import exit_code
 from springfoot.envs.physics.model import build_model
-from springfoot.envs.timing import CONTROL_WINDOW
-from springfoot.gait.body import Body
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.envs.physics.timing import CONTROL_WINDOW
+from springfoot.errors import SpringfootError, require_count
+from springfoot.gait.body.body import Body
 
 from .walking import Walk, record_walk
 

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from tensorboard.backend.event_processing.event_file_loader import LegacyEventFileLoader
 
-from springfoot.agents import training  # noqa: F401 - here once, not in each process
-from springfoot.agents.checkpoint import newest_checkpoint
-from springfoot.agents.run_record import EVENTS, read_record
-from springfoot.agents.train_command import train_main
+from springfoot.agents.training import training  # noqa: F401 - here once, not in each process
+from springfoot.agents.training.checkpoint import newest_checkpoint
+from springfoot.agents.training.run_record import EVENTS, read_record
+from springfoot.cli.train import train_main
 from springfoot.terminal import at_terminal
 
 SHORT = (

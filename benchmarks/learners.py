@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from scipy.stats import wilcoxon
 
 from springfoot.agents import PolicyFunction, baseline, load_policy
-from springfoot.agents.command_line import exit_code
-from springfoot.agents.fingerprint import fingerprint
-from springfoot.agents.markdown import table, write_section
-from springfoot.agents.returns import evaluate_returns
+from springfoot.agents.policies.fingerprint import fingerprint
+from springfoot.agents.training.returns import evaluate_returns
+from springfoot.command_line import exit_code
 from springfoot.envs import Biped, BipedSettings
-from springfoot.gait.errors import SpringfootError
+from springfoot.errors import SpringfootError
+from springfoot.files.markdown import table, write_section
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples" / "learners"

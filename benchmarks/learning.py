@@ -10,13 +10,13 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from springfoot.agents.config import PRESETS
-from springfoot.agents.ppo import Learner
-from springfoot.agents.sb3_vec_env import SegmentedFootBipedVecEnv
-from springfoot.envs.settings import body_of, settings_to_json
-from springfoot.gait.body import Body
-from springfoot.gait.plan import plan_walk
-from springfoot.gait.posture import leg_angles
+from springfoot.agents.training.config import PRESETS
+from springfoot.agents.training.ppo import Learner
+from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
+from springfoot.envs.settings.settings import body_of, settings_to_json
+from springfoot.gait.body.body import Body
+from springfoot.gait.plan.plan import plan_walk
+from springfoot.gait.plan.posture import leg_angles
 
 from .environments import OURS
 from .timing import Case

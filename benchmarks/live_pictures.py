@@ -12,8 +12,8 @@ import shutil
 import threading
 import time
 
-from springfoot.evaluation.live_session import LiveSession
-from springfoot.evaluation.live_view import LiveView
+from springfoot.evaluation.live.steered_walk import LiveSession
+from springfoot.evaluation.live.view import LiveView
 
 from .screenshots import BROWSERS
 

@@ -21,14 +21,14 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from springfoot.agents.baselines import PolicyFunction
-from springfoot.agents.command_line import exit_code
-from springfoot.envs.settings import BipedSettings, body_of
-from springfoot.envs.timing import WINDOWS_PER_STEP
-from springfoot.evaluation.metrics import Gait, measure
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
-from springfoot.gait.errors import require_count
+from springfoot.agents.policies.baselines import PolicyFunction
+from springfoot.command_line import exit_code
+from springfoot.envs.physics.timing import WINDOWS_PER_STEP
+from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.errors import require_count
+from springfoot.evaluation.numbers.metrics import Gait, measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
 
 from .physics_changes import DEFAULT, JOINT_ROWS, ROWS, edited, joint_constant, without_stairs
 from .timing import load, machine

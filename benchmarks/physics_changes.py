@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from springfoot.envs.physics import model as physics_model
 from springfoot.envs.physics.model import JOINTS, build_model
 from springfoot.envs.physics.simulation import Simulation
-from springfoot.envs.timing import CONTROL_WINDOW, PHYSICS_STEP
-from springfoot.gait.body import Body
+from springfoot.envs.physics.timing import CONTROL_WINDOW, PHYSICS_STEP
+from springfoot.gait.body.body import Body
 
 Edit = Callable[[mujoco.MjModel], None]
 

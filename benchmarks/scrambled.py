@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 import tyro
 
-from springfoot.agents.config import PRESETS
-from springfoot.agents.policy import read_policy
-from springfoot.agents.training import train
+from springfoot.agents.policies.policy import read_policy
+from springfoot.agents.training.config import PRESETS
+from springfoot.agents.training.training import train
 from springfoot.envs.control.leg_constants import leg_constants
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
-from springfoot.gait.human import PEOPLE_FILE
-from springfoot.studies.constants_file import read_constants, write_constants
-from springfoot.studies.generic_constants import GENERIC
-from springfoot.studies.leg_tuning import LegTuning
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.gait.people.human import PEOPLE_FILE
+from springfoot.studies.searches.constants_file import read_constants, write_constants
+from springfoot.studies.searches.generic_constants import GENERIC
+from springfoot.studies.searches.leg_tuning import LegTuning
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,12 +9,12 @@ from gymnasium.vector import AutoresetMode
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.physics.model import build_model
-from springfoot.envs.step_result import Tick
-from springfoot.envs.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
+from springfoot.envs.physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
 from springfoot.envs.vector_env import SegmentedFootBipedVector
-from springfoot.gait.body import Body
+from springfoot.gait.body.body import Body
 
 from .timing import Case, clock_cost
 

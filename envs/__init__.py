@@ -2,10 +2,10 @@
 
 import gymnasium as gym
 
-from .biped_batch import Biped
+from .batch.biped_batch import Biped
+from .batch.step_result import TERMINATIONS
 from .env import SegmentedFootBiped
-from .settings import BipedSettings, body_of, reference_gait, settings_from, settings_to_json
-from .step_result import TERMINATIONS
+from .settings.settings import BipedSettings, body_of, reference_gait, settings_from, settings_to_json
 from .vector_env import SegmentedFootBipedVector
 
 __all__ = [

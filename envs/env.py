@@ -5,15 +5,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
 
-from .biped_batch import Biped
-from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
+from .batch.biped_batch import Biped
+from .batch.step_result import INFO, report_start
+from .gym_face import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
 from .physics.simulation import MjData, MjModel
-from .setting_checks import check_seed, real_numbers
-from .settings import settings_from
-from .step_result import INFO, report_start
+from .settings.checks import check_seed, real_numbers
+from .settings.settings import settings_from
 
 
 class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -167,7 +167,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     `model` that of the present body. Bodies are changed by settings and by the options of a reset.
 
     ## Arguments
-    Every field of `springfoot.envs.settings.BipedSettings`, by theme, as plain JSON values:
+    Every field of `springfoot.envs.settings.settings.BipedSettings`, by theme, as plain JSON values:
 
     | Argument                  | Default         | Meaning                                                            |
     | ------------------------- | --------------- | ------------------------------------------------------------------ |

@@ -10,16 +10,16 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_count
 
-from .biped_batch import Biped
-from .faces import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
-from .feet import each_foot
+from .batch.biped_batch import Biped
+from .batch.step_result import INFO, StepResult, report_start
+from .gym_face import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
 from .physics.simulation import MOST_THREADS
-from .setting_checks import MOST_ENVIRONMENTS, check_seed
-from .settings import BipedSettings, settings_from
-from .step_result import INFO, StepResult, report_start
+from .settings.checks import MOST_ENVIRONMENTS, check_seed
+from .settings.feet import each_foot
+from .settings.settings import BipedSettings, settings_from
 
 _NAMES = (*INFO, "termination")
 _MASKS = tuple(f"_{name}" for name in _NAMES)

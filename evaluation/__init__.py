@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from springfoot.extras import naming_extras
 
-from .criteria import HUMAN_LIKE, WALKS, Criterion, unmet
-from .metrics import Gait, measure
-from .open_loop import open_loop_copy
-from .policies import prepare
-from .recording import Recording, load_recording, record, record_each
-from .stride_curves import StrideCurves
+from .numbers.criteria import HUMAN_LIKE, WALKS, Criterion, unmet
+from .numbers.curves import StrideCurves
+from .numbers.metrics import Gait, measure
+from .recording.open_loop import open_loop_copy
+from .recording.policies import prepare
+from .recording.recording import Recording, load_recording, record, record_each
 
 if TYPE_CHECKING:
-    from .animation import save_animation
-    from .gait_figure import save_gait_figure
-    from .gait_table import print_table
-    from .report import write_gait_cycle, write_report
+    from .report.animation import save_animation
+    from .report.gait_figure import save_gait_figure
+    from .report.gait_table import print_table
+    from .report.report import write_gait_cycle, write_report
 
 __all__ = [
     "HUMAN_LIKE",
@@ -43,11 +43,11 @@ __all__ = [
 ]
 
 _DRAWS = {
-    "print_table": "gait_table",
-    "save_animation": "animation",
-    "save_gait_figure": "gait_figure",
-    "write_gait_cycle": "report",
-    "write_report": "report",
+    "print_table": "report.gait_table",
+    "save_animation": "report.animation",
+    "save_gait_figure": "report.gait_figure",
+    "write_gait_cycle": "report.report",
+    "write_report": "report.report",
 }
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists

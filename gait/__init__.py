@@ -1,18 +1,19 @@
 """The science of walking. NumPy and SciPy only: no simulator, no learner."""
 
-from .body import GRAVITY, Body
+from springfoot.errors import SpringfootError
+
+from .body.body import GRAVITY, Body
+from .body.leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
 from .bout import Bout, plan_bout
-from .cycle import PERCENT
-from .errors import SpringfootError
-from .human import HumanGait, human_gait
-from .identification import PhaseSpring, identify
-from .kinetics import foot_force, ground_reaction, planned_moments, projection_table
-from .leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
-from .own_data import OwnGait, read_gait
-from .perturbation import PushedSpring, identify_pushed
-from .plan import WalkPlan, plan_walk
+from .people.cycle import PERCENT
+from .people.human import HumanGait, human_gait
+from .people.own_data import OwnGait, read_gait
+from .plan.kinetics import foot_force, ground_reaction, planned_moments, projection_table
+from .plan.plan import WalkPlan, plan_walk
 from .preview import preview_com
-from .stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
+from .springs.identification import PhaseSpring, identify
+from .springs.perturbation import PushedSpring, identify_pushed
+from .springs.stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
 
 __all__ = [
     "GRAVITY",

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator, PPoly
 
-from .arrays import NDArray
-from .body import Body
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_count
+
+from .body.body import ANGLES, Body
 from .bout_com import AFTER, BEFORE, com_from_rest_to_rest, quintics, step_lengths_of, zmp_knots
 from .bout_feet import BoutFoot, Point, bout_feet, bout_legs, foot_postures, standing_height
-from .cart_table import zmp
-from .errors import SpringfootError, require_count
-from .feet import FLOOR_TOLERANCE
-from .human import ANGLES
-from .plan import Cadence, WalkPlan, plan_walk
-from .posture import POSTURE_SAMPLES, full_reach
+from .plan.cart_table import zmp
+from .plan.foot import FLOOR_TOLERANCE
+from .plan.plan import Cadence, WalkPlan, plan_walk
+from .plan.posture import POSTURE_SAMPLES, full_reach
 
 Side = Literal["left", "right"]
 

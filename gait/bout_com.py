@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 from scipy.linalg import solve_banded
 
-from .arrays import NDArray
-from .body import GRAVITY
-from .plan import WalkPlan
+from springfoot.arrays import NDArray
+
+from .body.body import GRAVITY
+from .plan.plan import WalkPlan
 
 BEFORE, AFTER = 2, 2
 """Step times from the start to the first heel strike, and from the closing foot's landing to the end; chosen."""

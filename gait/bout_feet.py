@@ -7,14 +7,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import NDArray
-from .body import Body
+from springfoot.arrays import NDArray
+
+from .body.body import Body
 from .bout_com import BEFORE, STANDING_COM, zmp_of_walk
-from .com_plan import Point
-from .feet import FLOOR_TOLERANCE, FootPath, feet_under_zmp
-from .foot_style import HEEL_STRIKE_PITCH, ROLL_PITCH, TOE_OFF_PITCH, pitch_at
-from .plan import WalkPlan
-from .posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_angle
+from .plan.com_plan import Point
+from .plan.foot import FLOOR_TOLERANCE, FootPath, feet_under_zmp
+from .plan.foot_style import HEEL_STRIKE_PITCH, ROLL_PITCH, TOE_OFF_PITCH, pitch_at
+from .plan.plan import WalkPlan
+from .plan.posture import STRAIGHTEST_KNEE, LegPostures, full_reach, legs_under, toe_angle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_discrete_are
 
-from .arrays import NDArray
-from .body import GRAVITY
-from .errors import SpringfootError, require_number, require_within
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_number, require_within
+
+from .body.body import GRAVITY
 
 HORIZON = 2.4
 """How much of the reference is known ahead [s]; chosen. With Kajita's 1.6 s the CoM of a walk at 1.2 m/s stays 4.6 mm

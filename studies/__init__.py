@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 from springfoot.extras import naming_extras
 
 if TYPE_CHECKING:
-    from .body_sweep import draw_pairs, walk_pairs
-    from .comparison import contenders
+    from .base.study import Answer, Study, WalkingStudy
     from .constant_search import best_constant
-    from .identifiability import any_stiffness, mean_springs, rebuilt
-    from .push_experiment import identified
-    from .seed_agreement import agreements
-    from .study import Answer, Study, WalkingStudy
+    from .springs.agreement import agreements
+    from .springs.any_stiffness import any_stiffness, mean_springs, rebuilt
+    from .springs.push_experiment import identified
+    from .walks.bodies import draw_pairs, walk_pairs
+    from .walks.comparison import contenders
 
 __all__ = [
     "Answer",
@@ -30,18 +30,18 @@ __all__ = [
 ]
 
 _MODULE = {
-    "Answer": "study",
-    "Study": "study",
-    "WalkingStudy": "study",
-    "agreements": "seed_agreement",
-    "any_stiffness": "identifiability",
+    "Answer": "base.study",
+    "Study": "base.study",
+    "WalkingStudy": "base.study",
+    "agreements": "springs.agreement",
+    "any_stiffness": "springs.any_stiffness",
     "best_constant": "constant_search",
-    "contenders": "comparison",
-    "draw_pairs": "body_sweep",
-    "identified": "push_experiment",
-    "mean_springs": "identifiability",
-    "rebuilt": "identifiability",
-    "walk_pairs": "body_sweep",
+    "contenders": "walks.comparison",
+    "draw_pairs": "walks.bodies",
+    "identified": "springs.push_experiment",
+    "mean_springs": "springs.any_stiffness",
+    "rebuilt": "springs.any_stiffness",
+    "walk_pairs": "walks.bodies",
 }
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists

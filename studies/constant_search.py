@@ -11,16 +11,16 @@ from typing import Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.baselines import constant, schedule
-from springfoot.agents.files import csv_text
-from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
-from springfoot.gait.arrays import NDArray
+from springfoot.agents.policies.baselines import constant, schedule
+from springfoot.arrays import NDArray
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.files.writing import csv_text
 
-from .comparison import PushedFlags, pushed
-from .intervals import RESAMPLES, mean_interval
-from .study import Answer, OnProgress, WalkingStudy
+from .base.intervals import RESAMPLES, mean_interval
+from .base.study import Answer, OnProgress, WalkingStudy
+from .walks.comparison import PushedFlags, pushed
 
 COARSE = (8, 5)
 """First grid of the search for a constant, ankle by toe stiffness: evenly on a log scale over their ranges."""

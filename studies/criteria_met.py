@@ -9,18 +9,17 @@ from typing import Annotated, Any
 
 import tyro
 
-from springfoot.agents.baselines import and_copy
-from springfoot.agents.command_line import policy_label
-from springfoot.agents.files import csv_text
-from springfoot.agents.flags import SettingsFlags, given
-from springfoot.agents.markdown import table
-from springfoot.evaluation.criteria import FOLLOWS_THE_PLAN, HUMAN_LIKE, Criterion, number_text, numbers, unmet
-from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
+from springfoot.agents.policies.baselines import and_copy
+from springfoot.evaluation.numbers.criteria import FOLLOWS_THE_PLAN, HUMAN_LIKE, Criterion, number_text, numbers, unmet
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import policy_label, prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.files.markdown import table
+from springfoot.files.writing import csv_text
 
-from .quantities import OPEN_LOOP, open_loop_note
-from .study import Answer, OnProgress, WalkingStudy
+from .base.flags import SettingsFlags, given
+from .base.quantities import OPEN_LOOP, open_loop_note
+from .base.study import Answer, OnProgress, WalkingStudy
 
 CRITERIA = (*HUMAN_LIKE, *FOLLOWS_THE_PLAN)
 """Of the table, in its order: down the left half, then down the right."""

@@ -14,17 +14,17 @@ import matplotlib
 import tyro
 from matplotlib.figure import Figure
 
-from springfoot.agents.files import csv_text
-from springfoot.agents.flags import SettingsFlags, given
-from springfoot.agents.markdown import table, text_of
-from springfoot.evaluation.criteria import Criterion, number_text, numbers
-from springfoot.evaluation.gait_figure import STYLE
-from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
+from springfoot.evaluation.numbers.criteria import Criterion, number_text, numbers
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.files.markdown import table, text_of
+from springfoot.files.writing import csv_text
 
+from .base.flags import SettingsFlags, given
+from .base.study import Answer, OnProgress, WalkingStudy
 from .criteria_met import CRITERIA
-from .study import Answer, OnProgress, WalkingStudy
 
 MARKS = "osD^vP*X<>"
 """Shapes of the figure's marks, one after the other for the policies; a further policy begins anew."""

@@ -18,21 +18,21 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
-from springfoot.agents.files import csv_text
-from springfoot.agents.markdown import table, text_of
-from springfoot.agents.policy import Policy, read_policy, save_policy
-from springfoot.agents.returns import evaluate_returns
-from springfoot.envs.biped_batch import Biped
-from springfoot.evaluation.criteria import Criterion, numbers, unmet
-from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.policies import CONDITIONS
-from springfoot.evaluation.recording import record
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError, require_count, require_number
+from springfoot.agents.policies.policy import Policy, read_policy, save_policy
+from springfoot.agents.training.returns import evaluate_returns
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.evaluation.numbers.criteria import Criterion, numbers, unmet
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import CONDITIONS
+from springfoot.evaluation.recording.recording import record
+from springfoot.files.markdown import table, text_of
+from springfoot.files.writing import csv_text
 
+from .base.study import Answer, OnProgress, Study
 from .criteria_met import CRITERIA
 from .front import beyond_percent
-from .study import Answer, OnProgress, Study
 
 MARGIN_PERCENT = 0.5
 """Nearness to the end of a criterion's range that is paid for already [% of that end]; chosen: about as much as the

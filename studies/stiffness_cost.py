@@ -2,8 +2,8 @@
 
     springfoot study stiffness-cost --page docs/results.md
 
-Without disturbance the stiffness of a gait is not identified (`springfoot.studies.identifiability`): a cost on K shows
-what softer springs cost in likeness and under pushes. A seed that is finished is not trained again, so the
+Without disturbance the stiffness of a gait is not identified (`springfoot.studies.springs.any_stiffness`): a cost on K
+shows what softer springs cost in likeness and under pushes. A seed that is finished is not trained again, so the
 command may be stopped and begun anew, with more weights or seeds, or with `--no-train` to measure what there is.
 """
 
@@ -20,25 +20,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from springfoot.agents.config import PRESETS, TrainingConfig
-from springfoot.agents.files import csv_text
-from springfoot.agents.markdown import MISSING, plus_minus, table
-from springfoot.agents.multi_seed import is_finished
-from springfoot.envs.settings import DEFAULT_WEIGHTS, body_of
+from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.multi_seed import is_finished
+from springfoot.arrays import NDArray
+from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, body_of
 from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
-from springfoot.evaluation.gait_figure import MODEL, PLAN, STYLE
-from springfoot.evaluation.metrics import Gait, measure
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import TICK, Recording, record
-from springfoot.evaluation.stride_series import WARM_UP
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError
-from springfoot.gait.scores import mean_sd
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers.metrics import Gait, measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record
+from springfoot.evaluation.report.gait_figure import MODEL, PLAN, STYLE
+from springfoot.files.markdown import MISSING, plus_minus, table
+from springfoot.files.writing import csv_text
+from springfoot.gait.people.scores import mean_sd
 
-from .quantities import COMPARED_JOINTS
-from .seed_agreement import agreements
-from .study import Answer, OnProgress
-from .trainings import TrainingStudy
+from .base.quantities import COMPARED_JOINTS
+from .base.study import Answer, OnProgress
+from .base.trainings import TrainingStudy
+from .springs.agreement import agreements
 
 SECTION = "TRADE-OFF"
 """Of the results page."""

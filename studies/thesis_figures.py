@@ -11,14 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from springfoot.evaluation.gait_figure import PEOPLE, PLAN, STYLE
+from springfoot.arrays import NDArray
+from springfoot.evaluation.report.gait_figure import PEOPLE, PLAN, STYLE
 from springfoot.gait import GRAVITY, Body, HumanGait, WalkPlan, human_gait
-from springfoot.gait import thesis as printed_thesis
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.human import ANGLES, human_cop
-from springfoot.gait.kinetics import foot_force
-from springfoot.gait.leg import joint_positions, segment_turns
-from springfoot.gait.thesis import ThesisWalk
+from springfoot.gait.body.body import ANGLES
+from springfoot.gait.body.leg import joint_positions, segment_turns
+from springfoot.gait.people.human import human_cop
+from springfoot.gait.plan import thesis as printed_thesis
+from springfoot.gait.plan.kinetics import foot_force
+from springfoot.gait.plan.thesis import ThesisWalk
 
 PRINTED = "#7a5195"
 PHASE = 0.5 + np.arange(751) / 1000

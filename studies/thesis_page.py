@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from springfoot.agents.files import write_atomically
-from springfoot.agents.markdown import table
+from springfoot.files.markdown import table
+from springfoot.files.writing import write_atomically
 from springfoot.gait import SpringfootError, thesis_schedule
-from springfoot.gait.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
+from springfoot.gait.plan.thesis import GRAVITY, INTERPOLATIONS, ThesisWalk
 
-from .study import Answer, OnProgress, Study
+from .base.study import Answer, OnProgress, Study
 from .thesis_figures import FIGURES, PHASE, DrawnWalk, as_planned, as_printed, of_people, save_figure
 from .thesis_tables import BODY, STRIDE, THESIS_SPEED, cart_table, claims, corrected, moments, people_work, springs
 
@@ -52,11 +52,11 @@ def _head() -> str:
     return f"""{TITLE}
 
 D. W. Nam, *Numerical analysis of ZMP based biped walking model with different stiffness of ankle and toe joint*, DGIST
-2016. **As printed** is `springfoot.gait.thesis`: its via-points and formulas, faults included; names that its program
-never defines are read as `READINGS` there says. **Corrected** is `plan_walk(Body(), {THESIS_SPEED}, "thesis")`: the
-same body, step ({plan.step_length:.1f} m in {plan.step_time:.1f} s) and double support ({plan.double_support:.2f} s),
-and a CoM that obeys equation (1) over a ZMP under the feet. **People** are the mean curves of
-`human_gait({THESIS_SPEED})`. `springfoot study thesis --page docs/thesis.md` writes this page.
+2016. **As printed** is `springfoot.gait.plan.thesis`: its via-points and formulas, faults included; names that its
+program never defines are read as `READINGS` there says. **Corrected** is `plan_walk(Body(), {THESIS_SPEED},
+"thesis")`: the same body, step ({plan.step_length:.1f} m in {plan.step_time:.1f} s) and double support
+({plan.double_support:.2f} s), and a CoM that obeys equation (1) over a ZMP under the feet. **People** are the mean
+curves of `human_gait({THESIS_SPEED})`. `springfoot study thesis --page docs/thesis.md` writes this page.
 
 All figures show the thesis's 0.75 s on one axis: from the other foot's heel strike (50 % of this foot's stride) over
 its own (100 %) into stance. Double support is grey, dots are via-points."""

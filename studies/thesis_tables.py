@@ -4,10 +4,11 @@ from functools import cache
 
 import numpy as np
 
-from springfoot.agents.markdown import table
+from springfoot.arrays import NDArray
+from springfoot.files.markdown import table
 from springfoot.gait import GRAVITY, Body, WalkPlan, human_gait, plan_walk
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.kinetics import (
+from springfoot.gait.people.scores import correlation, force_features, positive_work
+from springfoot.gait.plan.kinetics import (
     foot_force,
     inverse_dynamics,
     people_leg,
@@ -15,11 +16,10 @@ from springfoot.gait.kinetics import (
     planned_moments,
     projection_table,
 )
-from springfoot.gait.plan import DOUBLE_SUPPORT
-from springfoot.gait.quasi_stiffness import ankle_quasi_stiffness
-from springfoot.gait.scores import correlation, force_features, positive_work
-from springfoot.gait.stiffness import schedule_from_curves
-from springfoot.gait.thesis import ThesisWalk
+from springfoot.gait.plan.plan import DOUBLE_SUPPORT
+from springfoot.gait.plan.thesis import ThesisWalk
+from springfoot.gait.springs.quasi_stiffness import ankle_quasi_stiffness
+from springfoot.gait.springs.stiffness import schedule_from_curves
 
 from .thesis_figures import of_people
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from springfoot.gait import GRAVITY, Body, SpringfootError
+from springfoot.gait.body.rockers import turned
 from springfoot.gait.bout import plan_bout
 from springfoot.gait.bout_com import STANDING_COM, zmp_knots
-from springfoot.gait.plan import Cadence
-from springfoot.gait.posture import STRAIGHTEST_KNEE
-from springfoot.gait.rockers import turned
+from springfoot.gait.plan.plan import Cadence
+from springfoot.gait.plan.posture import STRAIGHTEST_KNEE
 
 SIDES = ("left", "right")
 

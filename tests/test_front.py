@@ -5,8 +5,8 @@ import csv
 import pytest
 from drawn import kept_figures
 
-from springfoot.evaluation.criteria import Criterion
-from springfoot.studies.command import study_main
+from springfoot.cli.main import study_main
+from springfoot.evaluation.numbers.criteria import Criterion
 from springfoot.studies.criteria_met import CRITERIA
 from springfoot.studies.front import beyond_percent
 

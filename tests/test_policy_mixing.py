@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from springfoot.agents import read_policy, save_policy
-from springfoot.evaluation.criteria import Criterion, numbers
-from springfoot.evaluation.metrics import measure
-from springfoot.evaluation.policies import CONDITIONS
-from springfoot.evaluation.recording import record
-from springfoot.gait.errors import SpringfootError
-from springfoot.studies.command import study_main
+from springfoot.cli.main import study_main
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers.criteria import Criterion, numbers
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import CONDITIONS
+from springfoot.evaluation.recording.recording import record
 from springfoot.studies.policy_mixing import MARGIN_PERCENT, cheapest_shares, mean_policy, missed_percent, price
 
 ROOT = Path(__file__).parents[1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, plan_walk
-from springfoot.gait.cart_table import zmp
+from springfoot.gait.plan.cart_table import zmp
 from springfoot.gait.preview import preview_com
 
 TICK, HEIGHT = 0.005, 0.97

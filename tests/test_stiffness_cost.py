@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from drawn import has_line, kept_figures
 
-from springfoot.envs.biped_batch import Biped
-from springfoot.evaluation.policies import prepare
-from springfoot.evaluation.recording import record
-from springfoot.evaluation.stride_series import WARM_UP
+from springfoot.cli.main import study_main
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import WARM_UP, record
 from springfoot.studies import stiffness_cost as tradeoff
-from springfoot.studies.command import study_main
 from springfoot.studies.stiffness_cost import config_of, folder_of, knee, stiffness_cost
 
 

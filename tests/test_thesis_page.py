@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from springfoot.studies.command import study_main
+from springfoot.cli.main import study_main
 from springfoot.studies.thesis_page import page, walks
 
 DOCS = Path(__file__).parents[1] / "docs"

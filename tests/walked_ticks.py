@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from springfoot.envs.biped_batch import Biped
-from springfoot.envs.step_result import Tick
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.step_result import Tick
 
 
 def walked_ticks(biped: Biped, steps: int = 60, actions: Any = 0.3) -> list[Tick]:

@@ -1,1 +1,1 @@
-"""What moves the body: foot springs, legs, standing, and the walks they follow."""
+"""The control of the body: stiffness of ankles and toes, rest angles, hips and knees, standing."""

@@ -4,12 +4,12 @@ from math import isfinite
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.human import HumanGait
-from springfoot.gait.stiffness import ankle_events, toe_events
+from springfoot.arrays import NDArray
+from springfoot.gait.people.human import HumanGait
+from springfoot.gait.springs.stiffness import ankle_events, toe_events
 
 from ..physics.kernel import kernel
-from ..settings import BipedSettings
+from ..settings.settings import BipedSettings
 from .phase_table import GRID
 
 

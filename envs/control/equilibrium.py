@@ -4,15 +4,15 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
-from springfoot.gait.human import FootHabits, HumanGait, foot_habits
-from springfoot.gait.stiffness import StiffnessSchedule
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import Body
+from springfoot.gait.people.human import FootHabits, HumanGait, foot_habits
+from springfoot.gait.springs.stiffness import StiffnessSchedule
 
 from ..physics.model import ANKLE, TOE, damping_times
-from ..settings import BipedSettings
+from ..settings.settings import BipedSettings
 from .leg_constants import LegConstants
-from .leg_controller import knot_curve
+from .legs import knot_curve
 from .phase_table import GRID
 from .reference_walk import ReferenceWalk
 
@@ -22,7 +22,7 @@ PLATEAUS = _PEOPLES.plateaus
 is constant, between them linear; chosen near people's."""
 REFERENCE_STIFFNESS = _PEOPLES.ankle_quasi_stiffness or ()
 """K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase, of the package's own
-file (`springfoot.gait.human`)."""
+file (`springfoot.gait.people.human`)."""
 FOOT_FLAT, TOE_OFF = _PEOPLES.toe_flat, _PEOPLES.toe_off
 """Stride phases over which people's planned toe goes flat, and over which it returns to its swing posture."""
 

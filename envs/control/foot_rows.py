@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.stiffness import StiffnessSchedule
+from springfoot.arrays import NDArray
+from springfoot.gait.springs.stiffness import StiffnessSchedule
 
-from ..feet import feet_of
 from ..physics.foot import LOCK, Feet
 from ..physics.kernel import part
-from ..settings import BipedSettings
+from ..settings.feet import feet_of
+from ..settings.settings import BipedSettings
 from .phase_table import GRID, SAMPLES, PhaseTable, read
-from .rows import FOOT, PLACE
+from .state import FOOT, PLACE
 
 
 class FootLines(NamedTuple):

@@ -10,20 +10,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import Body
 
-from ..feet import feet_of
 from ..physics.foot import Feet
 from ..physics.kernel import kernel, part
 from ..physics.measurement import plant_of
 from ..physics.model import ANKLE
 from ..physics.simulation import Physics
-from ..settings import BipedSettings
-from ..timing import CONTROL_WINDOW
+from ..physics.timing import CONTROL_WINDOW
+from ..settings.feet import feet_of
+from ..settings.settings import BipedSettings
 from .foot_rows import device, foot_lines, foot_rows
 from .phase_table import PhaseTable, read
-from .rows import PLACE
+from .state import PLACE
 from .subjects import Subjects
 
 FEET = slice(ANKLE, None)
@@ -160,7 +160,7 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
         state: (N, numbers) MuJoCo's, whose `control` is filled.
         rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; behind them, if so asked,
             torques that act beside the springs, whatever their K [N m]: as shifts of the rest angle by torque / K.
-        incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.leg_controller.slope_table`).
+        incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.legs.slope_table`).
         feet: `envs.control.foot_rows.FootLines`, as a plain tuple.
         options: (1,) of `SPRING_OPTIONS`.
         walking: (N,) bool; the springs of the others do not change.

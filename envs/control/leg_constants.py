@@ -1,4 +1,4 @@
-"""Tuned constants of the leg controller (`envs.control.leg_controller`): committed sets, interpolated over speed."""
+"""Tuned constants of the leg controller (`envs.control.legs`): committed sets, interpolated over speed."""
 
 import json
 from collections.abc import Mapping
@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from springfoot.gait.errors import SpringfootError
-from springfoot.gait.json_file import MOST_JSON_BYTES
-from springfoot.gait.text_table import read_bytes
+from springfoot.errors import SpringfootError
+from springfoot.files.json_file import MOST_JSON_BYTES
+from springfoot.files.text_table import read_bytes
 
 TUNED_SPEED = 1.2
 """Speed [m/s] at 1.70 m of the constants whose name gives no speed."""
@@ -23,11 +23,11 @@ class LegConstants:
     """Tuned constants of the leg controller, for 1.70 m and 63 kg."""
 
     hip_knots_deg: tuple[float, ...]
-    """Added to people's thigh angle at `envs.control.leg_controller.KNOTS` [deg]."""
+    """Added to people's thigh angle at `envs.control.legs.KNOTS` [deg]."""
     knee_knots_deg: tuple[float, ...]
-    """Added to people's knee angle at `envs.control.leg_controller.KNOTS` [deg]."""
+    """Added to people's knee angle at `envs.control.legs.KNOTS` [deg]."""
     ankle_knots_deg: tuple[float, ...]
-    """Added to people's ankle angle at `envs.control.leg_controller.KNOTS` in the planned equilibrium [deg]."""
+    """Added to people's ankle angle at `envs.control.legs.KNOTS` in the planned equilibrium [deg]."""
     hip_stiffness: tuple[float, float]
     """Stance, swing [N m/rad]."""
     knee_stiffness: tuple[float, float]

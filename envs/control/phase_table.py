@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from springfoot.gait.arrays import NDArray
+from springfoot.arrays import NDArray
 
 from ..physics.kernel import kernel, part
-from .rows import PLACE
+from .state import PLACE
 
 SAMPLES = 1000
 """Samples of a stride, between which curves are linear; chosen."""

@@ -13,19 +13,19 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
-from springfoot.gait.com_plan import ComPlan, over_peoples_zmp
-from springfoot.gait.human import HumanGait
-from springfoot.gait.kinetics import planned_moments
-from springfoot.gait.plan import Cadence, WalkPlan, plan_walk
-from springfoot.gait.plan_gait import gait_of
-from springfoot.gait.walk_style import least_work
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import Body
+from springfoot.gait.people.human import HumanGait
+from springfoot.gait.plan.com_plan import ComPlan, over_peoples_zmp
+from springfoot.gait.plan.kinetics import planned_moments
+from springfoot.gait.plan.plan import Cadence, WalkPlan, plan_walk
+from springfoot.gait.plan.plan_gait import gait_of
+from springfoot.gait.plan.walk_style import least_work
 
 from ..physics.model import LEFT, RIGHT
-from ..settings import BipedSettings, body_of, plan_file_of, reference_gait
-from .adapted_legs import adapted_foot, person_constants
+from ..settings.settings import BipedSettings, body_of, plan_file_of, reference_gait
 from .leg_constants import LegConstants
+from .person import adapted_foot, person_constants
 from .phase_table import GRID
 from .standing import SLOW_SPEED
 

@@ -8,8 +8,8 @@ stiffness are those of these springs while the body stands, and those of the fix
 down. A policy acts in the steady walk between, which is all it has learnt.
 
 Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`). Unless a
-source is given they were chosen by trial: bodies set off, walk and come to rest with them (`tests/test_standing.py`).
-"""
+source is given they were chosen by trial: bodies set off, walk and come to rest with them
+(`tests/envs/control/test_standing.py`)."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -18,15 +18,15 @@ from math import inf, sin, sqrt
 import numpy as np
 from scipy.optimize import brentq
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import Body
 
 from ..physics.kernel import kernel, part
 from ..physics.measurement import Measurement, plant_of
 from ..physics.model import ANKLE, HIP, KNEE
 from ..physics.simulation import Physics
-from ..settings import BipedSettings, body_of
-from ..timing import CONTROL_WINDOW
+from ..physics.timing import CONTROL_WINDOW
+from ..settings.settings import BipedSettings, body_of
 from .subjects import Subjects
 
 STANDING_STIFFNESS = (1200.0, 800.0, 350.0, 60.0)

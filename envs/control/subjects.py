@@ -11,13 +11,13 @@ from math import radians, sqrt
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
-from springfoot.gait.errors import SpringfootError
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+from springfoot.gait.body.body import Body
 
 from ..physics.kernel import kernel
-from ..settings import BipedSettings, body_of
-from .rows import CONTROL_ROW
+from ..settings.settings import BipedSettings, body_of
+from .state import CONTROL_ROW
 
 DRAWN: tuple[str, ...] = ("height", "mass", "speed")
 """What may be drawn for each environment: settings `<name>_range`, and options of a reset."""

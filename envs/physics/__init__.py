@@ -1,1 +1,1 @@
-"""What the body is: its MuJoCo model, its feet on the ground, and the simulation of many."""
+"""The body in MuJoCo: model, feet, contacts, simulation, measurement, energy and pictures."""

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import GRAVITY, Body
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import GRAVITY, Body
 
 from .foot import SOUND, Feet, leg_segments
 from .kernel import kernel, part

@@ -7,8 +7,8 @@ numbers do not scale with the body.
 from dataclasses import dataclass
 from math import inf
 
-from springfoot.gait.body import Body
-from springfoot.gait.stiffness import StiffnessSchedule
+from springfoot.gait.body.body import Body
+from springfoot.gait.springs.stiffness import StiffnessSchedule
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class Foot:
     """One foot, and the shank above it."""
 
     kind: str = "intact"
-    """Its name among the kinds of `springfoot.envs.feet`."""
+    """Its name among the kinds of `springfoot.envs.settings.feet`."""
     ankle: FootJoint = FootJoint()
     toe: FootJoint = FootJoint()
     schedule: StiffnessSchedule | None = None

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import Body
 
+from .contact import CONTACTS, contact_offsets
 from .foot import SOUND, Feet, leg_segments, total_mass
-from .foot_contact import CONTACTS, contact_offsets
 from .kernel import kernel, part
 from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times_of, torque_ranges
 

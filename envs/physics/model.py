@@ -13,14 +13,14 @@ from math import sqrt
 import mujoco
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import GRAVITY, Body
-from springfoot.gait.leg import JOINTS
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import GRAVITY, Body
+from springfoot.gait.body.leg import JOINTS
 
-from ..timing import PHYSICS_STEP
+from .contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
 from .foot import INTACT, SOUND, Feet, Foot, FootJoint, leg_segments, torque_range
-from .foot_contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
 from .scene import DEVICE, FLESH, add_scene, bone, box
+from .timing import PHYSICS_STEP
 
 SIDES = ("left", "right")
 BASE = ("x", "z", "pitch")

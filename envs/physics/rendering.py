@@ -9,8 +9,8 @@ from typing import Any
 
 import mujoco
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.errors import SpringfootError
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
 
 RENDER_MODES = ("human", "rgb_array")
 WIDTH, HEIGHT = 640, 480

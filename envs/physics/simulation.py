@@ -13,16 +13,16 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import Body
-from springfoot.gait.errors import SpringfootError, require_count
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_count
+from springfoot.gait.body.body import Body
 
-from ..timing import CONTROL_WINDOW
+from .contact import CONTACTS, FRICTION
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot import SOUND, Feet
-from .foot_contact import CONTACTS, FRICTION
 from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
+from .timing import CONTROL_WINDOW
 
 MjModel: TypeAlias = Any
 """A `mujoco.MjModel`; MuJoCo has no type stubs, and what it leaves unknown would be unknown in our users' files."""

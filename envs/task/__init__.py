@@ -1,1 +1,1 @@
-"""What is asked of the body: observation, reward, ground, pushes and the start of an episode."""
+"""The task: observation, reward, ground, pushes, start and end of an episode."""

@@ -5,12 +5,12 @@ from math import radians
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
+from springfoot.arrays import NDArray
 
 from ..control.subjects import Subjects
 from ..physics.measurement import Measurement
 from ..physics.simulation import Simulation
-from ..settings import BipedSettings
+from ..settings.settings import BipedSettings
 
 NEXT_FOOTFALL_PHASE = 0.75
 """Stride phase at which a swinging foot gets the ground of its next footfall; chosen: the foot is then in mid-swing, at

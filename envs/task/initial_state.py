@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.human import ANGLES
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import ANGLES
 
 from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable, leg_phases

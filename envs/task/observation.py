@@ -6,10 +6,10 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import GRAVITY, Body
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import GRAVITY, Body
 
-from ..physics.foot_contact import CONTACTS
+from ..physics.contact import CONTACTS
 from ..physics.kernel import kernel
 from ..physics.model import ACTIONS, ANKLE, JOINTS, LEFT, SIDES
 from .observation_entries import OBSERVATION, UNITS

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ..physics.foot_contact import CONTACTS
+from ..physics.contact import CONTACTS
 from ..physics.model import ACTIONS, JOINTS, SIDES
 
 UNITS = ("1", "rad", "leg length", "sqrt(g l)", "sqrt(g/l)", "body weight")

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import REFERENCE_MASS
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import REFERENCE_MASS
 
 from ..control.subjects import Subjects
-from ..settings import BipedSettings
+from ..settings.settings import BipedSettings
 
 
 class Pushes:

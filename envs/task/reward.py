@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
+from springfoot.arrays import NDArray
 
 from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable
@@ -18,13 +18,13 @@ from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
 from ..physics.kernel import part
 from ..physics.model import HIP, LEFT, RIGHT
-from ..settings import DEFAULT_WEIGHTS, BipedSettings
-from ..timing import ACTION_STEP
+from ..physics.timing import ACTION_STEP
+from ..settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from .episode_end import TOO_LOW, TOO_TILTED, divergence
 from .observation import HIGH, LOW, observe, units_of
 from .observation_entries import OBSERVATION
 from .reward_reference import body_scales, reference_curves
-from .rows import TASK_ROW
+from .state import TASK_ROW
 from .tracking import curves_at, error_of, track
 
 if TYPE_CHECKING:

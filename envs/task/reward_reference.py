@@ -5,10 +5,10 @@ from math import sqrt
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
-from springfoot.gait.body import GRAVITY, Body
-from springfoot.gait.com_plan import ComPlan
-from springfoot.gait.human import ANGLES, HumanGait
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import ANGLES, GRAVITY, Body
+from springfoot.gait.people.human import HumanGait
+from springfoot.gait.plan.com_plan import ComPlan
 
 from ..control.phase_table import GRID
 from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from springfoot.gait.arrays import NDArray
+from springfoot.arrays import NDArray
 
 from ..control.phase_table import read
 from ..physics.kernel import kernel, part

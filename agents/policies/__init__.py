@@ -1,0 +1,1 @@
+"""Policies: files, networks trained elsewhere, schedules and baselines."""

@@ -1,0 +1,203 @@
+"""Baselines: policies that need no learning, against which a learned one is judged.
+
+Each is, like a trained policy, a function of observations (N, D) that returns actions (N, 4) in [-1, 1]. They turn a
+stiffness in N m/rad into an action by the inverse of the environment's log scale, so they need
+`action_mode="absolute"`.
+"""
+
+from collections.abc import Callable, Sequence
+from math import inf, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
+from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_phases
+from springfoot.envs.control.reference_walk import ReferenceWalk, tabulated_speeds, walks_of_legs
+from springfoot.envs.physics.model import ACTIONS, SIDES
+from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.envs.task.observation_entries import OBSERVATION
+from springfoot.errors import SpringfootError
+from springfoot.gait.body.body import Body
+from springfoot.gait.body.tissue import TOE_STIFFNESS
+from springfoot.gait.springs.stiffness import PRINTED_SWING, THESIS_SWING, StiffnessSchedule, thesis_schedule
+
+PolicyFunction = Callable[[NDArray], NDArray]
+"""Observations (N, D) -> actions (N, 4) in [-1, 1]."""
+
+CONSTANT_STIFFNESS = (300.0, 40.0)
+"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg: round numbers that walk, not the best ones, which
+`springfoot study best-constant` finds."""
+
+_SIN, _COS, _SPEED = (
+    [entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos", "command_speed")
+)
+
+
+def leg_phase(observation: NDArray) -> NDArray:
+    """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike, read from observations (N, D)."""
+    left = np.arctan2(observation[:, _SIN], observation[:, _COS], dtype=float) / (2 * np.pi) % 1.0
+    return leg_phases(left)
+
+
+def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
+    """Hold one `stiffness` (ankle, toe) [N m/rad], given for 1.70 m and 63 kg and scaled with the body."""
+    body = body_of(settings)
+    require_absolute(settings)
+    scaled = np.asarray(stiffness, float) * body.stiffness_scale
+    action = np.tile(action_of(scaled, settings, body).astype(np.float32), 2)
+    return lambda observation: np.tile(action, (len(observation), 1))
+
+
+def untrained(settings: BipedSettings) -> PolicyFunction:
+    """What training starts from: mean action 0, mid-range on the log scale, or in residual mode the fixed schedule."""
+    return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
+
+
+def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
+    """Draw every action from the whole range; one generator, seeded with `seed`, serves all calls."""
+    generator = np.random.default_rng(seed)
+    return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
+
+
+def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
+    """A fixed stiffness over the stride, times `factor`: that of `settings.schedule`, or that of the leg tuning.
+
+    The tuned one goes with the speed that is commanded at each moment, and each leg has its own where a person has
+    adapted to a foot. Both scale with the body.
+    """
+    body, speeds = body_of(settings), tabulated_speeds(settings)
+    if settings.schedule is not None:
+        stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
+        return follow(factor * stiffness[None], speeds[:1], settings, body)
+    left, right = walks_of_legs(settings)
+    stiffness = np.stack([_scheduled(left), _scheduled(right)], 2) if right else _scheduled(left)
+    return follow(factor * stiffness, speeds, settings, body)
+
+
+def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
+    """(speeds, samples, (ankle, toe)) stiffness of the leg tuning [N m/rad]."""
+    return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.human.foot.plateaus) for walk in walks])
+
+
+def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
+    """People's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and `TOE_STIFFNESS`, as K."""
+    body = body_of(settings)
+    ankle = plateau_curve(REFERENCE_STIFFNESS)
+    stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
+    return follow(stiffness[None], tabulated_speeds(settings)[:1], settings, body)
+
+
+def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
+    """The policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
+
+    Where the legs have their own it is (speeds, samples, side, (ankle, toe)). Phase and Froude speed are read from the
+    observation; between two of `speeds` [m/s, of `body`] it is linear.
+    """
+    require_absolute(settings)
+    froude, own = np.array([body.froude_speed(speed) for speed in speeds]), np.arange(len(SIDES))
+    each = stiffness if stiffness.ndim == 4 else np.stack([stiffness] * len(SIDES), 2)
+    table = PhaseTable(each.reshape(*each.shape[:2], -1))
+
+    def policy(observation: NDArray) -> NDArray:
+        spot = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
+        place = np.zeros(len(spot), PLACE)
+        place["row"], place["weight"] = spot, spot % 1.0
+        curves = table.at(leg_phase(observation), place).reshape(-1, *2 * [len(SIDES)], each.shape[-1])
+        action = action_of(curves[:, own, own], settings, body)
+        return action.reshape(len(observation), -1).astype(np.float32)
+
+    return policy
+
+
+def require_absolute(settings: BipedSettings) -> None:
+    """Raise `SpringfootError` for settings in which an action is no stiffness of its own."""
+    if settings.action_mode != "absolute":
+        raise SpringfootError("a stiffness schedule or constant needs action_mode 'absolute', got 'residual'")
+
+
+BASELINES = ("untrained", "random", "constant", "schedule", "quasi_stiffness", "thesis", "thesis_printed")
+"""Names of the baselines. `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad], `schedule:FACTOR` the
+schedule times a factor."""
+FROZEN = "frozen"
+"""`frozen:POLICY` is the mean stiffness of a trained policy over the stride, played open loop
+(`springfoot.evaluation.recording.open_loop`)."""
+SCHEDULE_SUFFIXES = (".csv", ".json")
+"""How the names of schedule files end."""
+SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
+"""Swing springs of the thesis's lines: completed, and as printed."""
+
+
+def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
+    """A baseline by name, in the environment of `settings`; `seed` is that of `random`."""
+    kind, colon, numbers = name.partition(":")
+    if kind not in BASELINES:
+        raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
+    if colon and kind not in ("constant", "schedule"):
+        raise SpringfootError(f"only constant and schedule take numbers, as in constant:300,40, got {name!r}")
+    match kind:
+        case "constant":
+            return constant(settings, _stiffness_from(numbers) if colon else CONSTANT_STIFFNESS)
+        case "random":
+            return uniform(settings, seed)
+        case "untrained":
+            return untrained(settings)
+        case "quasi_stiffness":
+            return quasi_stiffness(settings)
+        case _:
+            return schedule(settings, _factor_from(numbers) if colon else 1.0)
+
+
+def has_feedback(name: str) -> bool:
+    """Whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop copy, nor a
+    schedule in a file."""
+    return name.partition(":")[0] not in (*BASELINES, FROZEN) and not is_schedule_file(name)
+
+
+def is_schedule_file(name: str) -> bool:
+    """Whether a policy of that name is a schedule in a file (`springfoot.agents.policies.schedules`)."""
+    return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
+
+
+def and_copy(name: str) -> tuple[str, ...]:
+    """What a table that judges a policy walks: the policy and, unless it has no feedback, its open-loop copy."""
+    return (name, f"{FROZEN}:{name}") if has_feedback(name) else (name,)
+
+
+def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
+    """The environment settings that a baseline needs, for the body and speed of `settings`.
+
+    What is stiffness in N m/rad acts absolutely; `untrained` and `random` act as `settings` say. The thesis's lines
+    bring the springs between gait events, their rest angles included.
+    """
+    if name in ("untrained", "random"):
+        return {}
+    absolute = {"action_mode": "absolute"}
+    if name not in SWINGS:
+        return absolute
+    lines = thesis_schedule(body_of(settings), settings.speed, SWINGS[name])
+    return absolute | {"equilibrium": "phase", "schedule": lines.to_json()}
+
+
+def _factor_from(text: str) -> float:
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = nan
+    if not 0 < factor < inf:
+        raise SpringfootError(f"schedule takes a positive factor, as in schedule:1.2, got {text!r}")
+    return factor
+
+
+def _stiffness_from(text: str) -> tuple[float, float]:
+    try:
+        ankle, toe = map(float, text.split(","))
+    except ValueError:
+        ankle = toe = nan
+    if not (0 < ankle < inf and 0 < toe < inf):
+        raise SpringfootError(f"constant takes two positive stiffnesses, as in constant:300,40, got {text!r}")
+    return ankle, toe

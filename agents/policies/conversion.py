@@ -1,0 +1,216 @@
+"""Policies from networks that were trained elsewhere: any MLP's weights, and stable-baselines3's models.
+
+They become `Policy`, which `save_policy` writes as a .safetensors file. Models are given as objects: their own files
+are pickles, which run code when read, and are never opened here. Nothing in this module imports torch.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, get_args
+
+import numpy as np
+from gymnasium import ObservationWrapper
+
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.errors import SpringfootError, require_number
+
+from .fingerprint import fingerprint
+from .numpy_player import ACTIVATIONS
+from .policy import VARIANCE_FLOOR, Output, Policy
+
+TORCH_NAMES = {"tanh": "Tanh", "relu": "ReLU", "leaky_relu": "LeakyReLU", "elu": "ELU", "silu": "SiLU"}
+"""Class of `torch.nn` that each of `ACTIVATIONS` is, with its default arguments."""
+
+NEVER_VARIED = 1e-6
+"""Variance below which an observation told the policy nothing in training [unit squared]; one that varies has more than
+1e-5."""
+IGNORED = 1e12
+"""Variance that such an observation gets in the policy, so that no value of it reaches the network."""
+
+Layers = Sequence[tuple[Any, Any]]
+"""Weight (outputs, inputs) and bias (outputs,) or None of each layer, from the observation to the action: arrays, or
+torch's parameters."""
+
+
+def policy_from_mlp(
+    layers: Layers,
+    settings: BipedSettings | Mapping[str, Any],
+    *,
+    activation: str,
+    output: Output = "clip",
+    observation_mean: Any = None,
+    observation_variance: Any = None,
+    observation_clip: float | None = None,
+    variance_floor: float = VARIANCE_FLOOR,
+) -> Policy:
+    """A policy from the weights of a multilayer perceptron that gives the mean action.
+
+    Args:
+        layers: weight (outputs, inputs) and bias (outputs,) of each layer, torch's way round; a bias may be None.
+        settings: what the environment was made with, as its `settings` or as its keyword arguments.
+        activation: what stands between the layers: tanh, relu, leaky_relu (slope 0.01), elu (alpha 1) or silu.
+        output: what makes an action in [-1, 1] of the last layer's output: clip (as PPO) or tanh (as SAC).
+        observation_mean: (D,) what was subtracted from observations in training; None if they were not normalised.
+        observation_variance: (D,) whose root observations were divided by.
+        observation_clip: largest magnitude of a normalised observation; None for no limit.
+        variance_floor: added to the variance before the root.
+
+    Raises `SpringfootError`, one line, for widths that do not lead from observation to action, an unknown activation
+    and numbers that are not finite.
+    """
+    settings = settings if isinstance(settings, BipedSettings) else settings_from(**settings)
+    biped = Biped(settings, 1)
+    if activation not in ACTIVATIONS:
+        raise SpringfootError(f"activation must be one of {', '.join(ACTIVATIONS)}, got {activation!r}")
+    if output not in get_args(Output):
+        raise SpringfootError(f"output must be one of {', '.join(get_args(Output))}, got {output!r}")
+    if (observation_mean is None) != (observation_variance is None):
+        raise SpringfootError("give observation_mean and observation_variance together, or neither")
+    if observation_clip is not None:
+        require_number("observation_clip", observation_clip, 0, above=True)
+    width = len(biped.observation_names)
+    if observation_mean is None:
+        observation_mean, observation_variance, variance_floor = np.zeros(width), np.ones(width), 0.0
+    require_number("variance_floor", variance_floor, 0)
+    weights, biases = _checked_layers(layers, width, len(biped.action_names))
+    mean, variance = _array("observation_mean", observation_mean), _array("observation_variance", observation_variance)
+    for name, value in (("observation_mean", mean), ("observation_variance", variance)):
+        if value.shape != (width,):
+            raise SpringfootError(f"{name} must be ({width},), is {value.shape}")
+    if (variance < 0).any() or (variance + variance_floor <= 0).any():
+        raise SpringfootError("observation_variance with variance_floor must be positive")
+    return Policy(
+        settings=settings,
+        fingerprint=fingerprint(biped),
+        weights=weights,
+        biases=biases,
+        observation_mean=mean,
+        observation_variance=variance,
+        observation_clip=None if observation_clip is None else float(observation_clip),
+        variance_floor=float(variance_floor),
+        activation=activation,
+        output=output,
+    )
+
+
+def policy_from_sb3(
+    model: Any,
+    settings: Any = None,
+    normalizer: Any = None,
+    *,
+    ignore_unvaried: bool = False,
+) -> Policy:
+    """The mean action of a stable-baselines3 model with an MLP policy: of PPO, A2C, TRPO, SAC, TQC, TD3 or DDPG.
+
+    Args:
+        model: the model; its environment, where it has one, knows `settings` and `normalizer`.
+        settings: what the environment was made with, if the model has no environment of springfoot's.
+        normalizer: the `VecNormalize` of the training, if the model's environment is not inside it.
+        ignore_unvaried: whether entries that never varied in training (body, commanded speed) get no part in the
+            action, as in train.py; their weights are still random, and other bodies and speeds would meet them.
+
+    For every observation it acts as `model.predict(normalizer.normalize_obs(observation), deterministic=True)` does, to
+    the precision of float32; with `ignore_unvaried`, for those that training could meet. Raises `SpringfootError`, one
+    line, for a network that is no MLP of one activation, behind a Gymnasium wrapper of observations, and where settings
+    are missing.
+    """
+    if settings is None:
+        try:
+            settings = model.get_env().get_attr("settings")[0]
+        except AttributeError:
+            raise SpringfootError(
+                "the model has no environment of springfoot's: give settings, and the VecNormalize if it had one"
+            ) from None
+    normalizer = model.get_vec_normalize_env() if normalizer is None else normalizer
+    low, high = model.action_space.low, model.action_space.high
+    if not ((low == -1).all() and (high == 1).all()):
+        raise SpringfootError("the model acts on another range than [-1, 1]: a wrapper rescales the actions")
+    layers, activation, output = actor_of(model.policy)
+    policy = policy_from_mlp(layers, settings, activation=activation, output=output, **statistics_of(normalizer))
+    if model.get_env() is not None and any(model.get_env().env_is_wrapped(ObservationWrapper)):
+        raise SpringfootError(
+            "a wrapper changes the observations before the model sees them: train with VecNormalize instead, "
+            "or give its statistics to policy_from_mlp"
+        )
+    return ignoring_unvaried(policy) if ignore_unvaried else policy
+
+
+def ignoring_unvaried(policy: Policy) -> Policy:
+    """The policy without the entries of the observation that never varied in training."""
+    variance = np.where(policy.observation_variance < NEVER_VARIED, IGNORED, policy.observation_variance)
+    return replace(policy, observation_variance=variance)
+
+
+def actor_of(network: Any) -> tuple[Layers, str, Output]:
+    """Layers, activation and output of the actor in a stable-baselines3 policy; `SpringfootError` for no plain MLP."""
+    if hasattr(network, "lstm_actor"):
+        raise SpringfootError("a recurrent policy has a memory; a policy of springfoot sees one observation only")
+    actor = getattr(network, "actor", network)
+    if type(actor.features_extractor).__name__ != "FlattenExtractor":
+        kind = type(actor.features_extractor).__name__
+        raise SpringfootError(f"its features are extracted by {kind}; only a plain MLP can be a policy file")
+    output: Output = "tanh" if network.squash_output else "clip"
+    if hasattr(network, "action_net"):  # PPO, A2C, TRPO
+        parts = [network.mlp_extractor.policy_net, network.action_net]
+    else:  # SAC and TQC; TD3 and DDPG
+        parts = [actor.latent_pi, actor.mu] if hasattr(actor, "latent_pi") else [actor.mu]
+    leaves = [leaf for part in parts for leaf in part.modules() if not list(leaf.children())]
+    kinds = [type(leaf).__name__ for leaf in leaves]
+    if not hasattr(actor, "latent_pi") and output == "tanh" and kinds[-1:] == ["Tanh"]:
+        leaves, kinds = leaves[:-1], kinds[:-1]  # the output, a module of its own there
+    names = {kind: name for name, kind in TORCH_NAMES.items()}
+    linear, between = kinds[::2], set(kinds[1::2]) or {"Tanh"}
+    if len(kinds) % 2 == 0 or set(linear) != {"Linear"} or len(between) > 1 or not between <= set(names):
+        raise SpringfootError(
+            f"its actor is {', '.join(kinds)}: no layers with one activation between them, of {', '.join(ACTIVATIONS)}"
+        )
+    for leaf in leaves[1::2]:
+        if (getattr(leaf, "negative_slope", 0.01), getattr(leaf, "alpha", 1.0)) != (0.01, 1.0):
+            raise SpringfootError(f"its activation {leaf} is not of the default slope")
+    return [(layer.weight, layer.bias) for layer in leaves[::2]], names[between.pop()], output
+
+
+def statistics_of(normalizer: Any) -> dict[str, Any]:
+    """How a `VecNormalize` normalises observations, as keyword arguments of `policy_from_mlp`; {} if it does not."""
+    if normalizer is None or not normalizer.norm_obs:
+        return {}
+    return {
+        "observation_mean": normalizer.obs_rms.mean,
+        "observation_variance": normalizer.obs_rms.var,
+        "observation_clip": normalizer.clip_obs,
+        "variance_floor": normalizer.epsilon,
+    }
+
+
+def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDArray, ...], tuple[NDArray, ...]]:
+    """Weights and biases as arrays; raises `SpringfootError` where they do not lead from observation to action."""
+    weights, biases, inputs = [], [], width
+    for index, (weight, bias) in enumerate(layers):
+        name = f"layer {index}"
+        w = _array(f"{name}: weight", weight)
+        if w.ndim != 2 or w.shape[1] != inputs:
+            what = "the observation's entries" if index == 0 else "the outputs of the layer before"
+            raise SpringfootError(f"{name}: weight must be (outputs, {inputs}), {what}, is {w.shape}")
+        b = np.zeros(len(w), w.dtype) if bias is None else _array(f"{name}: bias", bias)
+        if b.shape != (len(w),):
+            raise SpringfootError(f"{name}: bias must be ({len(w)},), is {b.shape}")
+        weights.append(w)
+        biases.append(b)
+        inputs = len(w)
+    if not weights or inputs != actions:
+        raise SpringfootError(f"the last layer must have {actions} outputs, one for each action, has {inputs}")
+    return tuple(weights), tuple(biases)
+
+
+def _array(name: str, value: Any) -> NDArray:
+    """A copy of an array or of a torch tensor, float32 or float64; `SpringfootError` if it is not finite."""
+    try:
+        array = np.array(value.detach().cpu().numpy() if hasattr(value, "detach") else value)
+        array = array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
+    except (TypeError, ValueError):
+        raise SpringfootError(f"{name} must be an array of numbers, got {type(value).__name__}") from None
+    if not np.isfinite(array).all():
+        raise SpringfootError(f"{name} must be finite, has NaN or infinity")
+    return array

@@ -1,0 +1,65 @@
+"""What a policy relies on, as digests: a policy of another environment is refused, not walked."""
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.control.equilibrium import foot_curves, foot_feed
+from springfoot.envs.control.foot_springs import stiffness_of
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.legs import PLANNED_PLACE, leg_curves
+from springfoot.envs.control.reference_walk import rows
+from springfoot.errors import SpringfootError
+
+_MODEL_NUMBERS = (
+    *("body_mass", "body_inertia", "body_pos", "body_ipos", "jnt_range", "jnt_actfrcrange", "dof_damping"),
+    *("dof_armature", "geom_size", "geom_pos", "pair_friction", "pair_solref", "pair_solreffriction", "pair_solimp"),
+    "actuator_gainprm",
+)
+
+
+def fingerprint(biped: Biped) -> dict[str, str]:
+    """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
+
+    The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed; the
+    planned place of the CoM counts where a gain reads it.
+    Numbers count to six significant digits, so that compilers and processors agree.
+    """
+    model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
+    numbers: list[Any] = []
+    for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
+        read = slice(None) if legs.swing_place_gain else slice(PLANNED_PLACE)
+        curves = (leg_curves(legs, walk)[:, read], *foot_curves(biped.settings, legs, walk))
+        numbers += [*_used(legs).values(), *(curve[::50] for curve in curves)]
+        if (feed := foot_feed(biped.settings, legs, walk)) is not None:
+            numbers.append(feed[::50])
+    return {
+        "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
+        "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),
+        "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
+        "legs": _digest(_used(biped.constants[0]), *numbers),
+    }
+
+
+def _used(legs: LegConstants) -> dict[str, Any]:
+    """The constants; a `swing_place_gain` of 0 is none, so that policies from before there was one walk on."""
+    return {name: value for name, value in asdict(legs).items() if value or name != "swing_place_gain"}
+
+
+def require_same(name: object, stored: Mapping[str, str], current: Mapping[str, str]) -> None:
+    """Raise `SpringfootError` where the policy `name` has another fingerprint than this version's environment."""
+    if different := [part for part in current if current[part] != stored.get(part)]:
+        raise SpringfootError(
+            f"{name} was trained on another version of this environment: other {' and '.join(different)}; "
+            "train it again, or use the version of springfoot it came from"
+        )
+
+
+def _digest(names: Iterable[str], *numbers: Any) -> str:
+    values = np.concatenate([np.ravel(item).astype(np.float64) for item in numbers])
+    values[np.abs(values) < 1e-9] = 0.0  # rounding noise has no significant digits
+    return hashlib.sha256(" ".join([*names, *(f"{value:.6g}" for value in values)]).encode()).hexdigest()

@@ -1,0 +1,189 @@
+"""Policies from elsewhere: an ONNX file, or a function of a module that the user names. Both take raw observations.
+
+An ONNX file is data, as a .safetensors file is: reading it executes nothing but what onnxruntime computes.
+`module:function` is the user's own code, and runs because the user typed its name; no file or folder can ask for it.
+"""
+
+import json
+import os
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.envs.task.observation_entries import OBSERVATION
+from springfoot.errors import SpringfootError
+
+from .fingerprint import fingerprint, require_same
+from .onnx_process import INPUT_TYPES, one_line, onnx_session
+
+CONTRACT_KEY = "springfoot"
+"""Key of an ONNX file's metadata under which an exported policy carries its contract."""
+
+
+def contract_path(path: Path) -> Path:
+    """The contract that stands beside a file: walk.onnx.json beside walk.onnx."""
+    return path.with_name(f"{path.name}.json")
+
+
+def observation_rows(observation: Any, width: int) -> NDArray:
+    """Observations (N, D) or (D,) as float64; `SpringfootError` for another width and for what is not finite."""
+    rows = np.asarray(observation, dtype=np.float64)
+    if rows.ndim not in (1, 2) or rows.shape[-1] != width:
+        raise SpringfootError(f"observations must be (N, {width}), got {rows.shape}")
+    if not np.isfinite(rows).all():
+        raise SpringfootError("observations must be finite, got NaN or infinity")
+    return rows
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForeignPolicy:
+    """A policy that is not ours, with the same face as `Policy`: observations (N, D) or (D,) to actions in [-1, 1].
+
+    Raises `SpringfootError` for bad observations, and where it returns other than finite actions (N, 4). Its last bits
+    may differ with N.
+    """
+
+    name: str
+    """What errors call it."""
+    settings: BipedSettings
+    """The task it was made for: of its contract, of the function's own `settings`, or the defaults."""
+    width: int
+    """Entries D of an observation."""
+    act: Callable[[NDArray], Any]
+    """From float32 observations (N, D) to actions (N, 4); what leaves [-1, 1] is clipped."""
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions (N, 4) in [-1, 1] for observations (N, D)."""
+        rows = observation_rows(observation, self.width).astype(np.float32)
+        batch = np.atleast_2d(rows)
+        returned = self.act(batch)
+        try:
+            actions = np.asarray(returned, np.float64)
+        except (TypeError, ValueError):
+            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned no numbers") from None
+        if actions.shape != (len(batch), len(ACTIONS)):
+            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned {actions.shape}")
+        if not np.isfinite(actions).all():
+            raise SpringfootError(f"{self.name} returned an action that is not finite")
+        return actions.reshape(*rows.shape[:-1], -1).clip(-1.0, 1.0).astype(np.float32)
+
+
+def onnx_policy(path: Path) -> ForeignPolicy:
+    """The policy in an ONNX file, run by onnxruntime: one input, the raw observation; `action` or the first output.
+
+    The input is (N, D), (1, D) or (D,), of float32 or float64. Its settings are those of the contract beside it, else
+    of the contract inside it (exported policies carry theirs), else the defaults. Raises `SpringfootError`, one line,
+    without onnxruntime, for a file it does not run within the bounds of `onnx_process`, for other widths, and for a
+    contract that is wrong or of another version of the environment.
+    """
+    try:
+        import onnxruntime  # noqa: F401  # not above: an extra
+    except ModuleNotFoundError as error:
+        raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
+    session, fails = onnx_session(path, len(OBSERVATION))
+    inputs, outputs = session.get_inputs(), [output.name for output in session.get_outputs()]
+    if len(inputs) != 1:
+        names = ", ".join(each.name for each in inputs) or "none"
+        raise SpringfootError(f"{path} has the inputs {names}; a policy has one, the observation")
+    (given,) = inputs
+    if given.type not in INPUT_TYPES:
+        raise SpringfootError(f"{path}: its input must be of float32 or float64, is {given.type}")
+    biped = _asked_by(path, session.get_modelmeta().custom_metadata_map.get(CONTRACT_KEY))
+    width = len(biped.observation_names)
+    if len(given.shape) not in (1, 2) or (isinstance(given.shape[-1], int) and given.shape[-1] != width):
+        raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, given.shape))})")
+    if fails:
+        raise SpringfootError(f"{path} fails on observations (2, {width}): {fails}")
+    output, dtype = "action" if "action" in outputs else outputs[0], INPUT_TYPES[given.type]
+
+    def act(observation: NDArray) -> Any:
+        return session.run([output], {given.name: np.ascontiguousarray(observation, dtype)})[0]
+
+    return _probed(str(path), act, biped)
+
+
+def is_function(name: str) -> bool:
+    """Whether a policy's name is of the form `module:function`, and no file's."""
+    return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name) is not None and not Path(name).exists()
+
+
+def function_policy(name: str) -> ForeignPolicy:
+    """The function that `module:function` names, of observations (N, D), (1, D) or (D,); imports the module.
+
+    The module is one that Python finds, else one in the current folder. An attribute `settings` of the function, a
+    mapping or `BipedSettings`, says what it was made for. Raises `SpringfootError`, one line, where module or function
+    are missing, and where it returns other than four finite actions for the first observations of two episodes.
+    """
+    module_name, _, function_name = name.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        module = import_module(module_name)
+    except Exception as error:  # whatever the user's module raises
+        raise SpringfootError(f"{name}: cannot import {module_name}: {one_line(error)}") from error
+    function = getattr(module, function_name, None)
+    if not callable(function):
+        place = getattr(module, "__file__", None) or "it"
+        raise SpringfootError(f"{name}: module {module_name} has no function {function_name} ({place})")
+    settings = getattr(function, "settings", None)
+    if not isinstance(settings, BipedSettings):
+        try:
+            settings = settings_from(**(settings or {}))
+        except (SpringfootError, TypeError) as error:
+            raise SpringfootError(f"{name}: its settings: {error}") from None
+    return _probed(name, function, Biped(settings, 1))
+
+
+def _asked_by(path: Path, inside: str | None) -> Biped:
+    """The environment that the contract beside the file asks for, else the one inside it; the default one without."""
+    beside = contract_path(path)
+    if inside is None and not beside.is_file():
+        return Biped(BipedSettings(), 1)
+    name = beside if beside.is_file() else f"{path}: the contract inside it"
+    try:
+        contract = json.loads(beside.read_text(encoding="utf-8") if beside.is_file() else inside or "")
+        biped = Biped(settings_from(**contract["settings"]), 1)
+        stored = None if contract.get("fingerprint") is None else dict(contract["fingerprint"])
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        what = f"has no {error}" if isinstance(error, KeyError) else f"is not a contract: {one_line(error)}"
+        raise SpringfootError(f"{name} {what}") from None
+    if stored is not None:
+        require_same(path, stored, fingerprint(biped))
+    return biped
+
+
+def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
+    """The policy that `act` is; which of (N, D), (1, D) and (D,) it takes is tried on two first observations."""
+
+    def first(seed: int) -> NDArray:
+        biped.reset(np.array([0]), [seed])
+        return biped.observe()[0]
+
+    probe, count = np.stack([first(0), first(1)]), len(biped.action_names)
+    width, wrong, failed = probe.shape[1], "", ""
+    for take, given, wanted in (
+        (act, probe, (2, count)),
+        (lambda rows: np.concatenate([act(row[None]) for row in rows]), probe[:1], (1, count)),
+        (lambda rows: np.stack([act(row) for row in rows]), probe[0], (count,)),
+    ):
+        try:
+            found = np.shape(act(given))
+        except Exception as error:  # whatever the user's function raises
+            failed = failed or f"{name} fails on observations {given.shape}: {one_line(error)}"
+            continue
+        if found == wanted:
+            policy = ForeignPolicy(name=name, settings=biped.settings, width=width, act=take)
+            policy(probe)  # raises for what is not finite
+            return policy
+        wrong = wrong or f"{name} must return actions {wanted} for observations {given.shape}, returned {found}"
+    raise SpringfootError(wrong or failed)

@@ -1,0 +1,47 @@
+"""How large the numbers of a network, of Adam's moments and of running statistics may be in a file that is read."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from springfoot.errors import SpringfootError
+
+LARGEST_WEIGHT = 1e6
+"""Largest magnitude of a weight or bias [-]; chosen, a hundred thousand times a usual one."""
+LARGEST_MOMENT = 1e12
+"""Largest magnitude of Adam's moments [-]; chosen. Gradients are clipped to 0.5 before."""
+LARGEST_STATISTIC = 1e30
+"""Largest magnitude of a mean, variance or count; chosen: its root and its square are numbers, too."""
+_MOMENTS = frozenset({"step", "exp_avg", "exp_avg_sq"})
+
+
+def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
+    """Raise `SpringfootError` for a tensor that no training makes, by its name; others are not looked at."""
+    for name, values in tensors.items():
+        bounds = _bounds(name)
+        if bounds is not None and values.size:
+            low, high = bounds
+            least, most = float(values.min()), float(values.max())
+            if not low <= least <= most <= high:
+                wrong = least if not least >= low else most
+                raise SpringfootError(f"{path}: {name} must be in [{low:g}, {high:g}], has {wrong:.4g}")
+
+
+def _bounds(name: str) -> tuple[float, float] | None:
+    kind, _, item = name.partition(".")
+    item = item.rpartition(".")[2]
+    if kind in ("network", "layer"):
+        return -LARGEST_WEIGHT, LARGEST_WEIGHT
+    if kind == "adam":
+        return (-LARGEST_MOMENT if item == "exp_avg" else 0.0), LARGEST_MOMENT
+    if kind in ("observation", "return"):
+        return (-LARGEST_STATISTIC if item == "mean" else 0.0), LARGEST_STATISTIC
+    return None
+
+
+def require_moments(path: object, names: Mapping[str, object], parameters: int) -> None:
+    """Raise `SpringfootError` unless Adam's moments are there for each of so many parameters, or for none at all."""
+    found = {name for name in names if name.startswith("adam.")}
+    wanted = {f"adam.{index}.{item}" for index in range(parameters) for item in _MOMENTS}
+    if found and (missing := sorted(wanted - found)):
+        raise SpringfootError(f"{path} has no {missing[0]}")

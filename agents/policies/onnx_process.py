@@ -1,0 +1,84 @@
+"""ONNX files: onnxruntime runs them here once it did so in a process of its own, within bounds on memory and time."""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.errors import SpringfootError
+from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, in_process
+
+MOST_ONNX_BYTES = 2**26
+"""Largest ONNX file that is read; chosen, ten times the largest network that is trained here."""
+INPUT_TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
+"""What an input may be of."""
+
+_CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
+
+
+def onnx_session(path: Path, width: int) -> tuple[Any, str]:
+    """The session that runs a file, and why it runs for no observations of `width` entries, nothing if it does.
+
+    Raises `SpringfootError` for a file that onnxruntime does not take, or not within the bounds.
+    """
+    if (size := path.stat().st_size) > MOST_ONNX_BYTES:
+        raise SpringfootError(f"{path} must have at most {MOST_ONNX_BYTES:,} bytes, has {size:,}")
+    said = in_process(_CHILD, str(path.absolute()), str(width))
+    if said is None:
+        raise SpringfootError(
+            f"{path} is damaged: onnxruntime crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"
+        )
+    found = json.loads(said)
+    if found["refused"]:
+        raise SpringfootError(f"{path} is not an ONNX file that onnxruntime runs: {found['refused']}")
+    return _session(path), found["fails"]
+
+
+def _session(path: Path) -> Any:
+    import onnxruntime  # not above: an extra
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1  # more would compete with the physics'
+    options.log_severity_level = 4  # errors are raised, and told
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+def main() -> None:
+    """The child: open the file that the command line names, run it once, say on standard output what failed."""
+    import onnxruntime  # noqa: F401  # before the bounds
+
+    out = os.dup(1)
+    os.dup2(2, 1)  # what a library prints is not ours
+    bound_resources()
+    found = {"refused": "", "fails": ""}
+    try:
+        session = _session(Path(sys.argv[1]))
+    except Exception as error:  # its classes have no common one
+        found["refused"] = one_line(error)
+    else:
+        found["fails"] = _fails(session, int(sys.argv[2]))
+    os.write(out, json.dumps(found).encode())
+
+
+def _fails(session: Any, width: int) -> str:
+    """Why it takes neither two observations nor one, nothing if it does."""
+    inputs, failed = session.get_inputs(), ""
+    if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:
+        return failed  # the parent says so
+    for shape in ((2, width), (1, width), (width,)):
+        try:
+            session.run(None, {inputs[0].name: np.zeros(shape, INPUT_TYPES[inputs[0].type])})
+        except Exception as error:
+            failed = failed or one_line(error)
+        else:
+            return ""
+    return failed
+
+
+def one_line(error: Exception) -> str:
+    """An error as a part of a message."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, SpringfootError) else f"{type(error).__name__}: {text[:300]}"

@@ -1,0 +1,221 @@
+"""A policy as one .safetensors file: weights, observation statistics, settings, a fingerprint; no code.
+
+The file's header has one entry, `springfoot`, whose JSON says what the tensors mean and holds a digest
+(`tensor_file`); nothing in it tells where or when it was made. `Policy` needs NumPy only, so a policy runs where no
+learner is installed.
+"""
+
+from dataclasses import dataclass
+from importlib import resources
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.errors import SpringfootError, quoted
+from springfoot.files.tensor_file import read_tensors, write_tensors
+
+from .fingerprint import fingerprint, require_same
+from .foreign import ForeignPolicy, function_policy, is_function, observation_rows, onnx_policy
+from .number_bounds import LARGEST_WEIGHT, require_bounded
+from .numpy_player import ACTIVATIONS
+
+FORMAT_VERSION = 1
+"""Version of the file layout; a reader refuses any other."""
+ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
+"""What the header of a policy says."""
+
+
+VARIANCE_FLOOR = 1e-8
+"""Added to each observation's variance before the root, as in stable-baselines3's VecNormalize."""
+
+
+Output = Literal["clip", "tanh"]
+"""What makes an action in [-1, 1] of the last layer's output, as PPO does (clip) or SAC (tanh)."""
+
+
+BEST, LAST = "best.safetensors", "last.safetensors"
+"""Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
+SHIPPED = {"pretrained": "walk.safetensors", "predicted": "predicted.safetensors"}
+"""Name of a policy of this package -> its file in `pretrained/`: of preset `walk` (mixed), and of preset `predict`."""
+RUN = "run.json"
+"""Name of a run folder's record: configuration, evaluations, status."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Policy:
+    """A deterministic policy: normalised observation -> layers -> mean action in [-1, 1].
+
+    Calling it maps observations (N, D), or one (D,), to actions (N, 4) or (4,), float32. The result of a row
+    does not depend on the other rows. Raises `SpringfootError` for another width or for an observation that
+    is not finite.
+    """
+
+    settings: BipedSettings
+    """The task the policy was trained on."""
+    fingerprint: dict[str, str]
+    """What it was trained on, as `fingerprint` gives it."""
+    weights: tuple[np.ndarray, ...]
+    """Of each layer, shape (outputs, inputs)."""
+    biases: tuple[np.ndarray, ...]
+    """Of each layer, shape (outputs,)."""
+    observation_mean: np.ndarray
+    """Of the observations in training, shape (D,)."""
+    observation_variance: np.ndarray
+    """Of the observations in training, shape (D,)."""
+    observation_clip: float | None = 10.0
+    """Largest magnitude of a normalised observation; None for no limit."""
+    variance_floor: float = VARIANCE_FLOOR
+    """Added to each variance before the root."""
+    activation: str = "tanh"
+    """Name of what stands between the layers, one of `ACTIVATIONS`."""
+    output: Output = "clip"
+    """What makes actions of the last layer's output."""
+
+    @property
+    def layer_sizes(self) -> list[int]:
+        """Observation, hidden layers, actions."""
+        return [self.weights[0].shape[1], *(len(bias) for bias in self.biases)]
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What the file's header says, as plain JSON values."""
+        return {
+            "format_version": FORMAT_VERSION,
+            "network": {
+                "layer_sizes": self.layer_sizes,
+                "activation": self.activation,
+                "output": self.output,
+                "observation_clip": self.observation_clip,
+                "variance_floor": self.variance_floor,
+            },
+            "settings": settings_to_json(self.settings),
+            "fingerprint": self.fingerprint,
+        }
+
+    @property
+    def observation_deviation(self) -> np.ndarray:
+        """(D,) what the distance of an observation from its mean is divided by."""
+        return np.sqrt(self.observation_variance + self.variance_floor)
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Mean actions (N, 4) in [-1, 1] for observations (N, D)."""
+        rows = observation_rows(observation, len(self.observation_mean))
+        rows = (rows - self.observation_mean) / self.observation_deviation
+        if self.observation_clip is not None:
+            rows = rows.clip(-self.observation_clip, self.observation_clip)
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            rows = ACTIVATIONS[self.activation](rows) if layer else rows
+            # einsum adds in the same order for any N; BLAS does not, and a batch must equal its rows alone.
+            rows = np.einsum("...i,oi->...o", rows, weight.astype(np.float64), optimize=False) + bias
+        if not np.isfinite(rows).all():  # as the widest and deepest of unbounded layers can make it
+            raise SpringfootError("the policy's output is not finite")
+        return (np.tanh(rows) if self.output == "tanh" else rows.clip(-1.0, 1.0)).astype(np.float32)
+
+
+def save_policy(path: str | Path, policy: Policy) -> None:
+    """Write a policy as one .safetensors file, whole or not at all; equal policies give equal bytes."""
+    tensors = {
+        "observation.mean": policy.observation_mean,
+        "observation.variance": policy.observation_variance,
+    }
+    for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
+        tensors |= {f"layer.{layer}.weight": weight, f"layer.{layer}.bias": bias}
+    write_tensors(Path(path), "springfoot", policy.header, tensors)
+
+
+def find_policy(name: str | Path) -> Path:
+    """The file that a path, a run folder (its best) or one of `SHIPPED` means; `SpringfootError` if there is none."""
+    path = Path(name)
+    if str(name) in SHIPPED:
+        path = Path(str(resources.files("springfoot.agents") / "pretrained" / SHIPPED[str(name)]))
+        if not path.is_file():
+            raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: train.py")
+    elif path.is_dir():
+        if not (path / BEST).is_file():
+            raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of train.py")
+        path /= BEST
+    elif not path.is_file():
+        raise SpringfootError(
+            f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'"
+        )
+    return path
+
+
+_NUMBERS = ("observation_clip", "variance_floor")
+
+
+def load_policy(name: str | Path) -> Policy | ForeignPolicy:
+    """The policy in a file, a run folder (its best), one of `SHIPPED`, or the function that `module:function` names.
+
+    A .safetensors file is read by `read_policy`, an .onnx file by `onnx_policy`; neither executes anything. Only a
+    `name` that is a text of the form `module:function` runs code: `function_policy` imports that module.
+    """
+    if isinstance(name, str) and is_function(name):
+        return function_policy(name)
+    path = find_policy(name)
+    return onnx_policy(path) if path.suffix == ".onnx" else read_policy(name)
+
+
+def read_policy(name: str | Path) -> Policy:
+    """The policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, checked against this springfoot.
+
+    Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of
+    another format version, incomplete or not finite, or made for other spaces, another model or other legs than
+    this version has.
+    """
+    path = find_policy(name)
+    header, tensors = read_tensors(path, "springfoot", "policy", ENTRIES)
+    if header.get("format_version") != FORMAT_VERSION:
+        raise SpringfootError(
+            f"{name} has policy format {header.get('format_version')!r}, this version reads {FORMAT_VERSION}"
+        )
+    try:
+        network, values = header["network"], header["settings"]
+        clip, floor = (None if network[key] is None else float(network[key]) for key in _NUMBERS)
+        activation, output, sizes = network["activation"], network.get("output", "clip"), list(network["layer_sizes"])
+        stored = dict(header["fingerprint"])
+        settings = settings_from(**values)
+        biped = Biped(settings, 1)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        what = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
+        raise SpringfootError(f"{name}: its header {what}") from None
+    known = activation in ACTIVATIONS and output in get_args(Output)
+    if not known or floor is None or not 0 <= floor <= LARGEST_WEIGHT:
+        raise SpringfootError(f"{name}: its header asks for a network this version does not have: {quoted(network)}")
+    if clip is not None and not 0 < clip <= LARGEST_WEIGHT:
+        raise SpringfootError(f"{name}: observation_clip must be in (0, {LARGEST_WEIGHT:g}] or null, is {clip:g}")
+    if len(sizes) < 2 or (sizes[0], sizes[-1]) != (len(biped.observation_names), len(biped.action_names)):
+        raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to action")
+    _check_tensors(name, tensors, sizes)
+    current = fingerprint(biped)
+    require_same(name, stored, current)
+    layers = range(len(sizes) - 1)
+    return Policy(
+        settings=settings,
+        fingerprint=current,
+        weights=tuple(tensors[f"layer.{layer}.weight"] for layer in layers),
+        biases=tuple(tensors[f"layer.{layer}.bias"] for layer in layers),
+        observation_mean=tensors["observation.mean"],
+        observation_variance=tensors["observation.variance"],
+        observation_clip=clip,
+        variance_floor=floor,
+        activation=activation,
+        output=output,
+    )
+
+
+def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list[int]) -> None:
+    """Raise `SpringfootError` for tensors that are not those of the layer sizes."""
+    expected = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
+    for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
+        expected |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}
+    for tensor_name in sorted(set(expected) | set(tensors)):
+        wanted = expected.get(tensor_name, "absent")
+        found = tensors[tensor_name].shape if tensor_name in tensors else "absent"
+        if found != wanted:
+            raise SpringfootError(f"{name}: {tensor_name} must be {wanted}, is {found}")
+    require_bounded(name, tensors)

@@ -1,0 +1,167 @@
+"""Schedules in files as policies: K over the stride (CSV), or the springs of a few finite states (JSON).
+
+An evaluation writes both of its walk (`springfoot.evaluation.report.schedule_tables`); docs/policies.md says what may
+stand in them. K scales with the body; a file that names none is of 1.70 m and 63 kg.
+"""
+
+from collections.abc import Callable
+from math import radians, sqrt
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.physics.model import SIDES, damping_times
+from springfoot.envs.settings.settings import BipedSettings, Equilibrium, body_of
+from springfoot.errors import SpringfootError, as_float, require_number, require_within
+from springfoot.files.json_file import read_object
+from springfoot.files.text_table import Table, read_csv
+from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
+from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.springs.stiffness import SPRINGS, STIFFNESS_RANGE, Segment, StiffnessSchedule
+
+from .baselines import PolicyFunction, follow, schedule
+
+SPRING_KEYS = ("stiffness_Nm_per_rad", "damping_time_s", "equilibrium_deg")
+"""What a state says of each spring."""
+STATES_FILE = "table of finite states"
+SAME_BETA = 1e-4
+"""Difference of damping times that is rounding [s]."""
+
+
+def schedule_file(
+    name: str, conditions: BipedSettings
+) -> tuple[dict[str, Any], Callable[[BipedSettings], PolicyFunction]]:
+    """What a schedule file asks for.
+
+    Returns: the settings it needs, for the body of `conditions` (absolute actions, and the equilibrium that goes with
+    it), and what makes its policy in an environment of that body. Raises `SpringfootError` for another file.
+    """
+    path = Path(name)
+    if path.suffix.lower() == ".json":
+        springs = _states(path, conditions)
+        return {"action_mode": "absolute", "equilibrium": "phase", "schedule": springs.to_json()}, schedule
+    table = read_csv(path)
+    stiffness = _stiffness(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), conditions)
+    own = {"action_mode": "absolute"} | _equilibrium(table, stiffness)
+    return own, lambda settings: follow(stiffness[None], np.zeros(1), settings, body_of(settings))
+
+
+def _scale(height: float | None, mass: float | None, settings: BipedSettings) -> float:
+    """How many times stiffer the body of `settings` is than one of `height` [m] and `mass`, load and all [kg]."""
+    height = require_number("height_m", REFERENCE_HEIGHT if height is None else height, 0.0, unit="m", above=True)
+    mass = require_number("mass_kg", REFERENCE_MASS if mass is None else mass, 0.0, unit="kg", above=True)
+    return body_of(settings).stiffness_scale / (mass / REFERENCE_MASS * height / REFERENCE_HEIGHT)
+
+
+# K over the stride, in a CSV file ----------------------------------------------------------------------------
+
+
+def _cell(table: Table, column: str) -> float | None:
+    return float(table.numbers(column)[0]) if table.has(column) else None
+
+
+def _columns(table: Table, what: str) -> list[list[str]]:
+    """[side][joint] names of the columns with `what` of each spring: one a side, or one for both."""
+    names = [
+        [
+            next((c for c in (f"{joint}_{side}_{what}", f"{joint}_{what}") if c in table.columns), "")
+            for joint in SPRINGS
+        ]
+        for side in SIDES
+    ]
+    for joint, *columns in zip(SPRINGS, *names, strict=True):
+        if not all(columns):
+            raise SpringfootError(
+                f"{table.name}, line 1: needs a column {joint}_{what}, or {joint}_left_{what} and {joint}_right_{what}"
+            )
+    return names
+
+
+def _curves(table: Table, what: str) -> NDArray:
+    """(SAMPLES, side, joint) of the columns with `what`, on `GRID`; linear and periodic between the rows."""
+    if not table.has("percent"):
+        raise SpringfootError(f"{table.name}, line 1: needs a column percent, of the leg's stride")
+    percent = table.ascending("percent")
+    for (line, _), value in zip(table.rows, percent, strict=True):
+        if not 0.0 <= value <= PERCENT[-1]:
+            raise table.error(line, "percent", f"must be in [0, 100], got {value:g}")
+    inside = percent < PERCENT[-1]  # 100 is 0 again
+    read = [[table.numbers(column)[inside] for column in columns] for columns in _columns(table, what)]
+    if not inside.any():
+        raise SpringfootError(f"{table.name} needs a row of less than 100 percent")
+    at = percent[inside] / PERCENT[-1]
+    return np.stack([[np.interp(GRID, at, curve, period=1.0) for curve in curves] for curves in read]).transpose(
+        2, 0, 1
+    )
+
+
+def _stiffness(table: Table) -> NDArray:
+    stiffness = _curves(table, "stiffness_Nm_per_rad")
+    low, high = STIFFNESS_RANGE
+    if not (low < stiffness.min() and stiffness.max() <= high):
+        raise SpringfootError(
+            f"{table.name}: stiffness must be above {low:g} and at most {high:g} N m/rad, got "
+            f"{stiffness.min():g} to {stiffness.max():g}"
+        )
+    return stiffness
+
+
+def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
+    """The setting that the file's column `equilibrium` names, `planned` without one; with `phase` also the schedule
+    of its rest angles, constant over each percent and the same for both legs."""
+    kinds = get_args(Equilibrium)
+    kind = "planned"
+    if table.has("equilibrium"):
+        line, cells = table.rows[0]
+        kind = cells[table.columns.index("equilibrium")].strip()
+        if kind not in kinds:
+            raise table.error(line, "equilibrium", f"must be one of {', '.join(kinds)}, got {kind!r:.40}")
+    if kind != "phase":
+        return {"equilibrium": kind}
+    every = len(GRID) // int(PERCENT[-1])
+    springs = np.stack([stiffness, np.radians(_curves(table, "equilibrium_deg"))], -1).mean(axis=1)[::every]
+    starts = np.broadcast_to(GRID[::every, None, None], (len(springs), len(SPRINGS), 1))
+    lines = np.concatenate([starts, springs], axis=-1).swapaxes(0, 1).tolist()
+    return {"equilibrium": kind, "schedule": dict(zip(SPRINGS, lines, strict=True))}
+
+
+# Springs of finite states, in a JSON file --------------------------------------------------------------------
+
+
+def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
+    """The springs of a finite-state table, for the body of `settings`."""
+    table = read_object(path, STATES_FILE)
+    try:
+        states = table["states"]
+        height, mass = table.get("height_m"), table.get("mass_kg")
+        entries = [
+            [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
+        ]
+    except (LookupError, TypeError, AttributeError):
+        raise SpringfootError(
+            f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
+            f"toe, and these {', '.join(SPRING_KEYS)}"
+        ) from None
+    beta, scale = damping_times(body_of(settings))[FEET], _scale(height, mass, settings)
+    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))
+    lines = []
+    for column, (joint, own) in enumerate(zip(SPRINGS, beta, strict=True)):
+        segments = []
+        for phase, stiffness, damping, rest_deg in (state[column] for state in entries):
+            stiffness = require_number(
+                f"{path.name}: {joint} {SPRING_KEYS[0]}", stiffness, 0.0, unit="N m/rad", above=True
+            )
+            if damping is not None and not abs(as_float(damping) * time_scale - own) < SAME_BETA:
+                beta_s = f"{own / time_scale:.4g} s, the model's"
+                raise SpringfootError(f"{path.name}: {joint} {SPRING_KEYS[1]} must be {beta_s}, got {damping!r:.40}")
+            rest = radians(require_within(f"{path.name}: {joint} {SPRING_KEYS[2]}", rest_deg, (-180.0, 180.0), "deg"))
+            segments.append(Segment(phase, stiffness * scale, rest))
+        lines.append(tuple(segments))
+    try:
+        return StiffnessSchedule(*lines)
+    except (SpringfootError, TypeError) as error:
+        raise SpringfootError(f"{path.name}: {error}") from None

@@ -1,0 +1,1 @@
+"""Training by PPO: configuration, runs, checkpoints, several seeds."""

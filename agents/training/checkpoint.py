@@ -1,0 +1,114 @@
+"""Checkpoints of a run: the newest few, each a file that is whole; one that is damaged is passed over."""
+
+import json
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+from typeguard import CollectionCheckStrategy, TypeCheckError, check_type
+
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.files.tensor_file import read_tensors, write_tensors
+
+from .config import config_from_json
+from .learning_state import Learning
+from .run_record import require_past
+
+Checkpoint = tuple[dict[str, Any], dict[str, np.ndarray]]
+"""Header, as `Header` says, and arrays by name."""
+STATE_KEY = "springfoot-training"
+"""Name of the entry of a checkpoint's header."""
+KEPT_CHECKPOINTS = 3
+"""Checkpoints that a run keeps; chosen."""
+_NAME = re.compile(r"state-(\d{1,15})\.safetensors")
+
+
+class Header(TypedDict):
+    """What the header of a checkpoint holds: see `session`."""
+
+    timesteps: int
+    config: dict[str, Any]
+    fingerprint: dict[str, str]
+    record: dict[str, list[dict[str, Any]]]
+    seconds: float
+    events: dict[str, int]
+    learning: Learning
+
+
+def checkpoints(out: Path) -> list[Path]:
+    """The checkpoints in a folder, the newest, that of the most timesteps, first."""
+    found = {path: _NAME.fullmatch(path.name) for path in out.iterdir()}
+    return sorted((path for path, match in found.items() if match), key=_timesteps, reverse=True)
+
+
+def write_checkpoint(
+    out: Path, header: dict[str, Any], arrays: Mapping[str, np.ndarray], kept: int = KEPT_CHECKPOINTS
+) -> None:
+    """Write the checkpoint of `header["timesteps"]`, then remove all but the newest `kept`."""
+    write_tensors(out / f"state-{header['timesteps']}.safetensors", STATE_KEY, header, arrays)
+    for path in checkpoints(out)[kept:]:
+        path.unlink(missing_ok=True)
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Header and arrays of a checkpoint; raises `SpringfootError` for a file that is none or is damaged."""
+    names = Header.__annotations__
+    header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, sealed=True)
+    if missing := [name for name in names if name not in header]:
+        raise SpringfootError(f"{path} is of another version of springfoot: it has no {missing[0]}")
+    try:
+        _require_header(header)
+    except (KeyError, TypeError, ValueError) as error:
+        what = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise SpringfootError(f"{path} is damaged: {what}") from None
+    return header, arrays
+
+
+def _require_header(header: dict[str, Any]) -> None:
+    """Raise `SpringfootError`, KeyError, TypeError or ValueError where a header is not as a training writes it."""
+    json.dumps(header, allow_nan=False)  # raises for what is not finite
+    try:
+        check_type(header, Header, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
+    except TypeCheckError as error:
+        raise SpringfootError(f"in its header, {error}") from None
+    config_from_json(header["config"])
+    require_count("timesteps", header["timesteps"], 0)
+    require_number("seconds", header["seconds"], 0.0, unit="s")
+    require_past(header["record"])
+    if not header["record"]["sessions"]:
+        raise SpringfootError("sessions must be one or more")
+    for name, size in header["events"].items():
+        require_count(f"size of {name}", size, 0)
+
+
+def newest_checkpoint(out: Path) -> Checkpoint | None:
+    """Header and arrays of the newest checkpoint that is whole, None where there is none at all.
+
+    Those passed over get the ending `.damaged`, with a warning on standard error. Raises `SpringfootError`, with
+    nothing changed, where none is whole.
+    """
+    passed: list[tuple[Path, SpringfootError]] = []
+    for path in checkpoints(out):
+        try:
+            found = read_checkpoint(path)
+        except SpringfootError as error:
+            passed.append((path, error))
+            continue
+        for damaged, why in passed:
+            damaged.replace(damaged.with_name(f"{damaged.name}.damaged"))
+            print(f"Warning: {why}; going on from {path.name}", file=sys.stderr, flush=True)
+        return found
+    if passed:
+        raise SpringfootError(
+            f"{passed[0][1]}, and so are all other checkpoints in {out}" if passed[1:] else passed[0][1]
+        )
+    return None
+
+
+def _timesteps(path: Path) -> int:
+    match = _NAME.fullmatch(path.name)
+    assert match is not None
+    return int(match[1])

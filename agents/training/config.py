@@ -1,0 +1,137 @@
+"""The configuration of a training, and presets of it."""
+
+import dataclasses
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from numbers import Integral
+from typing import Any
+
+from springfoot.envs.physics.simulation import MOST_THREADS
+from springfoot.envs.settings.checks import MOST_ENVIRONMENTS, refusing_unknown
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.errors import MOST_COUNT, SpringfootError, quoted, require_count, require_number
+
+WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
+"""Units of the widest hidden layer, most of those layers, and most weights between them; chosen: a training state is
+then at most of half the size that is read."""
+_LARGEST = 1e3  # rate of learning or clip range; chosen
+_SIDE_BY_SIDE = ("num_envs", "eval_episodes")
+
+TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
+"""The default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range where it is 0."""
+
+
+@refusing_unknown
+@dataclass(frozen=True, kw_only=True)
+class TrainingConfig:
+    """One training by proximal policy optimisation (PPO); raises `SpringfootError` for a bad value."""
+
+    timesteps: int = 1_500_000
+    """Environment steps to learn from, of 20 ms unless `decisions` says otherwise, rounded up to whole updates."""
+    seed: int = 0
+    """Seed of weights, action noise and environments."""
+    num_envs: int = 64
+    """Environments stepped together in one batch."""
+    threads: int = 0
+    """Threads of the physics, 0 for one per available processor; results are the same with any number."""
+    update_steps: int = 8192
+    """Environment steps collected for each update of the policy, all environments together."""
+    minibatches: int = 8
+    """Parts into which the samples of an update are split, one gradient step each."""
+    epochs: int = 8
+    """Passes over the samples in each update."""
+    learning_rate: float = 3e-4
+    """Step size of Adam at the start [-]."""
+    learning_rate_end: float = 0.1
+    """Step size at the end as a share of the start, linear in between [0..1]."""
+    gamma: float = 0.98
+    """Discount of reward per 20 ms (0..1)."""
+    gae_lambda: float = 0.95
+    """Lambda of the generalised advantage estimate, per 20 ms [0..1]."""
+    clip_range: float = 0.2
+    """Largest relative change of an action's probability that one update rewards."""
+    log_std: float = -0.9
+    """Logarithm of the standard deviation of the actions at the start."""
+    hidden: tuple[int, ...] = (64, 64)
+    """Widths of the hidden tanh layers, the same for actor and critic."""
+    eval_interval: int = 131_072
+    """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
+    eval_episodes: int = 16
+    """Episodes of each periodic evaluation, on the same fixed seeds every time."""
+    environment: BipedSettings = field(default_factory=lambda: TRAINED_ON)
+    """Settings of the walking task that is trained on."""
+
+    def __post_init__(self) -> None:
+        for name in ("timesteps", "num_envs", "minibatches", "epochs", "eval_interval", "eval_episodes"):
+            require_count(name, getattr(self, name), 1, MOST_ENVIRONMENTS if name in _SIDE_BY_SIDE else MOST_COUNT)
+        require_count("seed", self.seed, 0, 2**31 - 1)
+        require_count("threads", self.threads, 0, MOST_THREADS)
+        require_count("update_steps", self.update_steps, max(self.num_envs, 2 * self.minibatches))
+        for name in ("learning_rate", "clip_range"):
+            require_number(name, getattr(self, name), 0, _LARGEST, above=True)
+        require_number("gamma", self.gamma, 0, 1, above=True)
+        for name in ("gae_lambda", "learning_rate_end"):
+            require_number(name, getattr(self, name), 0, 1)
+        require_number("log_std", self.log_std, -5, 2)
+        layers = self.hidden if isinstance(self.hidden, tuple) else ()
+        if not layers or any(type(width) is not int or width < 1 for width in layers):
+            raise SpringfootError(f"hidden must be one or more positive whole numbers, got {quoted(self.hidden)}")
+        if max(layers) > WIDEST or len(layers) > DEEPEST:
+            raise SpringfootError(
+                f"hidden must be at most {DEEPEST} layers of at most {WIDEST} units, got {quoted(self.hidden)}"
+            )
+        if (between := sum(below * above for below, above in pairwise(layers))) > MOST_WEIGHTS:
+            raise SpringfootError(
+                f"hidden must have at most {MOST_WEIGHTS:,} weights between its layers, has {between:,}"
+            )
+
+
+PREDICTED = replace(
+    TRAINED_ON,
+    push_newton=100.0,
+    guide="plan",
+    action_mode="residual",
+    reward_weights={"pose": 0.0, "grf": 0.0, "effort": -2.0},
+)
+"""The task of a body that follows its own plan: its action is a factor on the schedule found with its leg constants;
+it is paid for CoM, speed and ZMP of the plan and pays for effort; angles and forces count nothing."""
+
+PRESETS: dict[str, TrainingConfig] = {
+    "walk": TrainingConfig(),
+    "any-body": TrainingConfig(
+        timesteps=12_000_000,
+        eval_interval=262_144,
+        environment=replace(
+            TRAINED_ON,
+            height_range=(1.45, 2.0),
+            mass_range=(40.0, 120.0),
+            speed_range=(0.8, 1.6),
+            speed_interval=4.0,
+            slope_range_deg=(-5.0, 5.0),
+            unevenness_m=0.01,
+            stiffness_delay_range_s=(0.0, 0.02),
+        ),
+    ),
+    "predict": TrainingConfig(timesteps=500_000, environment=PREDICTED),
+}
+"""Trainings that are known to work, by name."""
+
+
+def config_to_json(config: TrainingConfig) -> dict[str, Any]:
+    """A configuration as a dictionary of plain JSON values; `config_from_json` is its inverse."""
+    values = {item.name: getattr(config, item.name) for item in dataclasses.fields(config)}
+    values = {name: int(value) if isinstance(value, Integral) else value for name, value in values.items()}
+    return values | {"hidden": list(config.hidden), "environment": settings_to_json(config.environment)}
+
+
+def config_from_json(values: dict[str, Any]) -> TrainingConfig:
+    """The configuration that `config_to_json` wrote; raises `SpringfootError` for anything else."""
+    names = [item.name for item in dataclasses.fields(TrainingConfig)]
+    if unknown := sorted(set(values) - set(names)):
+        raise SpringfootError(f"unknown training setting {unknown[0]!r}; valid: {', '.join(names)}")
+    plain = dict(values)
+    if "hidden" in plain:
+        plain["hidden"] = tuple(plain["hidden"])
+    if "environment" in plain:
+        plain["environment"] = settings_from(**plain["environment"])
+    return TrainingConfig(**plain)

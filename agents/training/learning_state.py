@@ -1,0 +1,129 @@
+"""The exact state of a learning, between two updates: what goes on from it does so with the same bits.
+
+Learner, environments with their simulations, every random generator, and what the logger has yet to write.
+"""
+
+import random
+from collections import deque
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any, TypedDict
+
+import numpy as np
+import torch
+
+from springfoot.errors import SpringfootError, require_count
+
+from .ppo import Learner
+from .sb3_vec_env import SegmentedFootBipedVecEnv
+
+_LEARNER = ("network.", "adam.", "observation.", "return.")
+_SIMULATION = "simulation."
+
+
+class Episode(TypedDict):
+    """An episode that ended: its return and its length in steps, by the names of stable-baselines3."""
+
+    r: float
+    l: int  # noqa: E741
+
+
+class Learning(TypedDict):
+    """What JSON holds of a learning."""
+
+    generators: list[dict[str, Any]]
+    """Of each environment."""
+    actions: dict[str, Any]
+    """Generator of the action space."""
+    numpy: list[float]
+    """Position, whether a normal number is kept, and that number."""
+    python_gauss: float | None
+    updates: int
+    episodes: list[Episode]
+    """The latest, from which rollout/ep_rew_mean is."""
+    logged: dict[str, list[Any]]
+    """Value and excluded formats of what is yet to be logged."""
+
+
+def learning_state(
+    learner: Learner, environments: SegmentedFootBipedVecEnv
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """All that learning changes, copies: JSON values, and arrays by name."""
+    ppo, normalized = learner.ppo, learner.normalized
+    assert ppo._last_obs is not None and ppo._last_episode_starts is not None and ppo.ep_info_buffer is not None
+    simulation = environments.state()
+    generators = simulation.pop("generators")
+    numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002 - SB3 draws from it
+    _, python_words, python_gauss = random.getstate()
+    arrays = learner.state() | {f"{_SIMULATION}{name}": values for name, values in simulation.items()}
+    arrays |= {
+        "rollout.observation": np.array(ppo._last_obs),
+        "rollout.episode_starts": np.array(ppo._last_episode_starts),
+        "rollout.returns": normalized.returns.copy(),
+        "random.torch": torch.get_rng_state().numpy().copy(),
+        "random.numpy": numpy_state["state"]["key"].copy(),  # type: ignore[index]
+        "random.python": np.array(python_words, np.uint32),
+    }
+    values = {
+        "generators": generators,
+        "actions": ppo.action_space.np_random.bit_generator.state,
+        "numpy": [int(numpy_state["state"]["pos"]), numpy_state["has_gauss"], numpy_state["gauss"]],  # type: ignore[index]
+        "python_gauss": python_gauss,
+        "updates": ppo._n_updates,
+        "episodes": [{"r": float(each["r"]), "l": int(each["l"])} for each in ppo.ep_info_buffer],
+        "logged": {
+            name: [float(value), ppo.logger.name_to_excluded[name]]
+            for name, value in ppo.logger.name_to_value.items()
+            if isinstance(value, (int, float, np.number))
+        },
+    }
+    return values, arrays
+
+
+def restore_learning(
+    learner: Learner,
+    environments: SegmentedFootBipedVecEnv,
+    values: Mapping[str, Any],
+    arrays: Mapping[str, np.ndarray],
+) -> None:
+    """Go on from what `learning_state` gave, but for `logged`; to be called last, as nothing may draw from then on.
+
+    Raises `SpringfootError` if it does not fit this learner. `logged` is checked, and left to the caller.
+    """
+    ppo, normalized = learner.ppo, learner.normalized
+    learner.restore({name: array for name, array in arrays.items() if name.startswith(_LEARNER)})
+    try:
+        simulation = {name: array for name, array in arrays.items() if name.startswith(_SIMULATION)}
+        simulation = {name.removeprefix(_SIMULATION): array for name, array in simulation.items()}
+        environments.restore(simulation | {"generators": values["generators"]})
+        width = len(environments.env.biped.observation_names)
+        normalized.returns = _fitting(arrays, "rollout.returns", (ppo.n_envs,), np.float64)
+        ppo._last_obs = _fitting(arrays, "rollout.observation", (ppo.n_envs, width), np.float32)
+        ppo._last_episode_starts = _fitting(arrays, "rollout.episode_starts", (ppo.n_envs,), np.bool_)
+        ppo._n_updates = require_count("updates", values["updates"], 0)
+        episodes = ({"r": float(each["r"]), "l": int(each["l"])} for each in values["episodes"])
+        ppo.ep_info_buffer = deque(episodes, maxlen=ppo._stats_window_size)
+        ppo.ep_success_buffer = deque(maxlen=ppo._stats_window_size)  # these environments tell of no success
+        if not all(
+            len(told) == 2 and isinstance(told[1], list) and isfinite(told[0]) for told in values["logged"].values()
+        ):
+            raise ValueError("logged must be values, each with the formats that leave it out")
+        position, has_gauss, gauss = values["numpy"]
+        ppo.action_space.np_random.bit_generator.state = values["actions"]
+        random.setstate((3, tuple(map(int, arrays["random.python"])), values["python_gauss"]))
+        np.random.set_state(("MT19937", arrays["random.numpy"], int(position), int(has_gauss), gauss))  # noqa: NPY002
+        torch.set_rng_state(torch.from_numpy(arrays["random.torch"]))
+    except SpringfootError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, RuntimeError, OverflowError) as error:
+        what = " ".join(str(error).split())
+        raise SpringfootError(f"the training state does not fit its configuration: {what}") from None
+
+
+def _fitting(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
+    values = arrays[name]
+    if values.shape != shape or values.dtype != kind:
+        raise ValueError(f"{name} is {values.dtype} {values.shape}, not {kind.__name__} {shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} must be finite")
+    return values

@@ -1,0 +1,220 @@
+"""The same training from several seeds at once: one process a processor, one thread each, and the spread of results.
+
+Seed k is trained in the folder `seed-k`, by the same bits as `train.py --seed k` alone; `seeds.json` holds the spread.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from springfoot.command_line import end_in_order, exit_code, stopped_by
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.errors import SpringfootError, require_count
+from springfoot.files.locks import owned
+from springfoot.files.markdown import MISSING, plus_minus, table, text_of
+from springfoot.files.writing import require_new, write_atomically
+from springfoot.gait.people.scores import mean_sd
+
+from ..policies.policy import RUN
+from .config import TrainingConfig, config_from_json, config_to_json
+from .run_record import read_record
+from .session import processors
+from .training import resume, train
+
+SEEDS = "seeds.json"
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
+"""Results whose mean and standard deviation (n - 1) over the seeds stand in `seeds.json`."""
+
+
+def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str, Any]:
+    """Train from the seeds `config.seed`, `config.seed` + 1, …, each into a new folder in `out`; return `seeds.json`.
+
+    As many processes run at a time as there are processors, each on one thread. The first SIGINT or SIGTERM lets the
+    running ones save a usable policy and stop, and no more are started. Raises `SpringfootError`, with nothing
+    written, if `out` exists and is not an empty folder.
+    """
+    require_count("seeds", seeds)
+    require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)
+    out = require_new(out)
+    Biped(config.environment, 1)  # raises for settings that nobody can walk in, before anything is written
+    configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
+    with owned(out):
+        require_new(out)
+        rows, signalled = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
+        record = {"config": config_to_json(config), "status": _status(rows, signalled), "seeds": rows}
+        record |= {"spread": spread(rows)} | ({"signal": signalled.name} if signalled else {})
+        write_atomically(out / SEEDS, (json.dumps(record, indent=2) + "\n").encode())
+    return record
+
+
+def train_all(
+    jobs: Sequence[tuple[TrainingConfig, Path, str]],
+) -> tuple[list[dict[str, Any]], signal.Signals | None]:
+    """Train each configuration into its folder, as `train_seeds` does; its messages begin with its name.
+
+    A folder that holds a run is gone on with. Returns a row of results for each, and the signal that stopped them.
+    """
+    at_once = min(max(len(jobs), 1), processors())
+    with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
+        print(f"{len(jobs)} seeds, {at_once} at a time, one thread each", file=sys.stderr, flush=True)
+        rows = list(pool.map(lambda job: trainings.run(*job), jobs))
+    return rows, trainings.stopping
+
+
+def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) -> str:
+    """`finished`, `failed` or `interrupted`, for all together."""
+    status = "interrupted" if signalled else "finished"
+    return "failed" if any(row["status"] == "failed" for row in rows) else status
+
+
+def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
+    """Train the configurations whose folders hold no finished run, as `train_all` does.
+
+    A run that was started and not finished is gone on with. Returns `finished`, `failed` or `interrupted`. Raises
+    `SpringfootError`, with nothing changed, for a run of another configuration.
+    """
+    for config, folder, _ in jobs:
+        if (folder / RUN).is_file():
+            done = config_from_json(read_record(folder)["config"])
+            if replace(done, threads=config.threads) != config:
+                raise SpringfootError(f"{folder} was trained with other settings; choose another folder")
+    missing = [job for job in jobs if not is_finished(job[1])]
+    return _status(*train_all(missing)) if missing else "finished"
+
+
+def is_finished(folder: Path) -> bool:
+    """Whether the folder holds a training that ran to its end."""
+    return (folder / RUN).is_file() and read_record(folder).get("status") == "finished"
+
+
+def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+    """Mean and standard deviation (n - 1) of each of `SPREAD` over the seeds that finished; None where unknown."""
+    finished = [row for row in rows if row["status"] == "finished"]
+    return {name: mean_sd([row[name] for row in finished]) for name in SPREAD}
+
+
+def training_table(record: dict[str, Any]) -> str:
+    """Markdown: one row a seed, and the mean ± SD over those that finished."""
+    head, lines = ["seed", "status", "steps", "seconds", "best return", "falls", "after steps"], []
+    for row in record["seeds"]:
+        falls = MISSING if row["falls"] is None else f"{row['falls']} of {row['episodes']}"
+        patterns = {"timesteps": ",d", "seconds": ".0f", "return_mean": ".1f", "best_timesteps": ",d"}
+        steps, seconds, best, after = (text_of(row[name], pattern) for name, pattern in patterns.items())
+        lines.append([str(row["seed"]), row["status"], steps, seconds, best, falls, after])
+    seconds, best, falls, after = (plus_minus(record["spread"][name], ",.1f", alone=False) for name in SPREAD)
+    lines.append(["mean ± SD", "", "", seconds, best, falls, after])
+    return table(head, lines)
+
+
+class _Trainings:
+    """Training processes, and the signals that end them; a context manager."""
+
+    def __init__(self) -> None:
+        self.stopping: signal.Signals | None = None
+        self._lock = threading.RLock()  # a second signal may interrupt the passing on of the first
+        self._running: list[subprocess.Popen[str]] = []
+        self._before: dict[int, Any] = {}
+
+    def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
+        """Train in a process of its own, print its messages after its `name`, and return its row of results."""
+        config = replace(config, threads=1)
+        command = [sys.executable, "-m", __name__, str(folder), json.dumps(config_to_json(config))]
+        _block(True)  # the new process inherits this, and unblocks after its imports; this thread only waits for it
+        with self._lock:
+            if self.stopping:
+                return _row(config, folder, "not begun")
+            # In a session of its own it does not get the terminal's Ctrl-C; this process passes it on, once.
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+                env=os.environ | {"OMP_NUM_THREADS": "1"},
+            )
+            self._running.append(process)
+        with process:
+            assert process.stderr is not None
+            for line in process.stderr:
+                print(f"{name}: {line}", end="", file=sys.stderr, flush=True)
+        with self._lock:
+            self._running.remove(process)
+        if process.returncode < 0 and not self.stopping:
+            ended = signal.Signals(-process.returncode).name
+            safe = f"springfoot train --resume {folder} goes on from what it has saved"
+            safe = safe if (folder / RUN).is_file() else "it had saved nothing yet"
+            said = f"{name}: its process was ended by {ended}; {safe}"
+            print(said, file=sys.stderr, flush=True)
+        return _row(config, folder, "interrupted" if self.stopping else "failed")
+
+    def _stop(self, number: int, _frame: Any) -> None:
+        with self._lock:
+            self.stopping = signal.Signals(number)
+            for process in self._running:
+                process.send_signal(number)
+
+    def __enter__(self) -> "_Trainings":
+        """Handle SIGINT and SIGTERM, which Python allows in the main thread only."""
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                self._before[number] = signal.signal(number, self._stop)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Restore the signal handlers; terminate processes that still run, as they do only after an error."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        for process in self._running:
+            process.terminate()
+
+
+def _block(blocked: bool) -> None:
+    """Block or unblock SIGINT and SIGTERM in this thread and in the processes it starts."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, SIGNALS)
+
+
+def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
+    """The row of results of one seed, from its run.json; its status is `without` where that file is not complete."""
+    row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
+    record = read_record(folder) if (folder / RUN).is_file() else {}
+    best = record.get("best") or {}
+    if record.get("status", "running") != "running":
+        row["status"] = record["status"]
+    return row | {
+        "timesteps": record.get("timesteps"),
+        "seconds": record.get("seconds"),
+        "return_mean": best.get("return_mean"),
+        "falls": best.get("falls"),
+        "episodes": best.get("episodes"),
+        "best_timesteps": best.get("timesteps"),
+    }
+
+
+def _main() -> int:
+    """Train one seed in this process; its arguments are a folder and a configuration as JSON text."""
+    folder, config = sys.argv[1:]
+    return exit_code("train.py", lambda: _train(config_from_json(json.loads(config)), folder))
+
+
+def _train(config: TrainingConfig, folder: str) -> int:
+    _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
+    end_in_order()
+    record = resume(folder, threads=config.threads) if (Path(folder) / RUN).is_file() else train(config, folder)
+    return stopped_by(record) if record["status"] == "interrupted" else 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())

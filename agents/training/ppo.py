@@ -1,0 +1,124 @@
+"""The learner: stable-baselines3's PPO on normalised observations, and its whole state as named arrays.
+
+PPO: proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347). The state goes through .safetensors only;
+`PPO.save`, `PPO.load` and VecNormalize's own files are pickles, which run code when read, and are never used.
+"""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+
+from springfoot.envs.physics.timing import ACTION_STEP
+from springfoot.errors import SpringfootError
+
+from ..policies.conversion import actor_of, ignoring_unvaried
+from ..policies.number_bounds import require_bounded, require_moments
+from ..policies.policy import Policy
+from .config import TrainingConfig
+
+
+class Learner:
+    """An untrained actor and critic on a batch of environments; the actor's mean action begins at 0.
+
+    Orthogonal weights, on the action layer with gain 0.01, and biases of zero. Observations and rewards are
+    normalised by their running statistics.
+    """
+
+    def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
+        torch.set_num_threads(1)  # more compete with the threads of the physics, and are up to 200 times slower
+        self._environment = config.environment
+        share = config.environment.step_seconds / ACTION_STEP
+        gamma, gae_lambda = config.gamma**share, config.gae_lambda**share
+        self.normalized = VecNormalize(environments, gamma=gamma)
+        self.rollout_steps = config.update_steps // config.num_envs
+        samples = self.rollout_steps * config.num_envs
+        with warnings.catch_warnings():  # a last minibatch that is a few samples smaller does no harm
+            warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
+            self.ppo = PPO(
+                "MlpPolicy",
+                self.normalized,
+                learning_rate=lambda left: config.learning_rate * (left + config.learning_rate_end * (1 - left)),
+                n_steps=self.rollout_steps,
+                batch_size=-(-samples // config.minibatches),
+                n_epochs=config.epochs,
+                gamma=gamma,
+                gae_lambda=gae_lambda,
+                clip_range=config.clip_range,
+                policy_kwargs={
+                    "net_arch": list(config.hidden),
+                    "activation_fn": torch.nn.Tanh,
+                    "log_std_init": config.log_std,
+                },
+                seed=seed,
+                device="cpu",
+            )
+
+    def policy(self, fingerprint: dict[str, str]) -> Policy:
+        """The actor's mean actions as they are now, with the observation statistics as they are now."""
+        layers, _, _ = actor_of(self.ppo.policy)
+        # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
+        seen = self._statistics()["observation"]
+        return ignoring_unvaried(
+            Policy(
+                settings=self._environment,
+                fingerprint=fingerprint,
+                weights=tuple(weight.detach().numpy().copy() for weight, _ in layers),
+                biases=tuple(bias.detach().numpy().copy() for _, bias in layers),
+                observation_mean=seen.mean.copy(),
+                observation_variance=seen.var,
+                observation_clip=self.normalized.clip_obs,
+            )
+        )
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that learning changes: network, Adam's moments, running statistics."""
+        tensors = {f"network.{name}": value for name, value in self.ppo.policy.state_dict().items()}
+        for index, moments in self.ppo.policy.optimizer.state_dict()["state"].items():
+            tensors |= {f"adam.{index}.{name}": value for name, value in moments.items()}
+        arrays = {name: value.detach().numpy().copy() for name, value in tensors.items()}
+        for name, statistics in self._statistics().items():
+            for item in ("mean", "var", "count"):
+                arrays[f"{name}.{item}"] = np.array(getattr(statistics, item), dtype=np.float64)
+        return arrays
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Continue from what `state` returned; raise `SpringfootError` if it does not fit this learner."""
+        what = "the training state"
+        require_bounded(what, arrays)
+        require_moments(what, arrays, len(list(self.ppo.policy.parameters())))
+        try:
+            network = {name: value for name, value in arrays.items() if name.startswith("network.")}
+            self.ppo.policy.load_state_dict(
+                {name.removeprefix("network."): torch.from_numpy(value) for name, value in network.items()}
+            )
+            optimizer, parameters = self.ppo.policy.optimizer, list(self.ppo.policy.parameters())
+            moments: dict[int, dict[str, torch.Tensor]] = {}
+            for name, value in arrays.items():
+                if name.startswith("adam."):
+                    _, index, item = name.split(".")
+                    expected = () if item == "step" else tuple(parameters[int(index)].shape)
+                    _require_shape(name, value, expected)
+                    moments.setdefault(int(index), {})[item] = torch.from_numpy(value)
+            optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+            for name, statistics in self._statistics().items():
+                for item in ("mean", "var", "count"):
+                    value = arrays[f"{name}.{item}"]
+                    _require_shape(f"{name}.{item}", value, np.shape(getattr(statistics, item)))
+                    setattr(statistics, item, value if value.shape else float(value))
+        except (KeyError, IndexError, ValueError, RuntimeError) as error:
+            what = " ".join(str(error).split())
+            raise SpringfootError(f"the training state does not fit its configuration: {what}") from None
+
+    def _statistics(self) -> dict[str, RunningMeanStd]:
+        observation: Any = self.normalized.obs_rms  # a dictionary only for dictionary observations
+        return {"observation": observation, "return": self.normalized.ret_rms}
+
+
+def _require_shape(name: str, value: np.ndarray, shape: tuple[int, ...]) -> None:
+    if value.shape != shape:
+        raise ValueError(f"{name} has shape {value.shape}, not {shape}")

@@ -1,0 +1,91 @@
+"""What is known of a run besides its learning: its record `run.json`, and its TensorBoard events."""
+
+import os
+from collections.abc import Mapping
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.files.json_file import read_object, sealed_object
+from springfoot.files.writing import write_atomically
+
+from ..policies.policy import RUN
+from .config import config_from_json
+
+EVENTS = "events.out.tfevents.*"
+
+
+def read_record(out: Path) -> dict[str, Any]:
+    """The record in a run's folder; raises `SpringfootError` where it is none."""
+    record = read_object(out / RUN, "record of a run")
+    try:
+        if not isinstance(record["config"], dict):
+            raise ValueError("config must be an object")
+        config_from_json(record["config"])
+        require_past(record)
+        require_count("timesteps", record.get("timesteps", 0), 0)
+        require_number("seconds", record.get("seconds", 0.0), 0.0, unit="s")
+        if not isinstance(record.get("best", {}), dict | None):
+            raise ValueError("best must be an object or null")
+    except (KeyError, TypeError, ValueError) as error:
+        raise SpringfootError(f"{out / RUN} is not the record of a run: {error!r}") from None
+    return record
+
+
+def require_past(record: Mapping[str, Any]) -> None:
+    """Raise KeyError or ValueError where `sessions` or `evaluations` of a record are none."""
+    for name in ("sessions", "evaluations"):
+        if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
+            raise ValueError(f"{name} must be a list of objects")
+    measured = [session["best"] for session in record["sessions"] if "best" in session]
+    if not all(isinstance(best, dict) for best in measured):
+        raise ValueError("best must be an object")
+    for entry in (*record["evaluations"], *measured):
+        for name in ("timesteps", "return_mean", "return_sd", "falls", "episodes"):
+            require_number(name, entry[name], -inf)
+    for session in record["sessions"]:
+        require_count("from_timesteps", session.get("from_timesteps", 0), 0)
+
+
+def runs_within(out: Path) -> list[Path]:
+    """Folders of the runs in a folder of several seeds, in the order of the seeds."""
+    return sorted((path.parent for path in out.glob(f"seed-*/{RUN}")), key=lambda path: (len(path.name), path.name))
+
+
+def write_record(out: Path, record: Mapping[str, Any]) -> None:
+    """Write the record, whole or not at all."""
+    write_atomically(out / RUN, sealed_object(dict(record)))
+
+
+def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The best evaluation, the first of several; None before the first.
+
+    A session that measured the best anew, as its task was another, compares it with what came after only.
+    """
+    entries: list[dict[str, Any]] = record["evaluations"]
+    for session in reversed(record["sessions"]):
+        if "best" in session:
+            later = [entry for entry in entries if entry["timesteps"] > session["from_timesteps"]]
+            return max([session["best"], *later], key=lambda entry: entry["return_mean"])
+    return max(entries, key=lambda entry: entry["return_mean"], default=None)
+
+
+def same_source(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two sessions ran the same code, of the same versions."""
+    return all(one.get(name) == other.get(name) for name in ("commit", "modified", "versions"))
+
+
+def event_sizes(out: Path) -> dict[str, int]:
+    """Size of each of the events' files [bytes], by name."""
+    return {path.name: path.stat().st_size for path in sorted(out.glob(EVENTS))}
+
+
+def cut_events(out: Path, sizes: Mapping[str, int]) -> None:
+    """Have the events' files as they were when they had `sizes`: what came after is lost, and would be told twice."""
+    for path in out.glob(EVENTS):
+        size = sizes.get(path.name, 0)
+        if size == 0:
+            path.unlink()
+        elif path.stat().st_size > size:
+            os.truncate(path, size)

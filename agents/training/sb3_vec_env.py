@@ -1,0 +1,132 @@
+"""The batched environment for stable-baselines3: the same bits as the Gymnasium VectorEnv under it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
+
+from springfoot.envs.control.subjects import DRAWN
+from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.vector_env import SegmentedFootBipedVector
+from springfoot.errors import SpringfootError
+
+
+class SegmentedFootBipedVecEnv(VecEnv):
+    """`SegmentedFootBipedVector` with SAME_STEP autoreset as a stable-baselines3 `VecEnv`.
+
+    Takes the same keyword arguments, `num_envs`, `num_threads` and every field of `BipedSettings`. Info
+    dictionaries are empty except where an episode ended: there `terminal_observation`,
+    `TimeLimit.truncated`, `episode` (`r` return, `l` steps; no VecMonitor is needed) and the values of that
+    last step. What each step reported for the whole batch is in `step_info`, arrays (N,) by name.
+    """
+
+    def __init__(self, num_envs: int = 1, *, num_threads: int = 1, **settings: Any) -> None:
+        self.env = SegmentedFootBipedVector(
+            num_envs=num_envs, num_threads=num_threads, autoreset_mode=AutoresetMode.SAME_STEP, **settings
+        )
+        super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
+        self.step_info: dict[str, np.ndarray] = {}
+        self._actions = np.zeros((num_envs, len(ACTIONS)), np.float32)
+        self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, int)
+
+    def reset(self) -> np.ndarray:
+        """First observations (N, D) of new episodes, with the seeds given to `seed` since the last reset."""
+        options = _merged(self._options)
+        observation, _ = self.env.reset(seed=self._seeds, options=options or None)
+        self._reset_seeds()
+        self._reset_options()
+        self._returns[:], self._lengths[:] = 0.0, 0
+        return observation
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions (N, 4) for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Observations (N, D), rewards (N,), dones (N,) and infos; an episode that ended is followed by a new one."""
+        observation, reward, terminated, truncated, info = self.env.step(self._actions)
+        done = terminated | truncated
+        self._returns += reward
+        self._lengths += 1
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        self.step_info = _values(info)
+        if done.any():
+            final = _values(info["final_info"])
+            self.step_info = {name: np.where(done, last, info.get(name, last)) for name, last in final.items()}
+            for i in np.flatnonzero(done):
+                infos[i] = {name: values[i] for name, values in final.items()} | {
+                    "terminal_observation": info["final_obs"][i],
+                    "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
+                    "episode": {"r": float(self._returns[i]), "l": int(self._lengths[i])},
+                }
+            self._returns[done], self._lengths[done] = 0.0, 0
+        return observation, reward.copy(), done, infos  # PPO adds bootstrapped values to the rewards in place
+
+    def state(self) -> dict[str, Any]:
+        """The exact state between two steps: that of the batch (see `Biped.state`), and of the running episodes."""
+        episodes = {"episode.return": self._returns.copy(), "episode.length": self._lengths.copy()}
+        return self.env.biped.state() | episodes
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `state` gave; raises `SpringfootError` for that of other settings."""
+        for name, own in (("episode.return", self._returns), ("episode.length", self._lengths)):
+            if np.shape(state.get(name, ())) != own.shape:
+                raise SpringfootError(f"the state does not fit: {name!r} must be {own.shape}")
+        self.reset()  # so that an episode is running everywhere; nothing of it is left
+        self.env.biped.restore({name: values for name, values in state.items() if not name.startswith("episode.")})
+        self._returns[:], self._lengths[:] = state["episode.return"], state["episode.length"]
+
+    def close(self) -> None:
+        """Free the simulation and any window."""
+        self.env.close()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """One picture of each environment."""
+        return list(self.env.render() or [None] * self.num_envs)
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The batch's attribute, once for each of `indices`: all environments share it."""
+        value = getattr(self.env, attr_name)
+        return [value for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Set an attribute of the whole batch; raise `SpringfootError` for a part of it."""
+        self._require_all(indices, f"set {attr_name}")
+        setattr(self.env, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of the whole batch once, and return its result for each environment."""
+        self._require_all(indices, f"call {method_name}")
+        return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * self.num_envs
+
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
+        """False for each of `indices`: nothing wraps an environment inside the batch."""
+        return [False for _ in self._get_indices(indices)]
+
+    def _require_all(self, indices: VecEnvIndices, what: str) -> None:
+        if set(self._get_indices(indices)) != set(range(self.num_envs)):
+            raise SpringfootError(f"cannot {what} for some environments only: the batch is one simulation")
+
+
+def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The options of one reset, from those of each environment; only bodies and speeds may differ between them."""
+    options, *others = ({name: value for name, value in own.items() if name not in DRAWN} for own in each)
+    if any(other != options for other in others):
+        raise SpringfootError(f"reset options other than {', '.join(DRAWN)} must be the same for all environments")
+    for name in DRAWN:
+        given = [own[name] for own in each if name in own]
+        if 0 < len(given) < len(each):
+            raise SpringfootError(f"reset option {name!r} must be given to all environments, or to none")
+        if given:
+            options[name] = given
+    return options
+
+
+def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:
+    """A vector environment's info without the masks and the last observations and infos."""
+    return {name: values for name, values in info.items() if not name.startswith(("_", "final_"))}

@@ -1,0 +1,111 @@
+"""A training run, new or resumed: a folder that holds its policies, its state and its results.
+
+`best.safetensors` and `last.safetensors` are policies, `state-N.safetensors` the checkpoint after N timesteps,
+`run.json` holds what is needed to repeat the run, and its results; beside them are TensorBoard's event files and
+pictures (`agents.training.run_pictures`). Each file is written whole or not at all. A checkpoint has all that decides
+what comes after it, and all other files are made again from it when the run is resumed.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from springfoot.envs.settings.settings import settings_from, settings_to_json
+from springfoot.errors import SpringfootError
+from springfoot.files.locks import owned
+from springfoot.files.writing import remove_temporary, require_new
+
+from ..policies.policy import BEST, LAST, RUN
+from .callbacks import Onlooker
+from .checkpoint import Checkpoint, newest_checkpoint
+from .config import TrainingConfig, config_from_json, config_to_json
+from .run_pictures import GALLERY, pictures_of
+from .run_record import read_record, runs_within
+from .session import BEST_FILE, Session
+
+
+def train(config: TrainingConfig, out: str | Path, callbacks: Sequence[Onlooker] = ()) -> dict[str, Any]:
+    """Train a new policy into the new folder `out`; return what `run.json` holds.
+
+    `callbacks` look on: stable-baselines3's, and functions of each periodic evaluation, a dictionary as in `run.json`.
+    One that returns False ends the training, with status `interrupted`.
+    The training ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM, and at the
+    second at once. Raises `SpringfootError`, with nothing written, if `out` exists and is not an empty folder, or if
+    another process writes into it.
+    """
+    out = require_new(out)
+    with owned(out):
+        remove_temporary(require_new(out))
+        return Session(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks).learn()
+
+
+def resume(
+    out: str | Path,
+    timesteps: int | None = None,
+    threads: int | None = None,
+    callbacks: Sequence[Onlooker] = (),
+    reward_weights: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
+    """Continue the run in `out` with its saved settings; return what `run.json` holds.
+
+    Args:
+        out: the run's folder.
+        timesteps: how many more to train after those already done, the step size falling linearly to the new end;
+            None finishes an interrupted run.
+        threads: of the physics in place of the saved ones; results are the same with any number.
+        callbacks: as for `train`; their own state is theirs to keep.
+        reward_weights: of the reward from here on, the setting of that name in place of the saved one. The best policy
+            is measured anew by it, and the session in `run.json` keeps what was saved as `changed_from`.
+
+    It goes on from the newest checkpoint that is whole, and ends with the bits of a run that nothing interrupted, on
+    the same versions and a processor of the same instructions. Whatever an earlier end left undone in the folder is
+    made good. Raises `SpringfootError` for a folder without a run, for a run that is finished, that another process
+    writes, or that this version cannot continue.
+    """
+    out = Path(out)
+    if not (out / RUN).is_file():
+        within = ", ".join(map(str, runs_within(out)))
+        several = f"; its runs are {within}" if within else ""
+        raise SpringfootError(f"{out} holds no run to continue: no {RUN} in it{several}")
+    with owned(out):
+        for folder in (out, out / GALLERY):
+            remove_temporary(folder)
+        record = read_record(out)
+        found = newest_checkpoint(out)
+        if found is None and record.get("timesteps"):
+            raise SpringfootError(f"{out} holds no run to continue: no state-{record['timesteps']}.safetensors in it")
+        done = found[0]["timesteps"] if found else 0
+        config = config_from_json(record["config"])
+        if reward_weights is not None:
+            settings = settings_to_json(config.environment) | {"reward_weights": dict(reward_weights)}
+            config = dataclasses.replace(config, environment=settings_from(**settings))
+        total = config.timesteps if timesteps is None else done + timesteps
+        if total <= done and found and _in_order(out, record, found):
+            raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
+        if found:
+            _require_shape(out, found[0]["config"], config_to_json(config))
+        told = found[0]["record"] if found else {"sessions": [], "evaluations": []}
+        return Session(dataclasses.replace(config, timesteps=total), out, told, found, threads, callbacks).learn()
+
+
+def _require_shape(out: Path, trained: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+    """Raise `SpringfootError` where what a state has the shape of was changed in the record."""
+    for name in ("num_envs", "hidden"):
+        if trained[name] != asked[name]:
+            raise SpringfootError(f"{out} was trained with {name} {trained[name]}; its {RUN} says {asked[name]}")
+
+
+def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:
+    """Whether a run that has done its timesteps has all that its last checkpoint says, in its other files."""
+    header, arrays = found
+    told = all(record.get(name) == value for name, value in header["record"].items())
+    evaluated = [entry["timesteps"] for entry in record["evaluations"]][-1:] == [header["timesteps"]]
+    best = (out / BEST).is_file() and (out / BEST).read_bytes() == arrays[BEST_FILE].tobytes()
+    return (
+        told
+        and evaluated
+        and best
+        and all((out / name).is_file() for name in (LAST, *pictures_of(out)))
+        and record.get("status") == "finished"
+    )

@@ -1,0 +1,66 @@
+"""The command that walks a policy live in a browser: `springfoot live`."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from springfoot.command_line import exit_code, parse
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.errors import MOST_COUNT, require_count, require_number
+from springfoot.evaluation.live.steered_walk import ELSEWHERE, LiveSession
+from springfoot.studies.base.flags import EVALUATED, given, optional_flags
+
+MOST_PORT = 65535
+"""Largest number of a port."""
+LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=ELSEWHERE)
+"""Every environment setting as an optional flag; those that live refuses say so."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveFlags:
+    """Walk a policy in a browser in real time: stiffness, speed, slope, body and feet under sliders, pushes at a click.
+
+    Open the address it prints; Ctrl-C ends it. It needs no OpenGL and loads nothing from elsewhere.
+    """
+
+    policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")] = "pretrained"
+    """Any policy of `springfoot evaluate`."""
+    host: str = "127.0.0.1"
+    """Address to listen on. By default programs on this machine and the live page itself can steer, no other page that
+    a browser has open; of another address whoever reaches it."""
+    port: int = 8080
+    """Port to listen on, the next free one if it is taken; 0 for any."""
+    seed: int = 0
+    """Of the walk."""
+    seconds: float | None = None
+    """End after this time [s]; it goes on until Ctrl-C otherwise."""
+    environment: tyro.conf.OmitArgPrefixes[LiveSettings]  # type: ignore[valid-type]
+    """What the sliders begin with, and all else that is set."""
+
+
+def live_main(arguments: Sequence[str], program: str = "springfoot live") -> int:
+    """Run the command line; returns its exit code: 0 ended, 2 bad input, 130 ended by Ctrl-C."""
+    flags = parse(LiveFlags, arguments, program)
+    return exit_code(program, lambda: run_live(flags))
+
+
+def run_live(flags: LiveFlags) -> None:
+    """Walk until the time is over; prints the address, and how many pictures a second were shown."""
+    require_count("seed", flags.seed, 0, MOST_COUNT)
+    require_count("port", flags.port, 0, MOST_PORT)
+    if flags.seconds is not None:
+        require_number("seconds", flags.seconds, 0.0, unit="s", above=True)
+    if sys.stderr.isatty():
+        print("starting…", file=sys.stderr, flush=True)
+    from springfoot.evaluation.live.view import LiveView  # not above: bad flags need not wait for viser
+
+    view = LiveView(LiveSession(flags.policy, given(flags.environment), flags.seed), flags.host, flags.port)
+    print(f"Live at {view.address} (Ctrl-C ends it)", flush=True)
+    try:
+        rate = view.run(flags.seconds)
+    finally:
+        view.stop()
+    print(f"{rate:.0f} pictures a second")

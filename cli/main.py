@@ -1,0 +1,157 @@
+"""The command `springfoot`: the same code as `train.py` and `evaluate.py`, and every study by its name."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from springfoot import __version__
+from springfoot.extras import EXTRA_OF
+from springfoot.terminal import at_terminal
+
+if TYPE_CHECKING:
+    from springfoot.studies.base.study import Study
+
+HELP = """usage: springfoot {train,evaluate,live,export,study} ...
+
+  springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
+  springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
+  springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
+  springfoot export POLICY          write it as a file that runs without springfoot: ONNX, torch or NumPy
+  springfoot study NAME             hold many walks against each other; springfoot study --help lists them
+
+Each takes --help; springfoot --version says which this is."""
+
+STUDIES = {
+    "compare": ("walks.comparison.Compare", "Does a policy walk better than every baseline?"),
+    "best-constant": ("constant_search.BestConstant", "Which constant stiffness earns most?"),
+    "best-factor": ("constant_search.BestFactor", "Which factor on the tuned schedule earns most?"),
+    "seeds": ("walks.seeds.Seeds", "How far apart are several policies, as one training from several seeds?"),
+    "bodies": ("walks.bodies.Bodies", "Does a policy walk with any body at any speed?"),
+    "criteria": ("criteria_met.CriteriaMet", "Which criteria of a human-like walk does a policy meet?"),
+    "front": ("front.Front", "Which criteria has no policy together, and by how much are they missed?"),
+    "mix": ("policy_mixing.Mix", "Which weighted mean of related policies meets most criteria? (searches)"),
+    "conditions": ("walks.conditions.Conditions", "How does a policy walk elsewhere, and how do other springs?"),
+    "ablations": ("walks.ablations.Ablations", "What does each part of the training contribute? (trains)"),
+    "stiffness-cost": ("stiffness_cost.StiffnessCost", "What does a cost on stiffness take and give? (trains)"),
+    "agreement": ("springs.agreement.SeedAgreement", "Do the springs of several policies agree over the stride?"),
+    "any-stiffness": ("springs.any_stiffness.AnyStiffness", "Does a gait walk with any other stiffness?"),
+    "identify": (
+        "springs.push_identification.Identify",
+        "Do pushes find a policy's springs, and are they springs at all?",
+    ),
+    "influence": ("springs.influence.Influence", "Does stiffness change torque, the CoM's acceleration and the walk?"),
+    "learning-curves": ("walks.learning_curves.LearningCurves", "How fast was a walk learned?"),
+    "leg-tuning": ("searches.leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
+    "plan-tuning": ("searches.plan_tuning.PlanTuning", "Which plan of a walk costs least effort? (searches)"),
+    "predict": ("searches.predict.Predict", "Which walk follows from body, plan and physics alone? (searches, trains)"),
+    "leg-sets": ("searches.leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
+    "adapt": ("feet.adapt.Adapt", "How does a person walk who has adapted to a foot? (searches for minutes)"),
+    "adapt-all": (
+        "feet.adapt_all.AdaptAll",
+        "Do the searches of all adapted feet find the same again? (searches for hours)",
+    ),
+    "prosthesis": ("feet.prosthesis.Prosthesis", "What are rigid, passive and adaptive feet worth to who wears them?"),
+    "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
+    "slope-tuning": ("searches.slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
+    "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
+    "thesis": ("thesis_page.Thesis", "How do the thesis's figures and claims stand against people?"),
+}
+"""Name of each study on the command line -> its class, imported when it is asked, and its question."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `springfoot`; returns the exit code, 2 for bad input and for a package that is not installed.
+
+    `arguments` are those of the process unless given. Imports no more than the asked command needs.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return at_terminal(lambda: _run(words))
+
+
+def _run(words: list[str]) -> int:
+    try:
+        match words:
+            case ["train", *rest]:
+                from .train import train_main
+
+                return train_main(rest, "springfoot train")
+            case ["evaluate", *rest]:
+                from .evaluate import evaluate_main
+
+                return evaluate_main(rest, "springfoot evaluate")
+            case ["live", *rest]:
+                from .live import live_main
+
+                return live_main(rest)
+            case ["export", *rest]:
+                from .export import export_main
+
+                return export_main(rest, "springfoot export")
+            case ["study", *rest]:
+                return study_main(rest)
+            case [] | ["-h" | "--help"]:
+                print(HELP)
+                return 0
+            case ["--version"]:
+                print(f"springfoot {__version__}")
+                return 0
+    except KeyboardInterrupt:  # while it imports; the commands themselves end in good order
+        return 130
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA_OF:
+            raise
+        extra = "train" if words[0] == "train" else EXTRA_OF[error.name]
+        print(
+            f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
+            file=sys.stderr,
+        )
+        return 2
+    known = "there are train, evaluate, live, export and study"
+    print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
+    return 2
+
+
+def study_main(arguments: Sequence[str]) -> int:
+    """Run the study whose name comes first: 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143 SIGTERM."""
+    name, *words = arguments or ["--help"]
+    if name in ("-h", "--help"):
+        print(study_help())
+        return 0
+    if name not in STUDIES:
+        print(f"springfoot study: error: no study {name!r:.60}; there are {', '.join(STUDIES)}", file=sys.stderr)
+        return 2
+    from springfoot.command_line import end_in_order, exit_code, parse
+
+    program = f"springfoot study {name}"
+    study = parse(study_class(name), words, program)
+    study = replace(study, command=shlex.join([*program.split(), *words]))
+
+    def run() -> int:
+        end_in_order()
+        return study.run(name)
+
+    return exit_code(program, run)
+
+
+def study_class(name: str) -> "type[Study]":
+    """The class of one of `STUDIES`."""
+    module, _, found = STUDIES[name][0].rpartition(".")
+    return getattr(import_module(f"springfoot.studies.{module}"), found)
+
+
+def study_help() -> str:
+    """What there is to study."""
+    width = max(map(len, STUDIES))
+    lines = (f"  {name:<{width}}  {question}" for name, (_, question) in STUDIES.items())
+    return "\n".join(
+        [
+            "usage: springfoot study NAME [--quick] [--out FOLDER] [--page FILE] ...",
+            "",
+            *lines,
+            "",
+            "Each takes --help; with --quick it runs a minute at most, only to be seen to run.",
+        ]
+    )

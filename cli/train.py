@@ -1,0 +1,147 @@
+"""The command that trains a policy or goes on with a run: `train.py`, `springfoot train`."""
+
+import dataclasses
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from springfoot.agents.policies.policy import RUN
+from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.run_record import runs_within
+from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.errors import SpringfootError, require_count
+from springfoot.files.writing import require_new
+from springfoot.studies.base.flags import given, optional_flags
+
+PRESET = PRESETS["walk"]
+RESUMED = {"timesteps", "threads", "reward_weights"}
+"""Settings that a run may be continued with others of."""
+TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
+FOLDER = tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")
+EnvironmentFlags = optional_flags("EnvironmentFlags", BipedSettings, PRESET.environment)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainFlags:
+    """Train a policy that sets the stiffness of ankles and toes, by PPO.
+
+    The first Ctrl-C ends it in good order with a usable policy (exit code 130), the second at once; SIGTERM likewise
+    (exit code 143). Defaults shown are those of
+    the preset walk.
+    """
+
+    out: Annotated[Path | None, FOLDER] = None
+    """New folder for the run."""
+    resume: Annotated[Path | None, FOLDER] = None
+    """Folder of a run to continue, with its saved settings, by the bits of one that nothing interrupted; --timesteps
+    is then how many more, --threads may be others, and --reward-weights others from there on."""
+    seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
+    """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
+    report with the spread; each in a folder seed-N of --out."""
+    preset: Literal["walk", "any-body", "predict"] = "walk"
+    """Training that is known to work, from which the other flags differ: one body at one speed; people of
+    1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it; or one
+    body that follows its own plan, no curve of people's."""
+    training: tyro.conf.OmitArgPrefixes[TrainingFlags]  # type: ignore[valid-type]
+    """How to train."""
+    environment: tyro.conf.OmitArgPrefixes[EnvironmentFlags]  # type: ignore[valid-type]
+    """What to train on."""
+
+
+def train_main(arguments: Sequence[str] | None = None, program: str = "train.py") -> int:
+    """Run the command line; returns its exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 Ctrl-C,
+    143 SIGTERM.
+
+    `arguments` are those of the process unless given; `program` is what messages call it.
+    """
+    flags = parse(TrainFlags, arguments, program)
+    return exit_code(program, lambda: run_training(flags))
+
+
+def run_training(flags: TrainFlags) -> int:
+    """Train or continue a run, then print where the results are."""
+    settings = given(flags.training) | given(flags.environment)
+    if (flags.out is None) == (flags.resume is None):
+        raise SpringfootError("give either --out NEW_FOLDER or --resume FOLDER")
+    if flags.out is not None:
+        try:
+            require_new(flags.out)
+        except SpringfootError as error:
+            runs = [flags.out] if (flags.out / RUN).is_file() else runs_within(flags.out)
+            further = f"; to continue a run, give {_likewise('--resume', runs)}" if runs else ""
+            raise SpringfootError(f"{error}{further}") from None
+    if flags.seeds is not None:
+        if flags.resume:
+            raise SpringfootError("--seeds begins anew; continue each seed's own by --resume FOLDER/seed-N")
+        if "threads" in settings:
+            raise SpringfootError("--seeds gives each seed one thread; drop --threads")
+        require_count("seeds", flags.seeds)
+    if flags.resume and (fixed := sorted(set(settings) - RESUMED)):
+        raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
+    if flags.resume:
+        from springfoot.agents.training import (
+            training,  # not above: torch takes seconds, and bad flags need not wait for it
+        )
+
+        end_in_order()
+        folder, record = flags.resume, training.resume(flags.resume, **settings)
+    else:
+        assert flags.out is not None
+        config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
+        if flags.seeds is not None:
+            return run_seeds(config, flags.out, flags.seeds)
+        from springfoot.agents.training import training
+
+        end_in_order()
+        folder, record = flags.out, training.train(config, flags.out)
+    interrupted, best = record["status"] == "interrupted", record["best"]
+    print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
+    if best:
+        falls = f"{best['falls']} of {best['episodes']} episodes fell"
+        print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
+    print(
+        f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard;\n"
+        "learning_curve.png, gallery.png)"
+    )
+    print(f"Next:    springfoot evaluate {_word(folder)}")
+    if interrupted:
+        print(f"Or:      springfoot train --resume {_word(folder)}")
+    return stopped_by(record) if interrupted else 0
+
+
+def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
+    """Train from several seeds, then print how far they agree and where the results are."""
+    from springfoot.agents.training import multi_seed
+
+    end_in_order()
+    record = multi_seed.train_seeds(config, out, count)
+    print(f"\n{multi_seed.training_table(record)}\n")
+    files = "best.safetensors, last.safetensors, run.json, TensorBoard"
+    print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
+    print(f"Next:    springfoot study seeds {_word(out)}/seed-*")
+    folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
+    if begun := [folder for folder in folders if (folder / RUN).is_file()]:
+        print(f"Or:      {_likewise('springfoot train --resume', begun)}")
+    return {"finished": 0, "interrupted": stopped_by(record)}.get(record["status"], 1)
+
+
+def _likewise(words: str, folders: Sequence[Path]) -> str:
+    """A command of the first of some folders, and the names of the others."""
+    others = ", ".join(folder.name for folder in folders[1:])
+    return f"{words} {_word(folders[0])}" + (f", then so with {others}" if others else "")
+
+
+def _word(folder: Path) -> str:
+    """The name of a folder as a shell reads it, spaces and all."""
+    return shlex.quote(str(folder))
+
+
+def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
+    """The preset, with the values given on the command line in place of its own."""
+    settings = settings_from(**settings_to_json(preset.environment) | environment)
+    return dataclasses.replace(preset, **training, environment=settings)

@@ -1,0 +1,298 @@
+"""The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
+
+One step lasts 20 ms, or what the setting `decisions` says. The action sets the stiffness, which is held for all control
+windows of 10 ms in it; in each window the springs' equilibrium, the hips and the knees follow the phase. Row i of every
+array depends on environment i alone, by the same operations for any N: a batch of N gives the bits of N batches of one.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from ..control.decisions import DecisionTimes
+from ..control.equilibrium import foot_tables
+from ..control.foot_springs import FootSprings, draw_delay
+from ..control.leg_constants import LegConstants, SlopeConstants, slope_constants
+from ..control.legs import LegController, slope_table
+from ..control.reference_walk import rows, walks_of_legs
+from ..control.standing import WALKING, Standing, off_phase
+from ..control.subjects import Subjects
+from ..physics.contact import CONTACTS
+from ..physics.foot import Feet
+from ..physics.measurement import Measurement
+from ..physics.model import ACTIONS, JOINTS, SIDES
+from ..physics.simulation import MjData, MjModel, Simulation
+from ..physics.timing import CONTROL_WINDOW
+from ..settings.checks import real_numbers
+from ..settings.feet import feet_of
+from ..settings.settings import BipedSettings
+from ..task.ground import Ground
+from ..task.initial_state import place, random_phase, start_table, walking_posture
+from ..task.observation import SensorNoise
+from ..task.pushes import Pushes
+from ..task.reward import Task
+from .exact_state import ExactState
+from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
+from .step_result import StepResult, Tick, held_control, room
+
+
+class Biped(ExactState):
+    """N bodies in one task.
+
+    Args:
+        settings: the task, the same for all N.
+        num_envs: number N of bodies.
+        num_threads: threads of the physics; any number gives the same bits.
+        legs: V sets of leg constants in place of the committed one.
+        variant: (N,) index into `legs` of the set that each body has.
+        rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], one for each of `legs`.
+        model: a custom model, as for `Simulation`.
+        slope: constants for slopes in place of the committed ones.
+        feet: N pairs, the feet of each body in place of the settings'.
+        right_legs: V sets for the right legs, where they have their own; phase, trunk and speed are held by `legs`.
+    """
+
+    tick_dt = CONTROL_WINDOW
+    action_names = ACTIONS
+
+    def __init__(
+        self,
+        settings: BipedSettings,
+        num_envs: int,
+        num_threads: int = 1,
+        legs: Sequence[LegConstants] | None = None,
+        variant: NDArray | None = None,
+        rest: NDArray | None = None,
+        model: MjModel | None = None,
+        slope: SlopeConstants | None = None,
+        feet: Sequence[Feet] | None = None,
+        right_legs: Sequence[LegConstants] | None = None,
+    ):
+        self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
+        self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
+        self._arguments["right_legs"] = right_legs
+        self.settings, self.num_envs = settings, num_envs
+        self.dt = settings.step_seconds
+        """Time of one step [s]."""
+        self.windows_per_step = round(self.dt / CONTROL_WINDOW)
+        """Control windows in one step."""
+        self.on_tick: Callable[[Tick], None] | None = None
+        self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
+        own = next(walk for walk in self.walks if walk.speed == settings.speed)
+        self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
+        table, right = list(rows(self.walks)), list(rows(self.right_walks))
+        speeds = np.array([walk.speed for walk in self.walks])
+        self.subjects = Subjects(settings, speeds, num_envs, variant)
+        feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * num_envs
+        incline = slope_table(slope or slope_constants())
+        self._legs = LegController(table, self.subjects, right)
+        planned, stiffness = foot_tables(settings, (*table, *right))
+        rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
+        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
+        self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)
+        self._start = start_table(table)
+        starts_or_stops = settings.start == "standing" or settings.stop_at is not None
+        self._standing = Standing(settings, self.subjects) if starts_or_stops else None
+        self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction, feet)
+        self._task = Task(settings, table, self.subjects)
+        self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
+        self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
+        self._pushes = Pushes(settings, self.subjects, self._task.rows)
+        self.observation_names = self._task.names
+        self.observation_low, self.observation_high = self._task.low, self._task.high
+        self._random: list[np.random.Generator | None] = [None] * num_envs
+        self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
+        self._no_reason, self._steps = np.broadcast_to(0, num_envs), self._task.rows["steps"]
+        forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
+        self._rows = self.subjects.rows, self._task.rows, forces
+        curves = self._springs.rest, self._springs.schedule, self._legs.table, incline
+        self._tables = *(each.table for each in curves), self._springs.feet, self._task.table
+        self._physics = tuple(self._simulation.arrays)
+        self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
+        self._simulation.measure()
+
+    @property
+    def model(self) -> MjModel:
+        """The compiled model of the settings' body."""
+        return self._simulation.model
+
+    def model_of(self, index: int) -> MjModel:
+        """The compiled model of environment `index`'s body."""
+        return self._simulation.models[index]
+
+    @property
+    def measurement(self) -> Measurement:
+        """The measurement at the end of the last control window, or right after a reset."""
+        return Measurement.of(self._simulation.arrays.bodies["measured"].copy())
+
+    @property
+    def leg_phase(self) -> NDArray:
+        """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike; a copy."""
+        return self._legs.phase.copy()
+
+    @property
+    def controlled(self) -> NDArray:
+        """(N, side, 2) whether actions set the stiffness of ankle and toe; others are read as 0. A copy."""
+        return self.subjects.rows["feet"]["controlled"].astype(bool)
+
+    @property
+    def standing_mode(self) -> NDArray:
+        """(N,) as `envs.control.standing.Standing.mode`: walking, standing, starting, stopping or stopped; a copy."""
+        return np.full(self.num_envs, WALKING) if self._standing is None else self._standing.mode.copy()
+
+    def data(self, index: int) -> MjData:
+        """A copy of environment `index`'s state, to render or to inspect."""
+        return self._simulation.data(index)
+
+    def scheduled_stiffness(self) -> NDArray:
+        """(N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
+        return self._springs.scheduled(self._legs.phase)
+
+    def command(self, ids: NDArray, speed: NDArray) -> None:
+        """Change the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s], at the rate `speed_rate`."""
+        self.subjects.command(ids, speed)
+
+    def push(self, force: NDArray) -> None:
+        """Push the trunks forward by `force` (N,) [N] until the next call; `push_newton` must be 0, else it rules."""
+        self._simulation.push(real_numbers("force", force))
+
+    def reset(
+        self,
+        ids: NDArray,
+        seeds: Sequence[int | np.random.Generator | None],
+        start: float | str | None = None,
+        given: Mapping[str, NDArray] | None = None,
+    ) -> None:
+        """Begin a new episode in environments `ids`, walking in single support as people do, or standing.
+
+        Args:
+            ids: (K,) which.
+            seeds: K seeds, or generators to draw from; for None the environment goes on with its own generator.
+            start: stride phase of the left leg [0, 1), "random" or "standing", in place of the setting.
+            given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of what is set or drawn.
+
+        Raises `SpringfootError` for an impossible body, or a standing start where the settings have none.
+        """
+        if len(ids) == 0:
+            return
+        start = self.settings.start if start is None else start
+        if start == "standing" != self.settings.start:
+            raise SpringfootError(
+                f"a reset can start 'standing' where the setting start is 'standing' too, got {self.settings.start!r}"
+            )
+        phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
+        randoms: list[np.random.Generator] = []
+        for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
+            random = self._random[index]
+            if seed is not None or random is None:
+                random = self._random[index] = np.random.default_rng(seed)
+            drawn = random_phase(random)
+            phase[row] = drawn if start == "random" else off_phase(drawn) if start == "standing" else start
+            if self.settings.start_noise:
+                noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
+            self._pushes.reset(index, random)
+            randoms.append(random)
+        self._fit(self.subjects.reset(ids, randoms, given))
+        self._legs.reset(ids, phase)
+        self._ground.reset(ids, randoms, self._legs.phase)
+        self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
+        self._noise.draw(ids, randoms)
+        self._decisions.reset(ids)
+        self._steps[ids], self._task.rows["force"][ids] = 0, 0.0
+        posture = walking_posture(self._start, self.subjects, ids, phase)
+        if self._standing is not None:
+            posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing") or posture
+        place(self._simulation, self.subjects, ids, posture, noise)
+        self._simulation.measure(ids)
+
+    def _fit(self, ids: list[int]) -> None:
+        """Give environments `ids` the bodies of their subjects, and every leg its commanded speed."""
+        if ids:
+            bodies = [self.subjects.bodies[index] for index in ids]
+            self._simulation.fit(ids, bodies)
+            self._task.fit(ids)
+        self._legs.follow()
+
+    def _embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> None:
+        self._fit(self.subjects.embody(ids, height, mass))
+
+    def observe(self) -> NDArray:
+        """(N, D) float32 observation at this moment."""
+        return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
+
+    def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
+        """Apply actions (N, 4) for one step.
+
+        Environments where the mask `active` (N,) is False stay as they are; their reward is 0.
+        Raises `SpringfootError` for actions of another shape, and for NaN or infinity.
+        """
+        running, ids = self._everyone, None
+        if active is not None and not active.all():
+            running, ids = active, np.flatnonzero(active)
+        rows, physics, tables, springs = self._rows, self._physics, self._tables, self._springs
+        factor = springs.factor(self._decode(actions, running))
+        walking, fixed = running, self._nobody
+        if self._standing is not None:
+            walking, fixed = self._standing.switch(self._simulation.arrays, self._steps * self.dt, running)
+        if self.subjects.advance(self._steps, self._random, walking):
+            self._legs.follow()
+        if self.settings.push_newton:
+            self._simulation.push(self._pushes.force(self._steps, self._random, running))
+        begin_step(rows, physics, tables, springs.options, factor, walking, fixed)
+        for window in range(self.windows_per_step - 1):
+            tick = self._roll(running, walking, ids)
+            if tick is None:
+                next_window(rows, physics, tables, springs.options, window, walking)
+                self._after_window(tick)
+            else:  # whoever listens sees the control of the window that ended
+                end_window(rows, physics, window, walking)
+                self._after_window(tick)
+                begin_window(rows, physics, tables, springs.options, walking)
+        tick = self._roll(running, walking, ids)
+        observation, reward, terminated, truncated, values = outcome = room(self.num_envs)
+        ended = end_step(rows, physics, tables, self._task.options, walking, running, outcome)
+        self._after_window(tick)
+        if self.settings.sensor_noise:
+            seen = np.flatnonzero(running)
+            self._noise.draw(seen, [self._random[index] for index in seen])
+        return StepResult(
+            observation=self._noise.on(observation),
+            reward=reward,
+            terminated=terminated,
+            truncated=truncated,
+            values=values,
+            termination=self._task.reasons(self._simulation.now, terminated) if ended else self._no_reason,
+        )
+
+    def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
+        """The actions that take effect, in [-1, 1]; an environment that is not `running` keeps its last one."""
+        action = real_numbers("actions", actions)
+        if action.shape != (self.num_envs, len(ACTIONS)):
+            raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
+        taken = self._decisions.take(action, running)
+        if taken is None:
+            raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
+        return taken
+
+    def _roll(self, running: NDArray, walking: NDArray, ids: NDArray | None) -> dict[str, NDArray] | None:
+        """Run the physics of one control window; returns what a `Tick` tells of its beginning, if someone listens."""
+        if self._standing is not None:
+            standing = running & ~walking
+            self._standing.drive(self._simulation.arrays, standing)
+            self._springs.hold(self._simulation.arrays, standing)
+        if self.on_tick is None:
+            self._simulation.advance(ids)
+            return None
+        begin = {"phase": self._legs.phase.copy(), "active": running.copy()} | held_control(self._simulation.control)
+        self._simulation.advance_watched(ids)
+        return begin
+
+    def _after_window(self, tick: dict[str, NDArray] | None) -> None:
+        """Lay the ground of the next footfalls, and tell of the window if someone listens."""
+        self._ground.advance(self._simulation.now, self._legs.phase, self._random)
+        if self.on_tick is not None and tick is not None:
+            com = self._task.planned_com(self._simulation.arrays.bodies)
+            self.on_tick(Tick(measurement=self.measurement, work=self._simulation.work, com_reference=com, **tick))

@@ -1,0 +1,107 @@
+"""The exact state of a batch, plain arrays and JSON values: to go on later, elsewhere or twice, with the same bits."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+
+class ExactState(ABC):
+    """Gives and takes the state of N environments; pickle and deepcopy make the batch anew and stand on the two.
+
+    A copy has the arguments and the state of the original, and generators of its own; nobody listens to its ticks.
+    """
+
+    _arguments: dict[str, Any]
+    """What the batch was made from."""
+    _kept: Mapping[str, NDArray]
+    """All that changes, by name: arrays with N rows, of numbers or of records."""
+    _random: list[np.random.Generator | None]
+    """(N,) the generator of each environment."""
+
+    @abstractmethod
+    def _embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> None:
+        """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]."""
+
+    @property
+    def generators(self) -> list[np.random.Generator | None]:
+        """The generator of each environment, None before its first reset; the list itself, to be changed in place."""
+        return self._random
+
+    def state(self, ids: NDArray | None = None) -> dict[str, Any]:
+        """The exact state of environments `ids` (K,), of all if None, between two steps.
+
+        Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values.
+        """
+        chosen = np.arange(len(self._random)) if ids is None else ids
+        generators = [None if each is None else each.bit_generator.state for each in self._random]
+        state: dict[str, Any] = {name: values[chosen] for name, values in self._numbers()}
+        return state | {"generators": [generators[index] for index in chosen.tolist()]}
+
+    def restore(self, state: Mapping[str, Any], ids: NDArray | None = None) -> None:
+        """Put environments `ids` (K,), all if None, into the state of K environments of a batch of the same settings.
+
+        What they then do has the bits of what those go on to do. Generators are set in place.
+        Raises `SpringfootError`, leaving all state unchanged, for a state of other names, shapes or generators; it
+        holds no settings, and they are not compared.
+        """
+        chosen = np.arange(len(self._random)) if ids is None else ids
+        numbers = dict(self._numbers())
+        expected = {name: (len(chosen), *values.shape[1:]) for name, values in numbers.items()}
+        for name in {*expected, "generators"} ^ set(state):
+            raise SpringfootError(f"the state does not fit these settings: {name!r} is in one of them only")
+        for name, shape in expected.items():
+            if np.shape(state[name]) != shape:
+                raise SpringfootError(f"the state does not fit: {name!r} must be {shape}, got {np.shape(state[name])}")
+        if len(state["generators"]) != len(chosen):
+            raise SpringfootError(f"the state does not fit: {len(chosen)} generators, got {len(state['generators'])}")
+        try:
+            given = {name: np.asarray(state[name]).astype(values.dtype) for name, values in numbers.items()}
+            for own in state["generators"]:
+                _generator(None, own)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise SpringfootError(f"the state does not fit: {' '.join(str(error).split())}") from None
+        self._embody(chosen, given["control.subject.height"], given["control.subject.mass"])
+        for name, values in numbers.items():
+            values[chosen] = given[name]
+        for index, own in zip(chosen.tolist(), state["generators"], strict=True):
+            self._random[index] = _generator(self._random[index], own)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made_anew, (type(self), self._arguments, self.state())
+
+    def _numbers(self) -> Iterator[tuple[str, NDArray]]:
+        """Names and views of all numbers that change."""
+        for name, rows in self._kept.items():
+            yield from _fields(name, rows)
+
+
+def _fields(name: str, rows: NDArray) -> Iterator[tuple[str, NDArray]]:
+    """The numbers in an array of records, to the last level; `name` leads to them."""
+    if rows.dtype.names is None:
+        yield name, rows
+    for field in rows.dtype.names or ():
+        yield from _fields(f"{name}.{field}", rows[field])
+
+
+def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
+    """A generator in this state: the present one if it is of that kind, else a new one."""
+    if state is None:
+        return None
+    kind = getattr(np.random, state["bit_generator"])
+    if not (isinstance(kind, type) and issubclass(kind, np.random.BitGenerator)):
+        raise ValueError(f"{state['bit_generator']} is no bit generator of NumPy's")
+    if present is None or type(present.bit_generator) is not kind:
+        present = np.random.Generator(kind())
+    present.bit_generator.state = dict(state)
+    return present
+
+
+def _made_anew(kind: type[ExactState], arguments: dict[str, Any], state: dict[str, Any]) -> ExactState:
+    made = kind(**arguments)
+    made.restore(state)
+    return made

@@ -1,0 +1,158 @@
+"""What one step of the batch returns, and what an evaluation records of each of its control windows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+
+from ..physics.energy import WindowWork
+from ..physics.kernel import part
+from ..physics.measurement import Measurement
+from ..physics.model import ACTIONS, ANKLE, SIDES
+from ..task.episode_end import TERMINATIONS
+from ..task.observation_entries import OBSERVATION
+from ..task.reward import TERMS
+
+REPORT = np.dtype(
+    [
+        ("stiffness", float, (len(SIDES), 2)),
+        ("torque", float, (len(SIDES), 2)),
+        ("equilibrium", float, (len(SIDES), 2)),
+        ("work_stiffness", float, (len(SIDES), 2)),
+        ("work_equilibrium", float, (len(SIDES), 2)),
+        ("controlled", float, (len(SIDES), 2)),
+        ("reward", float, len(TERMS)),
+        ("phase", float, len(SIDES)),
+        ("time", float),
+        ("speed", float),
+    ]
+)
+"""The numbers reported of one body's step besides observation and reward, as `INFO` names and explains them."""
+INFO = (
+    *(
+        f"{name}/{action}"
+        for name in ("stiffness", "torque", "equilibrium", "work/stiffness", "work/equilibrium", "controlled")
+        for action in ACTIONS
+    ),
+    *(f"reward/{term}" for term in TERMS),
+    *(f"phase/{side}" for side in SIDES),
+    "time",
+    "speed",
+)
+"""The names of the numbers of `REPORT`, in order.
+
+Of each action: `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/`
+and `work/equilibrium/` [J] of the step; `controlled/`, 1 where the action counts and 0 where it is read as 0. Of each
+reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1). `time` [s], `speed` [m/s].
+"""
+
+
+@part
+def report(rows, controls, bodies, terms, options, values) -> None:
+    """Fill `StepResult.values` of one step.
+
+    Args:
+        rows: (N,) of `TASK_ROW`; `steps` count this one.
+        controls: (N,) of `CONTROL_ROW`.
+        bodies: (N,) of `BODY_ROW`, as measured at the step's end.
+        terms: (N, len(TERMS)) reward terms, unweighted [-].
+        options: (1,) of `TASK_OPTIONS`.
+        values: (N, len(INFO)).
+    """
+    reports = values.view(REPORT)
+    for i in range(len(rows)):
+        row, springs, feet, m = reports[i, 0], controls[i].springs, controls[i].feet, bodies[i].measured
+        row.time, row.speed = options[0].seconds * rows[i].steps, m.com_velocity[0]
+        for term in range(terms.shape[1]):
+            row.reward[term] = terms[i, term]
+        for side in range(2):
+            row.phase[side] = controls[i].legs.phase[side]
+            for joint in range(2):
+                muscles = springs.acts[side, joint] * springs.stiffness[side, joint]
+                row.stiffness[side, joint] = muscles + springs.device[side, joint]
+                row.torque[side, joint] = m.torque[side, ANKLE + joint]
+                row.equilibrium[side, joint] = springs.equilibrium[side, joint]
+                row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]
+                row.work_equilibrium[side, joint] = springs.work_equilibrium[side, joint]
+                row.controlled[side, joint] = feet.controlled[side, joint]
+
+
+@dataclass(kw_only=True, eq=False)
+class StepResult:
+    """What one step returns; every array has N rows."""
+
+    observation: NDArray
+    """(N, D) float32."""
+    reward: NDArray
+    """(N,)."""
+    terminated: NDArray
+    """(N,) fallen or diverged."""
+    truncated: NDArray
+    """(N,) out of time."""
+    values: NDArray
+    """(N, len(INFO)) in the order of `INFO`."""
+    termination: NDArray
+    """(N,) int, why the episode was terminated, a code of `TERMINATIONS`, 0 where it was not; do not write to it."""
+
+    @property
+    def info(self) -> dict[str, NDArray]:
+        """Name -> (N,): `values` by their names in `INFO`, and `termination`."""
+        return dict(zip(INFO, self.values.T, strict=True)) | {"termination": self.termination}
+
+    @property
+    def reasons(self) -> NDArray:
+        """(N,) `termination` in words."""
+        return np.array(TERMINATIONS)[self.termination]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tick:
+    """One control window as an evaluation records it; arrays over N, axes as in `Measurement`."""
+
+    measurement: Measurement
+    phase: NDArray
+    """(N, side) stride phase of each leg at the window's start."""
+    stiffness: NDArray
+    """(N, side, joint) K held in the window [N m/rad]."""
+    equilibrium: NDArray
+    """(N, side, joint) rest angle theta_eq held in the window, feed-forward torque included as torque / K [rad]."""
+    work: WindowWork
+    """Torque, work and energy over the window's physics steps."""
+    com_reference: NDArray
+    """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
+    active: NDArray
+    """(N,) True for the environments that ran in this window."""
+
+
+def held_control(control: NDArray) -> dict[str, NDArray]:
+    """What a `Tick` tells of `control` (N, side, joint, 2), of K and K theta_eq; theta_eq is 0 where there is no K."""
+    stiffness, drive = np.moveaxis(control, -1, 0)
+    rest = np.divide(drive, stiffness, out=np.zeros_like(drive), where=stiffness > 0.0)
+    return {"stiffness": stiffness.copy(), "equilibrium": rest}
+
+
+def room(num: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Room for what a step of `num` environments returns: observation, reward, terminated, truncated, values."""
+    return (
+        np.empty((num, len(OBSERVATION)), np.float32),
+        np.empty(num),
+        np.empty(num, bool),
+        np.empty(num, bool),
+        np.empty((num, len(INFO))),
+    )
+
+
+def report_start(m: Measurement, leg_phase: NDArray, controlled: NDArray) -> NDArray:
+    """`StepResult.values` before an episode's first step: what is `controlled`, the phases and the speed, all else 0,
+    as nothing acts yet.
+
+    Args:
+        m: the measurement right after the reset.
+        leg_phase: (N, side) stride phase of each leg [0, 1).
+        controlled: (N, side, 2) whether actions set the stiffness of ankle and toe.
+    """
+    values = np.zeros((len(leg_phase), len(INFO)))
+    rows = values.view(REPORT)[:, 0]
+    rows["phase"], rows["speed"], rows["controlled"] = leg_phase, m.com_velocity[:, 0], controlled
+    return values

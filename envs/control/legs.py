@@ -1,0 +1,232 @@
+"""The phase of the gait, and the hips and knees, which no action sets.
+
+Each hip and knee is a spring like the ankle (variable impedance) around people's curves at the walking speed, with
+people's moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The
+constants of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by
+`springfoot study slope-tuning` (command and seed stand in that file).
+Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
+"""
+
+from collections.abc import Sequence
+from math import radians, sqrt
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import GRAVITY, REFERENCE_MASS
+
+from ..physics.kernel import kernel, part
+from ..physics.measurement import plant_of
+from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
+from ..physics.timing import CONTROL_WINDOW
+from .leg_constants import LegConstants, SlopeConstants
+from .phase_table import GRID, PhaseTable, leg_phases, read
+from .reference_walk import ReferenceWalk
+from .state import GAINS, PLACE
+from .subjects import Subjects
+
+KNOTS = np.arange(10) / 10
+"""Stride phases of the knots of the corrections to people's curves, which are periodic cubic splines."""
+STANCE_FALL = (0.5, 0.6)
+"""Stride phases over which the trunk torque of a leg falls to zero as its stance ends; chosen, about double support."""
+TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
+"""Vertical force of a foot that counts as touchdown [body weights]; chosen: 30 N at 63 kg, as of force plates."""
+TOUCHDOWN_PHASE = 0.80
+"""A touchdown before this stride phase of the leg is a scuff, not a step; chosen."""
+SLOWEST = -0.1
+"""Error of the speed below which gains see no more of it [m/s]; chosen: a body that sets off, or that its springs keep
+slow, is far slower than the plan for many steps, and with all of its error the legs would trip it."""
+FARTHEST = 0.1
+"""Error of the CoM's place over the stance foot beyond which gains see no more of it [m at 1.70 m]; chosen, as
+`SLOWEST`."""
+PLANNED_SPEED, PLANNED_PLACE = 5, 6
+"""Columns of `leg_curves`."""
+HOLD = 0.001
+"""A leg's phase waits at 1 minus this until its foot touches down; chosen, small against a window's 0.009."""
+
+
+def knot_curve(knots_deg: Sequence[float]) -> NDArray:
+    """A tuned correction [rad] on `GRID`: the periodic cubic spline through `KNOTS`."""
+    return np.deg2rad(CubicSpline(np.append(KNOTS, 1.0), [*knots_deg, knots_deg[0]], bc_type="periodic")(GRID))
+
+
+def slope_table(constants: SlopeConstants) -> PhaseTable:
+    """What a slope adds to hip, knee, ankle and held trunk pitch over the stride, per radian of slope: (SAMPLES, 4)."""
+    cosine, sine = np.cos(2 * np.pi * GRID), np.sin(2 * np.pi * GRID)
+    joints = [a + b * cosine + c * sine for a, b, c in (constants.hip, constants.knee, constants.ankle)]
+    return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
+
+
+@part
+def _between(low, high, weight):
+    """The number, or array, at `weight` in [0, 1] of the way from `low` to `high`."""
+    return low + weight * (high - low)
+
+
+@kernel
+def _follow(constants, rows):
+    """Scale the constants of the tables' rows, (R,) of `GAINS`, to the bodies of `rows`, (N,) of `CONTROL_ROW`."""
+    for i in range(len(rows)):
+        subject, gain = rows[i].subject, rows[i].legs.gains
+        row, weight, scale = subject.place.row, subject.place.weight, subject.scale
+        low, high = constants[row], constants[row + 1 if weight > 0.0 else row]
+        gain.touchdown = scale.mass * _between(low.touchdown, high.touchdown, weight)
+        gain.rate = _between(low.rate, high.rate, weight) / scale.time
+        gain.rate_gain = _between(low.rate_gain, high.rate_gain, weight) / scale.time
+        gain.pitch = _between(low.pitch, high.pitch, weight)
+        gain.trunk_stiffness = scale.torque * _between(low.trunk_stiffness, high.trunk_stiffness, weight)
+        gain.trunk_damping = scale.torque * scale.time * _between(low.trunk_damping, high.trunk_damping, weight)
+        gain.speed_torque = scale.torque / scale.time * _between(low.speed_torque, high.speed_torque, weight)
+        gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / scale.time
+        gain.place_gain = _between(low.place_gain, high.place_gain, weight) / scale.length
+        gain.farthest = scale.length * _between(low.farthest, high.farthest, weight)
+
+
+@part
+def _too_fast(m, row):
+    """Error of the CoM's forward speed against the plan [m/s], as the gains see it."""
+    return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
+
+
+@part
+def drive(rows, bodies, state, table, incline) -> None:
+    """Begin a control window: stiffness [N m/rad] and drive torque [N m] of hips and knees go into the control.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        state: (N, numbers) MuJoCo's, whose `control` is filled.
+        table: (R, SAMPLES, 2, 7) of `leg_curves`, of a `PhaseTable`.
+        incline: (1, SAMPLES, 2, 4) of `slope_table`.
+    """
+    curves, inclined, level = np.empty((2, table.shape[-1])), np.empty(4), np.zeros(1, PLACE)[0]
+    for i in range(len(rows)):
+        subject, legs, m, control = rows[i].subject, rows[i].legs, bodies[i].measured, plant_of(state, i).control
+        gain, torque = legs.gains, subject.scale.torque
+        for side in range(2):
+            read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
+        legs.planned_speed = curves[LEFT, PLANNED_SPEED]
+        too_fast = _too_fast(m, rows[i])
+        trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
+        on_trunk = trunk + gain.speed_torque * too_fast
+        for side in range(2):
+            stance, hip, knee = curves[side, 0], torque * curves[side, 1], torque * curves[side, 2]
+            ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
+            aim = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
+            own = stance * on_trunk + (1.0 - stance) * hip * aim
+            control[side, HIP, 0], control[side, HIP, 1] = hip, torque * curves[side, 3] + own
+            control[side, KNEE, 0], control[side, KNEE, 1] = knee, torque * curves[side, 4]
+            if subject.slope != 0.0:  # moves the targets of hips, knees and trunk
+                read(incline, level, legs.phase[side], inclined)
+                lean = stance * gain.trunk_stiffness * inclined[3]
+                control[side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
+                control[side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
+
+
+@part
+def _load(force):
+    """Vertical force [N] on a foot whose contacts carry `force` (3, 2), forward and up."""
+    return force[0, 1] + force[1, 1] + force[2, 1]
+
+
+@part
+def advance(rows, bodies, walking) -> None:
+    """Let one window pass.
+
+    The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`; the phase of the legs is changed.
+        bodies: (N,) of `BODY_ROW`, as measured at the window's end.
+        walking: (N,) bool; the phase of the others waits.
+    """
+    for i in range(len(rows)):
+        if not walking[i]:
+            continue
+        legs, m = rows[i].legs, bodies[i].measured
+        gain, left = legs.gains, legs.phase[LEFT]
+        rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(m, rows[i]))
+        waiting = (0.5 if left < 0.5 else 1.0) - HOLD
+        left = min(left + max(rate, 0.0), max(waiting, left))
+        right = (left + 0.5) % 1.0
+        if left > TOUCHDOWN_PHASE and _load(m.force[LEFT]) > gain.touchdown:
+            left = 0.0
+        elif right > TOUCHDOWN_PHASE and _load(m.force[RIGHT]) > gain.touchdown:
+            left = 0.5
+        legs.phase[LEFT], legs.phase[RIGHT] = left, (left + 0.5) % 1.0
+
+
+class LegController:
+    """Phase and hip-knee controller of N bodies.
+
+    Args:
+        rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
+        subjects: bodies and commanded speeds.
+        right: the same for a right leg of its own; phase, trunk and speed are held by the constants of `rows`.
+    """
+
+    def __init__(
+        self,
+        rows: Sequence[tuple[LegConstants, ReferenceWalk]],
+        subjects: Subjects,
+        right: Sequence[tuple[LegConstants, ReferenceWalk]] = (),
+    ):
+        self._subjects = subjects
+        self._constants = np.array([_gains(c, walk) for c, walk in rows], GAINS)
+        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in (*rows, *right)]))
+        subjects.rows["legs"]["right"] = len(rows) if right else 0
+        self.phase = subjects.rows["legs"]["phase"]
+        """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
+        self.phase[:] = leg_phases(np.zeros(len(self.phase)))
+        self.follow()
+
+    def follow(self) -> None:
+        """Take over the present bodies and commanded speeds of the subjects."""
+        _follow(self._constants, self._subjects.rows)
+
+    def reset(self, ids: NDArray, left_phase: NDArray) -> None:
+        """Put the left legs of bodies `ids` (K,) at the stride phases `left_phase` (K,)."""
+        self.phase[ids] = leg_phases(left_phase)
+
+
+def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
+    body, stride_time = walk.body, walk.plan.stride_time
+    scale, time_scale = body.stiffness_scale, sqrt(body.length_scale)
+    return (
+        TOUCHDOWN_LOAD * body.total_mass * GRAVITY,
+        CONTROL_WINDOW / (c.period_factor * stride_time),
+        c.period_speed_gain / time_scale,
+        radians(c.trunk_pitch_deg) + body.trunk_lean + walk.plan.lean,
+        c.trunk_stiffness * scale,
+        c.trunk_damping * scale * time_scale,
+        c.speed_torque * scale / time_scale,
+        c.swing_speed_gain / time_scale,
+        c.swing_place_gain / body.length_scale,
+        FARTHEST * body.length_scale,
+    )
+
+
+def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
+    """(SAMPLES, 7) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], the planned CoM's
+    forward speed over its mean, and how far it is ahead of the other leg's ankle [m]."""
+    body, human = walk.body, walk.human
+    fall_from, fall_to = STANCE_FALL
+    stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
+    beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
+    columns = [stance]
+    drives = []
+    for joint, name, knots, (in_stance, in_swing) in (
+        (HIP, "thigh", constants.hip_knots_deg, constants.hip_stiffness),
+        (KNEE, "knee", constants.knee_knots_deg, constants.knee_stiffness),
+    ):
+        stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
+        target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
+        if joint == HIP:
+            target = target + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
+        feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
+        columns.append(stiffness)
+        drives.append(stiffness * target + feed)
+    planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
+    planned_place = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
+    return np.stack([*columns, *drives, planned_speed, planned_place], axis=-1)

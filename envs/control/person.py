@@ -1,0 +1,89 @@
+"""The leg constants of each side: the committed ones, or those of a person who has adapted to a foot of the settings.
+
+An adapted person differs from the committed constants by what was found at one speed or more: that difference is linear
+between those speeds and the same beyond them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+
+from springfoot.errors import SpringfootError
+
+from ..settings.adapted import ADAPTED, LEGS, committed_feet
+from ..settings.feet import FOOT_SETTINGS
+from ..settings.settings import BipedSettings, plan_file_of
+from .leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
+
+HELD_BY_SOUND = (
+    *("period_factor", "period_speed_gain", "trunk_pitch_deg", "trunk_stiffness", "trunk_damping", "speed_torque"),
+    *("swing_speed_gain", "swing_place_gain"),
+)
+"""Constants of phase, trunk and speed, which both legs share: the sound leg's."""
+_LEAST = dict.fromkeys(("hip_stiffness", "knee_stiffness", "ankle_schedule", "toe_schedule"), 1.0)
+
+
+def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
+    """Side of the foot to which the person has adapted, and its `adapted`; None for a person who has not.
+
+    Raises `SpringfootError` where both feet have it, and for settings other than those the legs were found in.
+    """
+    found = [
+        (side, foot[ADAPTED])
+        for side, name in enumerate(FOOT_SETTINGS)
+        if isinstance(foot := getattr(settings, name), Mapping) and ADAPTED in foot
+    ]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise SpringfootError("left_foot and right_foot: a person adapts to one foot, the other one sound; got both")
+    asked = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.guide
+    if (kind := constants_name(*asked)) != "planned":
+        raise SpringfootError(f"{FOOT_SETTINGS[found[0][0]]}: adapted legs are of 'planned' constants, got {kind!r}")
+    return found[0]
+
+
+def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
+    """The constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
+    asked = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.guide
+    tuned = leg_constants(*asked, plan_file_of(settings))
+    adapted = adapted_foot(settings)
+    if adapted is None:
+        return tuned
+    of_side, given = adapted
+    sets = committed_feet()[given][ADAPTED] if isinstance(given, str) else given
+    leg = LEGS[side == of_side]
+    return _moved(tuned, {float(at): _checked(legs) for at, legs in sets.items()}, leg, speed)
+
+
+def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
+    try:
+        return {leg: constants_from(dict(legs[leg])) for leg in LEGS}
+    except TypeError:
+        names = ", ".join(item.name for item in fields(LegConstants))
+        raise SpringfootError(f"adapted: each leg must have the constants {names}") from None
+
+
+def _moved(
+    tuned: LegConstants, sets: Mapping[float, Mapping[str, LegConstants]], leg: str, speed: float
+) -> LegConstants:
+    """The constants `tuned` at `speed`, moved by how far the adapted ones are from those tuned at their speeds."""
+    speeds = sorted(sets)
+    if speed in sets:
+        own = asdict(sets[speed][leg])
+        return constants_from(own | {name: getattr(sets[speed][LEGS[0]], name) for name in HELD_BY_SOUND})
+    values = {}
+    for name, here in asdict(tuned).items():
+        source = LEGS[0] if name in HELD_BY_SOUND else leg
+        away = [
+            np.subtract(getattr(sets[at][source], name), getattr(leg_constants("planned", "people", at), name))
+            for at in speeds
+        ]
+        place = float(np.interp(speed, speeds, np.arange(len(speeds))))
+        low = int(place)
+        high = min(low + 1, len(speeds) - 1)
+        moved = np.maximum(here + away[low] + (place - low) * (away[high] - away[low]), _LEAST.get(name, -np.inf))
+        values[name] = moved.tolist()
+    return constants_from(values)

@@ -1,0 +1,101 @@
+"""What both Gymnasium faces share: spaces, spec, options of a reset, pictures, and what is pickled."""
+
+from collections.abc import Mapping
+from copy import copy
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, quoted
+
+from .batch.biped_batch import Biped
+from .control.subjects import DRAWN
+from .physics.rendering import RENDER_MODES, Camera
+from .physics.timing import ACTION_STEP
+from .settings.checks import check_start, real_numbers
+from .settings.settings import BipedSettings
+
+METADATA: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": round(1 / ACTION_STEP)}
+
+
+class Face:
+    """A batch behind one of Gymnasium's interfaces: its spec, its camera, and what is pickled of it."""
+
+    settings: BipedSettings
+    biped: Biped
+    render_mode: str | None
+    metadata: dict[str, Any]
+    _spec: EnvSpec | None = None
+    _camera: Camera | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gym.make` or `make_vec` made this of; its `max_episode_steps` are those of the settings."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copy(spec)
+        if self._spec is not None:
+            self._spec.max_episode_steps = self.settings.max_episode_steps
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the camera: a copy opens its own when it is asked for a picture."""
+        return self.__dict__ | {"_camera": None}
+
+    def _camera_for(self) -> Camera:
+        """The camera, opened at its first use; raises `SpringfootError` without a render mode, or without OpenGL."""
+        if self.render_mode is None:
+            modes = " or ".join(map(repr, RENDER_MODES))
+            raise SpringfootError(f"make the environment with render_mode {modes} to render")
+        self._camera = self._camera or Camera(self.biped.model, self.render_mode, self.metadata["render_fps"])
+        return self._camera
+
+    def _close_camera(self) -> None:
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+
+def spaces_of(biped: Biped) -> tuple[Box, Box]:
+    """Observation and action space of one environment."""
+    low, high = biped.observation_low, biped.observation_high
+    return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
+
+
+def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The options of a reset; raises `SpringfootError` for an unknown one or a bad start."""
+    options, allowed = {} if options is None else options, ("start", *DRAWN, *more)
+    if not isinstance(options, Mapping):
+        raise SpringfootError(f"reset options must be a dictionary, got {quoted(options)}")
+    for name in options:
+        if name not in allowed:
+            raise SpringfootError(f"unknown reset option {quoted(name)}; valid: {', '.join(allowed)}")
+    if "start" in options:
+        check_start(options["start"])
+    return options
+
+
+def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
+    """Bodies and speeds that the options of a reset set in N environments: (N,) by the names of `DRAWN`."""
+    given = {}
+    for name in DRAWN:
+        if name in options:
+            try:
+                given[name] = np.broadcast_to(real_numbers(name, options[name]), (num,))
+            except ValueError:
+                raise SpringfootError(
+                    f"reset option {name!r} must be a number, or one for each of {num} environments, "
+                    f"got {quoted(options[name])}"
+                ) from None
+    return given
+
+
+def check_render_mode(mode: str | None) -> str | None:
+    """The render mode; raises `SpringfootError` for an unknown one."""
+    if mode is not None and not (isinstance(mode, str) and mode in RENDER_MODES):
+        raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {quoted(mode)}")
+    return mode

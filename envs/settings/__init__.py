@@ -1,0 +1,1 @@
+"""The settings of the walking task, and the feet that they name."""

@@ -1,0 +1,83 @@
+"""People who have adapted to a foot: the leg constants that go with it, as `adapted` in the foot's dictionary.
+
+A committed one is named; one of your own is a dictionary: the speed for which it was found [m/s at 1.70 m] as text ->
+`sound` and `other`, the `LegConstants` of the leg with the sound foot and of the leg with this one, in JSON form.
+`springfoot study adapt` finds both. Trunk, speed and period are held by the constants of `sound`.
+"""
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from springfoot.errors import SpringfootError, as_float, quoted, require_within
+from springfoot.gait.plan.plan import PLAN_SPEED_RANGE
+
+ADAPTED = "adapted"
+"""Key of a foot's dictionary."""
+LEGS = ("sound", "other")
+"""The leg with the sound foot, and that with the foot to which the person has adapted."""
+
+
+def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[str, dict[str, Any]]]:
+    """`adapted` of a foot of a kind in its plain form; raises `SpringfootError` for what is none.
+
+    Who is named has adapted to a foot of that kind; its numbers may be others.
+    """
+    if isinstance(value, str):
+        if value not in (known := committed_feet()):
+            raise SpringfootError(f"{name}: adapted must be one of {', '.join(map(repr, known))}, got {quoted(value)}")
+        if (its := known[value]["kind"]) != kind:
+            raise SpringfootError(f"{name}: adapted {value!r} is a person on a foot of kind {its!r}, got kind {kind!r}")
+        return value
+    if not isinstance(value, Mapping) or not value:
+        raise SpringfootError(
+            f"{name}: adapted must be a name or a dictionary of speed -> {' and '.join(LEGS)}, got {quoted(value)}"
+        )
+    plain = {}
+    for speed, legs in value.items():
+        at = as_float(speed) if not isinstance(speed, str) else _number(speed)
+        require_within(f"{name}: adapted: speed", at, PLAN_SPEED_RANGE, "m/s")
+        if not isinstance(legs, Mapping) or set(legs) != set(LEGS) or not all(map(_is_set, legs.values())):
+            raise SpringfootError(f"{name}: adapted at {at:g} m/s must be {' and '.join(LEGS)}, leg constants both")
+        plain[f"{at:g}"] = {leg: _plain(legs[leg]) for leg in LEGS}
+    return plain
+
+
+def committed_feet() -> dict[str, dict[str, Any]]:
+    """Name -> the committed foot, a setting with its `adapted` people."""
+    return _file()["feet"]
+
+
+def without_person(foot: Mapping[str, Any]) -> dict[str, Any]:
+    """A foot's dictionary without its `adapted`."""
+    return {key: value for key, value in foot.items() if key != ADAPTED}
+
+
+@cache
+def _file() -> dict[str, Any]:
+    file = resources.files("springfoot.envs.control").joinpath("adapted.json")
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def _is_set(values: Any) -> bool:
+    return isinstance(values, Mapping) and all(
+        abs(as_float(each)) < 1e6
+        for value in values.values()
+        for each in (value if isinstance(value, (list, tuple)) else (value,))
+    )
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: [float(each) for each in value] if isinstance(value, (list, tuple)) else float(value)
+        for key, value in values.items()
+    }

@@ -1,0 +1,188 @@
+"""Checks that more than one setting needs; each raises `SpringfootError`, naming the setting and what is allowed."""
+
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from dataclasses import fields
+from difflib import get_close_matches
+from functools import wraps
+from math import isfinite
+from numbers import Real
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, as_float, quoted, require_count, require_number
+from springfoot.gait.people.human import harmonics
+from springfoot.gait.plan.walk_style import styles_of
+from springfoot.gait.springs.stiffness import STIFFNESS_RANGE
+
+from ..physics.timing import CONTROL_WINDOW
+
+Settings = TypeVar("Settings")
+
+STIFFNESS_BOUNDS = (1e-3, STIFFNESS_RANGE[1])
+"""Softest and stiffest spring of an action [N m/rad]; chosen: beyond, products of stiffnesses leave the numbers."""
+MOST_WEIGHT = 1e6
+"""Largest magnitude of a reward's weight [-]; chosen."""
+LONGEST_EPISODE = 1e9
+"""Longest episode [s]; chosen, 30 years."""
+MOST_PUSH = 1e5
+"""Hardest push [N]; chosen."""
+SHORTEST_PUSH_INTERVAL = 0.01
+"""Shortest time for one push [s]: a control window, in which the force is held."""
+_NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}  # NumPy's kinds
+MOST_ENVIRONMENTS = 1_000_000
+"""Largest batch; chosen."""
+CONSTRUCTOR_ARGUMENTS = ("render_mode", "num_envs", "num_threads", "autoreset_mode")
+"""Of the environments, beside the settings: what a misspelled name may have meant."""
+
+
+class UnknownSettingError(SpringfootError, TypeError):
+    """A setting that does not exist; also the `TypeError` that Python raises for an unknown keyword argument."""
+
+
+def check_people_file(name: object) -> None:
+    """Refuse what is no file of people's data."""
+    if name is not None:
+        if not isinstance(name, str):
+            raise SpringfootError(f"people_file must be the name of a file, got {quoted(name)}")
+        harmonics(Path(name))
+
+
+def check_guide(guide: str, human: object, plan_file: object) -> None:
+    """Refuse somebody's walk where the plan is the guide, and a file of plans where it is not."""
+    if guide == "plan" and human is not None:
+        raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
+    if plan_file is not None:
+        if not isinstance(plan_file, str):
+            raise SpringfootError(f"plan_file must be the name of a file, got {quoted(plan_file)}")
+        if guide != "plan":
+            raise SpringfootError(f"plan_file needs guide 'plan', got {guide!r}")
+        styles_of(Path(plan_file))  # raises for another kind of file
+
+
+def check_names(given: Iterable[str], names: Sequence[str]) -> None:
+    """Refuse what is none of `names`, the settings, as Python refuses an unknown keyword argument."""
+    for name in given:
+        if name not in names:
+            likely = get_close_matches(name, [*names, *CONSTRUCTOR_ARGUMENTS], n=3, cutoff=0.5)
+            which = f"likely: {', '.join(likely)}" if likely else f"valid: {', '.join(names)}"
+            raise UnknownSettingError(f"got an unexpected keyword argument {name!r}, which is no setting; {which}")
+
+
+def refusing_unknown(settings: type[Settings]) -> type[Settings]:
+    """A dataclass of settings, made to refuse what is none of its fields as `check_names` does."""
+    made, names = settings.__init__, [item.name for item in fields(settings)]  # type: ignore[arg-type]
+
+    @wraps(made)
+    def checked(self: Any, *given: Any, **named: Any) -> None:
+        check_names(named, names)
+        made(self, *given, **named)
+
+    settings.__init__ = checked
+    return settings
+
+
+def check_start(start: Any) -> None:
+    """Refuse what is neither "random" nor "standing" nor a stride phase in [0, 1)."""
+    known = start in ("random", "standing") if isinstance(start, str) else is_number(start) and 0 <= start < 1
+    if not known:
+        raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {quoted(start)}")
+
+
+def check_seed(seed: Any) -> int | None:
+    """A seed as a whole number, or None; refuse all else."""
+    return None if seed is None else require_count("seed", seed, 0, 2**63 - 1)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number."""
+    return isfinite(as_float(value))
+
+
+def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
+    """Refuse a value that is none of `choices`."""
+    if not isinstance(value, str) or value not in choices:
+        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {quoted(value)}")
+
+
+def check_range(name: str, value: Any, unit: str) -> None:
+    """Refuse what is not a pair 0 < low < high."""
+    numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
+    if not numbers or not 0 < value[0] < value[1]:
+        raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {quoted(value)}")
+
+
+def check_bounds(settings: Any) -> None:
+    """Refuse settings, each possible by itself, beyond which an observation or a reward might be no finite number."""
+    low, high = STIFFNESS_BOUNDS
+    for name in ("ankle_stiffness_range", "toe_stiffness_range"):
+        softest, stiffest = getattr(settings, name)
+        if softest < low or stiffest > high:
+            raise SpringfootError(
+                f"{name} must be within [{low:g}, {high:g}] N m/rad, got {quoted((softest, stiffest))}"
+            )
+    require_number("episode_seconds", settings.episode_seconds, 0.0, LONGEST_EPISODE, "s")
+    require_number("push_newton", settings.push_newton, 0.0, MOST_PUSH, "N")
+    require_number("push_interval", settings.push_interval, SHORTEST_PUSH_INTERVAL, unit="s")
+    for name, weight in settings.reward_weights.items():
+        require_number(f"reward_weights[{name!r}]", weight, -MOST_WEIGHT, MOST_WEIGHT)
+
+
+def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -> None:
+    """Refuse what is neither None nor a pair low < high within `allowed`."""
+    numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
+    if value is not None and not (numbers and allowed[0] <= value[0] < value[1] <= allowed[1]):
+        raise SpringfootError(
+            f"{name} must be (low, high) with low < high in [{allowed[0]:g}, {allowed[1]:g}] {unit}, "
+            f"got {quoted(value)}"
+        )
+
+
+def check_windows(name: str, delay: float | tuple[float, ...] | None) -> None:
+    """Refuse a delay, or ends of a range of delays [s], that is not whole control windows."""
+    ends = delay if isinstance(delay, tuple) else () if delay is None else (delay,)
+    if any(abs(end / CONTROL_WINDOW - round(end / CONTROL_WINDOW)) > 1e-9 for end in ends):
+        raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {delay!r}")
+
+
+def check_weights(weights: Any, defaults: dict[str, float]) -> None:
+    """Refuse unknown reward terms, and weights whose sign is not that of the term's in `defaults` (0: a cost)."""
+    if not isinstance(weights, dict):
+        raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {quoted(weights)}")
+    for name, weight in weights.items():
+        if name not in defaults:
+            raise SpringfootError(f"reward_weights has no term {quoted(name)}; valid: {', '.join(defaults)}")
+        cost = defaults[name] <= 0
+        if not is_number(weight) or (weight > 0 if cost else weight < 0):
+            allowed = "<= 0 (a cost)" if cost else ">= 0 (a reward)"
+            raise SpringfootError(f"reward_weights[{name!r}] must be a finite number {allowed}, got {quoted(weight)}")
+
+
+def real_numbers(name: str, value: Any) -> NDArray:
+    """`value` as a new array of float64; refuse text, dates, complex numbers, records and rows of unequal length."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in _NO_NUMBERS or array.dtype.names is not None:
+            raise SpringfootError(f"{name} must be real numbers, got {_NO_NUMBERS.get(array.dtype.kind, 'records')}")
+        if array.dtype == object and any(isinstance(each, (str, bytes, complex)) for each in array.flat):
+            raise TypeError
+        return np.array(array, float, order="C")
+    except (TypeError, OverflowError):
+        found = quoted(value)
+    except SpringfootError:
+        raise
+    except ValueError:
+        found = "rows of unequal length"
+    raise SpringfootError(f"{name} must be real numbers, got {found}")
+
+
+def plain(value: Any) -> Any:
+    """Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return as_float(value)
+    if isinstance(value, (list, tuple)):
+        return tuple(plain(item) for item in value)
+    return deepcopy(value)

@@ -1,0 +1,254 @@
+"""The feet that the settings `left_foot` and `right_foot` name: kinds, their numbers, and what makes a `Foot` of them.
+
+A foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind, in plain JSON values;
+`adapted` says that the person has adapted to it (`envs.settings.adapted`).
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from math import radians
+from typing import Any, NamedTuple
+
+from springfoot.errors import SpringfootError, require_within
+from springfoot.gait.springs.stiffness import SPRINGS, StiffnessSchedule
+
+from ..physics.foot import LOCK, Feet, Foot, FootJoint, Spring
+from .adapted import ADAPTED, adapted_setting
+
+FOOT_SETTINGS = ("left_foot", "right_foot")
+"""Names of the settings that are feet."""
+RIGID_TOE_STIFFNESS = 110.0
+"""Stiffness of the toe of a rigid foot [N m/rad]: the bend of a forefoot; chosen, for a foot as that of the thesis's
+Figure 1-b, of which it says how little ankle and toe move, not how stiff they are."""
+
+
+class Number(NamedTuple):
+    """A number that can be said of a foot."""
+
+    usual: float | None
+    """Its value where it is not given; None leaves it to the body."""
+    low: float
+    high: float
+    unit: str
+
+
+TABLE_ANGLE, TABLE_TORQUE = Number(None, -60.0, 90.0, "deg"), Number(None, -1000.0, 1000.0, "N m")
+"""Angle and torque of a point of a torque-angle line."""
+TABLE_SLOPE = Number(None, 1.0, 3000.0, "N m/rad")
+"""By how much the torque of such a line falls with the angle."""
+MOST_POINTS = 1000
+"""Points of such a line at most; chosen."""
+TABLES = ("ankle_table", "toe_table")
+"""Torque-angle lines of a passive foot, lists of [deg, N m], in place of stiffness and rest angle of that joint."""
+SPRING_NUMBERS = {
+    "ankle_stiffness": Number(600.0, 0.0, 3000.0, "N m/rad"),
+    "ankle_deg": Number(2.0, -30.0, 30.0, "deg"),
+    "toe_stiffness": Number(60.0, 0.0, 1000.0, "N m/rad"),
+    "toe_deg": Number(0.0, -30.0, 45.0, "deg"),
+    "damping_time": Number(None, 0.0, 0.1, "s"),
+}
+"""What a spring at ankle and toe has: stiffness, angle without torque (dorsiflexion, toe-up positive), and damping over
+stiffness. The usual ones are of a foot on which the committed controller walks unchanged."""
+ORTHOSIS_NUMBERS = SPRING_NUMBERS | {
+    "ankle_stiffness": Number(0.0, 0.0, 1000.0, "N m/rad"),
+    "ankle_deg": Number(0.0, -30.0, 30.0, "deg"),
+    "toe_stiffness": Number(0.0, 0.0, 1000.0, "N m/rad"),
+}
+"""The same of an orthosis, a spring beside the joint; 0.9 to 8.7 N m/deg at the ankle (Waterval et al. 2019) are 52 to
+498 N m/rad."""
+SEGMENT_RATIOS = {
+    f"{part}_ratio": Number(1.0, 0.1, 3.0, "(of the intact one)")
+    for part in ("shank_mass", "shank_com", "shank_inertia", "foot_mass", "foot_inertia")
+}
+"""Shank and foot of a prosthesis over intact ones: masses, distance of the shank's CoM from the knee, inertias about
+the CoMs. Prosthetic legs below the knee are about 1.95 kg lighter (Smith & Martin 2011, J. Prosthet. Orthot. 23:114),
+0.6 of shank and foot at 80 kg."""
+KINDS: dict[str, dict[str, Number]] = {
+    "intact": {},
+    "rigid": {},
+    "rigid_toe": {},
+    "no_toe": {},
+    "passive": SPRING_NUMBERS,
+    "adaptive": {name: SPRING_NUMBERS[name] for name in ("ankle_deg", "toe_deg")},
+    "weak": {"strength": Number(0.3, 0.1, 0.6, "(of the sound leg)")},
+    "drop": {},
+}
+"""The kinds of feet and the numbers of their own.
+
+`rigid`: ankle locked, toe a spring of 110 N m/rad. `rigid_toe`: toe locked. `no_toe`: the same length in one piece,
+which touches the ground with heel and tip alone. `passive`: a spring of fixed stiffness and rest angle at ankle and
+toe, or a torque-angle line (`ankle_table`, `toe_table`). `adaptive`: the policy sets their stiffness, the rest angle is
+fixed; or both are as a `schedule` says, a `StiffnessSchedule` in JSON form. `weak`: the plantarflexor moment is limited
+to a share of `envs.physics.model.TORQUE_LIMIT`. `drop`: the ankle's muscles are slack while the leg swings.
+"""
+
+
+def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
+    """A foot in its plain form: floats for numbers, a word where the kind says all.
+
+    Raises `SpringfootError` for what is no foot; `name` is that of the setting.
+    """
+    kind = value.get("kind") if isinstance(value, Mapping) else value
+    if not isinstance(kind, str) or kind not in KINDS:
+        form = "" if isinstance(value, (str, Mapping)) else ", or a dictionary with one of them as its 'kind'"
+        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, KINDS))}{form}, got {kind!r:.60}")
+    if not isinstance(value, Mapping):
+        return kind
+    plain: dict[str, Any] = {"kind": kind}
+    own = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
+    given = {key: number for key, number in value.items() if key not in ("kind", "orthosis", ADAPTED, *own)}
+    more = *own, "orthosis", ADAPTED
+    plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, more)
+    for key in own:
+        if value.get(key) is not None:
+            joint = key.partition("_")[0]
+            instead = [other for other in plain if key == "schedule" or other.startswith(joint)]
+            if both := [other for other in instead if other in KINDS[kind]]:
+                raise SpringfootError(f"{name}: give {key} or {both[0]}, not both")
+            plain[key] = _schedule(name, value[key]) if key == "schedule" else _table(f"{name}: {key}", value[key])
+    if (orthosis := value.get("orthosis")) is not None:
+        if not isinstance(orthosis, Mapping):
+            raise SpringfootError(
+                f"{name}: orthosis must be a dictionary of {', '.join(ORTHOSIS_NUMBERS)}, got {orthosis!r:.60}"
+            )
+        plain["orthosis"] = _numbers(f"{name}: orthosis", "an orthosis", orthosis, ORTHOSIS_NUMBERS)
+    if value.get(ADAPTED) is not None:
+        plain[ADAPTED] = adapted_setting(name, kind, value[ADAPTED])
+    return kind if len(plain) == 1 else plain
+
+
+def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
+    try:
+        schedule = StiffnessSchedule.from_json(value)
+    except SpringfootError as error:
+        raise SpringfootError(f"{name}: schedule: {error}") from None
+    for joint in SPRINGS:
+        its = SPRING_NUMBERS[f"{joint}_stiffness"]
+        for segment in getattr(schedule, joint):
+            require_within(f"{name}: schedule: {joint} K", segment.stiffness, (its.low, its.high), its.unit)
+    return schedule.to_json()
+
+
+def _table(name: str, value: Any) -> list[list[float]]:
+    """A torque-angle line: at least two points [deg, N m], of ascending angle and falling torque."""
+    points = [list(point) if isinstance(point, (list, tuple)) else [] for point in _listed(value)]
+    if not 2 <= len(points) <= MOST_POINTS or any(len(point) != 2 for point in points):
+        raise SpringfootError(f"{name} must be a list of 2 to {MOST_POINTS} pairs [deg, N m], got {value!r:.60}")
+    plain = [
+        [
+            require_within(f"{name}: {what}", number, (its.low, its.high), its.unit)
+            for what, number, its in zip(("angle", "torque"), point, (TABLE_ANGLE, TABLE_TORQUE), strict=True)
+        ]
+        for point in points
+    ]
+    for (first, high), (last, low) in pairwise(plain):
+        if last <= first:
+            raise SpringfootError(f"{name}: angles must ascend, got {last:g} deg after {first:g} deg")
+        fall = (high - low) / radians(last - first)
+        if not TABLE_SLOPE.low <= fall <= TABLE_SLOPE.high:
+            raise SpringfootError(
+                f"{name}: the torque must fall by {TABLE_SLOPE.low:g} to {TABLE_SLOPE.high:g} {TABLE_SLOPE.unit}, "
+                f"got {fall:.4g} between {first:g} and {last:g} deg"
+            )
+    return plain
+
+
+def _listed(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, (list, tuple)) else ()
+
+
+def _numbers(
+    name: str, owner: str, given: Mapping[Any, Any], known: Mapping[str, Number], more: tuple[str, ...] = ()
+) -> dict[str, float]:
+    """The numbers that are given, as floats, in the order in which they are known."""
+    for key in given:
+        if key not in known:
+            raise SpringfootError(f"{name}: {owner} has no {key!r:.40}; valid: {', '.join([*known, *more])}")
+    return {
+        key: require_within(f"{name}: {key}", given[key], (its.low, its.high), its.unit)
+        for key, its in known.items()
+        if key in given
+    }
+
+
+def _adapted(setting: str | Mapping[str, Any]) -> Any:
+    return None if isinstance(setting, str) else setting.get(ADAPTED)
+
+
+def kind_of(setting: str | Mapping[str, Any]) -> str:
+    """The kind of a foot of the settings."""
+    return setting if isinstance(setting, str) else setting["kind"]
+
+
+def foot_of(setting: str | Mapping[str, Any]) -> Foot:
+    """The foot of a setting in its plain form."""
+    given: dict[str, Any] = {"kind": setting} if isinstance(setting, str) else dict(setting)
+    kind, orthosis = given.pop("kind"), given.pop("orthosis", None)
+    given.pop(ADAPTED, None)  # of the person, not of the foot
+    value: dict[str, Any] = _usual(KINDS[kind]) | given
+    beside = (None, None) if orthosis is None else _springs(_usual(ORTHOSIS_NUMBERS) | orthosis)
+    ankle, toe = (FootJoint(orthosis=spring) for spring in beside)
+    match kind:
+        case "rigid":
+            ankle = FootJoint(device=LOCK, orthosis=beside[0])
+            toe = FootJoint(device=Spring(stiffness=RIGID_TOE_STIFFNESS), orthosis=beside[1])
+        case "rigid_toe" | "no_toe":
+            toe = FootJoint(device=LOCK, orthosis=beside[1])
+        case "passive":
+            ankle, toe = (FootJoint(device=own, orthosis=by) for own, by in zip(_springs(value), beside, strict=True))
+        case "adaptive" if "schedule" in given:
+            ankle, toe = (FootJoint(device=Spring(), orthosis=by) for by in beside)
+        case "adaptive":
+            ankle = FootJoint(rest=radians(value["ankle_deg"]), orthosis=beside[0])
+            toe = FootJoint(rest=radians(value["toe_deg"]), orthosis=beside[1])
+        case "weak":
+            ankle = FootJoint(strength=value["strength"], orthosis=beside[0])
+        case "drop":
+            ankle = FootJoint(acts_in_swing=False, orthosis=beside[0])
+    segments = {name: number for name, number in given.items() if name in SEGMENT_RATIOS}
+    schedule = StiffnessSchedule.from_json(given["schedule"]) if "schedule" in given else None
+    return Foot(kind=kind, ankle=ankle, toe=toe, schedule=schedule, one_piece=kind == "no_toe", **segments)
+
+
+def feet_of(left: str | Mapping[str, Any], right: str | Mapping[str, Any]) -> Feet:
+    """Both feet of settings in their plain form."""
+    return foot_of(left), foot_of(right)
+
+
+def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
+    """Settings of which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
+
+    Returns the settings with the first foot of each list, and the feet of each environment; None without lists.
+    """
+    listed = {name: settings[name] for name in FOOT_SETTINGS if isinstance(settings.get(name), (list, tuple))}
+    for name, feet in listed.items():
+        if len(feet) != num:
+            raise SpringfootError(f"{name} must be one foot or a list of {num}, got {len(feet)} feet")
+    plain = {
+        name: [foot_setting(name, foot) for foot in listed.get(name, [settings.get(name, "intact")] * num)]
+        for name in FOOT_SETTINGS
+    }
+    for name, feet in plain.items():
+        if any(_adapted(foot) != _adapted(feet[0]) for foot in feet):
+            raise SpringfootError(f"{name}: all feet of a list must have the same {ADAPTED}, as legs are of the batch")
+    first = {name: feet[0] for name, feet in plain.items() if name in listed}
+    pairs = [feet_of(*pair) for pair in zip(*plain.values(), strict=True)]
+    return {**settings, **first}, pairs if listed else None
+
+
+def _usual(numbers: Mapping[str, Number]) -> dict[str, float | None]:
+    return {name: number.usual for name, number in numbers.items()}
+
+
+def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
+    """Springs at ankle and toe from the values of `SPRING_NUMBERS`."""
+
+    def spring(joint: str) -> Spring:
+        rest, table = radians(value[f"{joint}_deg"]), value.get(f"{joint}_table", ())
+        points = tuple((radians(angle), torque) for angle, torque in table)
+        time = value["damping_time"]
+        if points:
+            return Spring(table=points, damping_time=time)
+        return Spring(stiffness=value[f"{joint}_stiffness"], rest=rest, damping_time=time)
+
+    return spring("ankle"), spring("toe")

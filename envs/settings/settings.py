@@ -1,0 +1,299 @@
+"""Everything that can be set about the walking task: plain JSON values, validated in one place.
+
+Flat, as `gym.make` takes them. Each also names its theme, once: of it are made the groups of `--help`, the table of the
+environment and what an evaluation sets anew.
+"""
+
+import json
+from dataclasses import asdict, dataclass, field, fields
+from math import ceil
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from springfoot.errors import SpringfootError, require_number, require_within
+from springfoot.gait.body.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from springfoot.gait.people.human import PEOPLE_FILE, HumanGait, human_gait
+from springfoot.gait.people.own_data import OwnGait
+from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, Cadence
+from springfoot.gait.springs.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
+
+from ..physics.contact import FRICTION
+from ..physics.timing import ACTION_STEP
+from .checks import (
+    check_bounds,
+    check_choice,
+    check_guide,
+    check_people_file,
+    check_range,
+    check_span,
+    check_start,
+    check_weights,
+    check_windows,
+    plain,
+    refusing_unknown,
+)
+from .feet import FOOT_SETTINGS, foot_setting
+from .themes import CONDITION_THEMES, THEMES
+
+Equilibrium = Literal["planned", "angle", "neutral", "phase"]
+Feedforward = Literal["people", "plan"]
+Guide = Literal["people", "plan"]
+ActionMode = Literal["absolute", "residual"]
+Decisions = Literal["100hz", "50hz", "25hz", "event"]
+StiffnessJoints = Literal["both", "ankle", "toe"]
+
+FRICTION_RANGE = (0.4, 1.2)
+"""Allowed coefficients of friction, from a wet floor to rough rubber [-]; chosen."""
+SLOPE_RANGE_DEG = (-5.0, 5.0)
+"""Allowed slopes, uphill positive [deg]; ramps for wheelchairs have up to 4.8 (1:12, ADA Standards 2010, 405.2)."""
+MOST_UNEVENNESS = 0.03
+"""Largest unevenness [m]; chosen, as swinging feet clear the ground by about this much."""
+MOST_SENSOR_NOISE = 0.1
+"""Largest standard deviation of sensor noise, in units of the observation [-]; chosen."""
+LONGEST_DELAY = 0.04
+"""Longest delay of a stiffness behind its command [s]; chosen, two steps of 20 ms."""
+
+DEFAULT_WEIGHTS = {
+    "alive": 0.15,
+    "speed": 0.40,
+    "com_x": 0.20,
+    "com_z": 0.10,
+    "zmp": 0.50,
+    "pose": 2.00,
+    "grf": 5.00,
+    "stiffness_rate": -0.10,
+    "stiffness": -0.02,
+    "effort": 0.0,
+}
+"""Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
+
+_BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = ({"theme": t} for t in THEMES)
+_DRAWN = {"drawn": True}  # the setting makes something differ between episodes, or change within one, by chance
+_KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
+
+
+@refusing_unknown
+@dataclass(frozen=True, kw_only=True)
+class BipedSettings:
+    """The walking task of the biped with segmented feet; raises `SpringfootError` for a bad value."""
+
+    height: float = field(default=REFERENCE_HEIGHT, metadata=_BODY)
+    """Standing height of the body [m]."""
+    mass: float = field(default=REFERENCE_MASS, metadata=_BODY)
+    """Body mass [kg]."""
+    leg_ratio: float = field(default=1.0, metadata=_BODY)
+    """Length of thigh and shank over the average at that height; the trunk takes the rest [-]."""
+    foot_ratio: float = field(default=1.0, metadata=_BODY)
+    """Length of the foot over the average at that height [-]."""
+    carried_ratio: float = field(default=0.0, metadata=_BODY)
+    """Mass of a load on the back over body mass [-]."""
+    left_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
+    """The left foot, a kind of `springfoot.envs.settings.feet` (intact, rigid, rigid_toe, no_toe, passive, adaptive,
+    weak, drop) a dictionary of a `kind` and its numbers, `{"kind": "passive", "ankle_stiffness": 600}`, or, on the
+    command line, a file (`springfoot.gait.springs.foot_file`)."""
+    right_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
+    """The right foot, likewise."""
+    speed: float = field(default=1.2, metadata=_SPEED)
+    """Commanded walking speed [m/s]."""
+    height_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
+    """Heights drawn at each reset in place of `height` [m], evenly; with the mass anew if they make no body."""
+    mass_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
+    """Body masses drawn at each reset in place of `mass` [kg], evenly and whatever the height."""
+    speed_range: tuple[float, float] | None = field(default=None, metadata=_SPEED | _DRAWN)
+    """Walking speeds drawn at each reset in place of `speed` [m/s], evenly."""
+    speed_interval: float | None = field(default=None, metadata=_SPEED | _DRAWN)
+    """Mean time between changes of the commanded speed within an episode, drawn from `speed_range` [s]."""
+    speed_rate: float = field(default=0.25, metadata=_SPEED | _KEPT)
+    """Rate at which the commanded speed goes to a new one [m/s^2]."""
+    cadence: Cadence = field(default="people", metadata=_REFERENCE)
+    """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
+    guide: Guide = field(default="people", metadata=_REFERENCE)
+    """What the controller follows, what is fed forward, what starts an episode and what the reward holds against:
+    people's walk; or the plan's own (plan), of people the step length and time alone (`docs/prediction.md`)."""
+    people_file: str | None = field(default=None, metadata=_REFERENCE)
+    """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
+    plan_file: str | None = field(default=None, metadata=_REFERENCE)
+    """With guide `plan`: file of the plan's style and leg constants (`springfoot study predict`), not the package's."""
+    equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
+    """Equilibrium angle of ankle and toe: people's ankle angle with the moment of `feedforward` fed forward (planned),
+    that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
+    feedforward: Feedforward = field(default="people", metadata=_SPRINGS)
+    """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
+    that inverse dynamics give for the plan. Either way the constants they go with were tuned on people's walk."""
+    action_mode: ActionMode = field(default="absolute", metadata=_SPRINGS)
+    """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
+    decisions: Decisions = field(default="50hz", metadata=_SPRINGS)
+    """When stiffness is decided: in every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
+    strike and at the foot flat, heel-off and toe-off of the guide, the action being held between them (event)."""
+    stiffness_joints: StiffnessJoints = field(default="both", metadata=_SPRINGS)
+    """Joints whose stiffness the action decides; the other has the fixed schedule, and its actions are read as 0."""
+    ankle_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[0], 800.0), metadata=_SPRINGS)
+    """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
+    toe_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[1], 200.0), metadata=_SPRINGS)
+    """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
+    schedule: dict[str, Any] | None = field(default=None, metadata=_SPRINGS)
+    """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
+    equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
+    human: dict[str, Any] | None = field(default=None, metadata=_REFERENCE)
+    """Someone's own walk in place of people's, JSON form of `springfoot.gait.people.own_data.OwnGait` (on the command
+    line a CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time follow it."""
+    episode_seconds: float = field(default=20.0, metadata=_EPISODE | _KEPT)
+    """Time after which an episode is truncated [s]."""
+    start: Literal["random", "standing"] | float = field(default="random", metadata=_EPISODE)
+    """Start of an episode: walking at this stride phase of the left leg [0..1), at a random one within single support,
+    or standing: the body sets off by itself within 3 s (`springfoot.envs.control.standing`)."""
+    stop_at: float | None = field(default=None, metadata=_EPISODE)
+    """Time in the episode from which the body slows down, then stops and stands [s]; not before 3 s if it starts
+    standing."""
+    start_noise: float = field(default=0.0, metadata=_EPISODE)
+    """Relative spread of the joint angles and velocities at the start [0..1]."""
+    push_newton: float = field(default=0.0, metadata=_DISTURBANCE)
+    """Size of each push on the trunk, forward or backward at random [N] for 63 kg; scales with mass; 0 for none."""
+    push_seconds: float = field(default=0.1, metadata=_DISTURBANCE | _KEPT)
+    """Duration of each push [s]."""
+    push_interval: float = field(default=4.0, metadata=_DISTURBANCE | _KEPT)
+    """One push at a random time in each interval of this length [s]."""
+    friction: float = field(default=FRICTION, metadata=_GROUND)
+    """Coefficient of friction between feet and ground [0.4..1.2]."""
+    slope_deg: float = field(default=0.0, metadata=_GROUND)
+    """Slope of the ground [-5..5 deg], uphill positive."""
+    slope_range_deg: tuple[float, float] | None = field(default=None, metadata=_GROUND | _DRAWN)
+    """Slopes drawn at each reset in place of `slope_deg` [deg], evenly."""
+    unevenness_m: float = field(default=0.0, metadata=_GROUND)
+    """The ground of each footfall is up to this much higher or lower than the mean ground [0..0.03 m], evenly; a
+    swinging foot gets that of its next footfall in mid-swing."""
+    sensor_noise: float = field(default=0.0, metadata=_DISTURBANCE)
+    """Standard deviation of Gaussian noise, new at every step, on all that is measured of the observation, in its own
+    dimensionless units [0..0.1]: 0.01 is 0.6 deg, 9 mm of hip height, 2 deg/s, and 1 % of body weight."""
+    stiffness_delay_s: float = field(default=0.0, metadata=_DISTURBANCE)
+    """A new ankle or toe stiffness acts this much later (pure delay) [0..0.04 s, in steps of 0.01 s]."""
+    stiffness_delay_range_s: tuple[float, float] | None = field(default=None, metadata=_DISTURBANCE | _DRAWN)
+    """Delays drawn at each reset in place of `stiffness_delay_s`, evenly from the steps of 0.01 s [s]."""
+    reward_weights: dict[str, float] = field(default_factory=dict, metadata=_REWARD)
+    """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
+
+    def __post_init__(self) -> None:
+        body_of(self)  # raises for an impossible one
+        require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
+        self._check_draws()
+        for name, choices in (
+            *(("cadence", Cadence), ("guide", Guide), ("equilibrium", Equilibrium), ("feedforward", Feedforward)),
+            *(("action_mode", ActionMode), ("decisions", Decisions), ("stiffness_joints", StiffnessJoints)),
+        ):
+            check_choice(name, getattr(self, name), get_args(choices))
+        for name in FOOT_SETTINGS:
+            foot_setting(name, getattr(self, name))
+        check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
+        check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
+        if self.schedule is not None:
+            StiffnessSchedule.from_json(self.schedule)
+        elif self.equilibrium == "phase":
+            raise SpringfootError(
+                "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
+            )
+        if self.human is not None:
+            OwnGait.from_json(self.human)
+        check_people_file(self.people_file)
+        check_guide(self.guide, self.human, self.plan_file)
+        require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
+        check_start(self.start)
+        if self.stop_at is not None:
+            require_number("stop_at", self.stop_at, 3.0 if self.start == "standing" else 0.0, unit="s")
+        require_number("start_noise", self.start_noise, 0.0, 1.0, "(relative)")
+        require_number("push_newton", self.push_newton, 0.0, unit="N")
+        require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
+        require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
+        self._check_world()
+        check_weights(self.reward_weights, DEFAULT_WEIGHTS)
+        check_bounds(self)
+
+    @property
+    def step_seconds(self) -> float:
+        """Time of one step of the environment [s]."""
+        return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Steps after which an episode is truncated: `episode_seconds`, to the nearest step."""
+        return ceil(self.episode_seconds / self.step_seconds - 0.5)
+
+    def _check_draws(self) -> None:
+        for name, allowed, unit in (
+            *(("height_range", HEIGHT_RANGE, "m"), ("mass_range", MASS_RANGE, "kg")),
+            ("speed_range", PLAN_SPEED_RANGE, "m/s"),
+        ):
+            if getattr(self, name) is not None:
+                check_range(name, getattr(self, name), unit)
+                for value in getattr(self, name):
+                    require_within(name, value, allowed, unit)
+        (short, tall), (light, heavy) = self.height_range or 2 * (self.height,), self.mass_range or 2 * (self.mass,)
+        if light / tall**2 > BMI_RANGE[1] or heavy / short**2 < BMI_RANGE[0]:
+            raise SpringfootError(
+                "height_range and mass_range must have a body with a body-mass index in "
+                f"[{BMI_RANGE[0]:g}, {BMI_RANGE[1]:g}] kg/m^2, got {light / tall**2:.3g} to {heavy / short**2:.3g}"
+            )
+        if self.speed_interval is not None:
+            require_number("speed_interval", self.speed_interval, self.step_seconds, unit="s")
+            if self.speed_range is None:
+                raise SpringfootError("speed_interval needs a speed_range to draw from, got None")
+        require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
+
+    def _check_world(self) -> None:
+        """Ground, noise and delays."""
+        require_number("friction", self.friction, *FRICTION_RANGE)
+        require_number("slope_deg", self.slope_deg, *SLOPE_RANGE_DEG, unit="deg")
+        check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
+        require_number("unevenness_m", self.unevenness_m, 0.0, MOST_UNEVENNESS, "m")
+        require_number("sensor_noise", self.sensor_noise, 0.0, MOST_SENSOR_NOISE, "(observation units)")
+        require_number("stiffness_delay_s", self.stiffness_delay_s, 0.0, LONGEST_DELAY, "s")
+        check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
+        check_windows("stiffness_delay_s", self.stiffness_delay_s)
+        check_windows("stiffness_delay_range_s", self.stiffness_delay_range_s)
+
+
+THEME_OF: dict[str, str] = {item.name: item.metadata["theme"] for item in fields(BipedSettings)}
+"""Theme of each setting, by its name."""
+DRAWN_SETTINGS = tuple(item.name for item in fields(BipedSettings) if item.metadata.get("drawn"))
+"""Names of the settings that make something differ between episodes, or change within one, by chance."""
+CONDITION_SETTINGS = tuple(
+    item.name
+    for item in fields(BipedSettings)
+    if item.metadata["theme"] in CONDITION_THEMES and not item.metadata.get("kept")
+)
+"""Names of the settings that every evaluation sets anew; the other ones a trained policy brings with it."""
+
+
+def settings_from(**values: Any) -> BipedSettings:
+    """Settings from keyword arguments or JSON: lists become tuples, numbers become floats.
+
+    Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
+    """
+    values = {name: foot_setting(name, each) if name in FOOT_SETTINGS else plain(each) for name, each in values.items()}
+    if values.get("schedule") is not None:
+        values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
+    if values.get("human") is not None:
+        values["human"] = OwnGait.from_json(values["human"]).to_json()
+    return BipedSettings(**values)
+
+
+def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
+    """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
+    return json.loads(json.dumps(asdict(settings)))
+
+
+def body_of(settings: BipedSettings) -> Body:
+    """The body of the settings."""
+    return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
+
+
+def plan_file_of(settings: BipedSettings) -> Path | None:
+    """The file of the plan's style and leg constants, if it is not the package's."""
+    return None if settings.plan_file is None else Path(settings.plan_file)
+
+
+def reference_gait(settings: BipedSettings) -> HumanGait:
+    """The walk that the body is held against: people's at its speed and height, or that of `settings.human`."""
+    people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
+    if settings.human is None:
+        return human_gait(settings.speed, settings.height, people)
+    return OwnGait.from_json(settings.human).gait(settings.speed, settings.height, people)

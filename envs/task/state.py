@@ -1,0 +1,30 @@
+"""What the task keeps of each environment: one row of `TASK_ROW`, which its kernels read and write."""
+
+import numpy as np
+
+from ..physics.contact import CONTACTS
+from ..physics.model import SIDES
+from .observation_entries import OBSERVATION, UNITS
+from .reward_reference import SCALES
+
+PUSH = np.dtype([("begin", float), ("force", float), ("ends", float)])
+"""A body's next or present push: when it begins [s], its force at the mass of the settings [N], and the end of the
+interval in which it is the one [s]."""
+GROUND_STATE = np.dtype(
+    [
+        ("height", float, len(SIDES)),  # below each foot above the mean ground [m]
+        ("phase", float, len(SIDES)),  # stride phase of each leg one control window ago
+    ]
+)
+TASK_ROW = np.dtype(
+    [
+        ("scales", SCALES),
+        ("units", float, len(UNITS)),  # of the observation, in the order of `UNITS` [SI]
+        ("height_ratio", float),  # height over 1.70 m
+        ("steps", np.int64),  # since the episode began
+        ("force", float, (len(SIDES), len(CONTACTS), 2)),  # (forward, up) on each contact, mean over the last step [N]
+        ("push", PUSH),
+        ("ground", GROUND_STATE),
+        ("noise", float, len(OBSERVATION)),  # on the observation, in its own units
+    ]
+)

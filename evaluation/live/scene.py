@@ -1,0 +1,112 @@
+"""The body of a live walk in 3-D: its capsules and spheres, the ground that runs below it, arrows of its ground forces.
+
+The body stays in the middle of the picture, however far it walks: ground and forces are moved back by its place.
+Meshes are coarse, and lights cast no shadow and reflect nothing, so that a processor can draw it too: in a browser
+without a GPU that is what a picture costs (`python -m benchmarks.live_pictures`).
+"""
+
+import mujoco
+import numpy as np
+import trimesh
+import viser
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.model import SIDES
+
+from .steered_walk import LiveSession
+
+FORCE_LENGTH = 0.55
+"""Length of the arrow of one body weight [m]; chosen, as in walk.gif."""
+FORCE_COLOUR = (213, 94, 0)
+GROUND_COLOUR = (190, 190, 190)
+GROUND_LENGTH, GROUND_WIDTH, GROUND_CELL = 14.0, 4.0, 0.5
+"""Of the grid that runs below it [m]; a metre is a whole number of cells."""
+ROUND = 16
+"""Faces around a capsule; chosen, with half as many along each of its ends."""
+DAYLIGHT, SUN = 1.6, 2.2
+"""Intensities of the light from all sides and from one [-]; chosen by eye."""
+
+
+class LiveScene:
+    """Draws what walks in `session` on the page of `server`."""
+
+    def __init__(self, server: viser.ViserServer, session: LiveSession):
+        self._server, self._session = server, session
+        server.initial_camera.position, server.initial_camera.look_at = (0.5, -2.6, 1.0), (0.15, 0.0, 0.75)
+        self._begin()
+
+    def show(self) -> None:
+        """Draw the body as it stands now."""
+        session = self._session
+        if session.model is not self._model:
+            self._server.scene.reset()
+            self._begin()
+        data, slope = session.data(), np.radians(session.wishes.slope_deg)
+        x = float(data.qpos[0])
+        away = np.array([x, 0.0, x * np.tan(slope)])
+        data.xpos[:] -= away
+        with self._server.atomic():
+            for body, frame in self._bodies.items():
+                frame.position, frame.wxyz = data.xpos[body], data.xquat[body]
+            along = (-x / np.cos(slope)) % 1.0  # the grid repeats itself every metre
+            self._ground.position = (along * np.cos(slope), 0.0, along * np.sin(slope))
+            self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], away)
+
+    def _begin(self) -> None:
+        model = self._model = self._session.model
+        self._feet = [model.body(f"foot_{side}").id for side in SIDES]
+        scene = self._server.scene
+        scene.configure_default_lights(False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/daylight", intensity=DAYLIGHT)
+        scene.add_light_directional("/sun", intensity=SUN, position=(2.0, -3.0, 4.0))
+        self._bodies = {body: scene.add_frame(_name(body), show_axes=False) for body in range(1, model.nbody)}
+        for geom in np.flatnonzero(model.geom_bodyid).tolist():
+            self._add_geom(geom)
+        turn = -np.radians(self._session.wishes.slope_deg) / 2
+        self._ground = scene.add_line_segments(
+            "/ground",
+            _grid(),
+            GROUND_COLOUR,
+            thickness=0.7,
+            thickness_units="screen",
+            wxyz=(np.cos(turn), 0.0, np.sin(turn), 0.0),
+        )
+        self._forces = scene.add_arrows(
+            "/forces", np.zeros((2, 2, 3)), FORCE_COLOUR, shaft_radius=0.012, head_radius=0.03, head_length=0.06
+        )
+
+    def _add_geom(self, geom: int) -> None:
+        """Draw a capsule or sphere of the model on its body."""
+        model = self._model
+        radius, half = model.geom_size[geom, :2]
+        name = f"{_name(model.geom_bodyid[geom])}/{geom}"
+        colour = tuple(model.geom_rgba[geom, :3].tolist())
+        place = {"wxyz": model.geom_quat[geom], "position": model.geom_pos[geom]}
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            mesh = trimesh.creation.capsule(2.0 * half, radius, count=(ROUND // 2, ROUND))
+            self._server.scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, **place)
+        else:
+            self._server.scene.add_icosphere(name, radius, colour, subdivisions=2, **place)
+
+
+def _name(body: int) -> str:
+    return f"/body/{body}"
+
+
+def _grid() -> NDArray:
+    """(K, 2, 3) lines along and across the ground [m]."""
+    along, across = GROUND_LENGTH / 2, GROUND_WIDTH / 2
+    xs, ys = np.arange(-along, along + GROUND_CELL, GROUND_CELL), np.arange(-across, across + GROUND_CELL, GROUND_CELL)
+    lines = [((x, -across, 0.0), (x, across, 0.0)) for x in xs] + [((-along, y, 0.0), (along, y, 0.0)) for y in ys]
+    return np.array(lines, np.float32)
+
+
+def _arrows(force: NDArray, feet: NDArray, away: NDArray) -> NDArray:
+    """(side, (start, end), 3) arrows of `force` as in a `Frame`, in the planes of the `feet` (side, 3); without a force
+    they have no length."""
+    points = np.zeros((len(force), 2, 3), np.float32)
+    for side, (place, height, forward, up) in enumerate(force):
+        start = np.array([place, feet[side, 1], height]) - away * (1, 0, 1)
+        points[side] = start, start + FORCE_LENGTH * np.array([forward, 0.0, up])
+    return points

@@ -1,0 +1,296 @@
+"""A walk that is steered while it runs: what is asked of it, what the body does, one step after another.
+
+It knows no browser and no clock: `live_view` shows it in real time, tests drive it step by step. The body is one
+`Biped`; K is set by its actions, and read back from what acted in the simulation.
+"""
+
+from dataclasses import dataclass, fields, replace
+from math import ceil, inf, sqrt
+from typing import Any, Literal
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.step_result import Tick
+from springfoot.envs.control.equilibrium import foot_curves
+from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
+from springfoot.envs.control.reference_walk import reference_walk_at, rows, tabulated_speeds
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.physics.simulation import MjData, MjModel
+from springfoot.envs.settings.checks import LONGEST_EPISODE
+from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.errors import SpringfootError, require_number
+from springfoot.gait import GRAVITY
+from springfoot.gait.body.body import Body
+from springfoot.gait.springs.stiffness import SPRINGS
+
+from ..recording.policies import prepare
+
+Source = Literal["policy", "scaled", "by hand"]
+"""Where K comes from: the policy, the policy times a factor, or a number held all the time."""
+
+LIVE_SPEEDS = (0.6, 1.8)
+"""Commanded speeds [m/s]; chosen, those at which the fixed schedule walks and a little beyond."""
+LIVE_HEIGHTS, LIVE_MASSES = (1.45, 2.0), (45.0, 110.0)
+"""Heights [m] and masses [kg]; chosen, as adults are."""
+LIVE_FACTORS = (0.25, 4.0)
+"""Factors on the policy's K [-]; chosen."""
+OFFSETS_DEG = (-15.0, 15.0)
+"""What is added to theta_eq [deg]; chosen, more than the ankle moves in stance."""
+LIVE_PUSHES, PUSH_SECONDS = (-400.0, 400.0), 0.1
+"""Horizontal pushes on the trunk, forward positive [N], and how long each lasts [s]; chosen."""
+ELSEWHERE = {
+    "push_newton": "the button Push pushes",
+    "push_seconds": f"the button Push pushes for {PUSH_SECONDS:g} s",
+    "push_interval": "the button Push pushes",
+    "episode_seconds": "the walk has no end",
+    "height_range": "the slider height sets it",
+    "mass_range": "the slider mass sets it",
+    "speed_range": "the slider speed sets it",
+    "speed_interval": "the slider speed sets it",
+    "slope_range_deg": "the slider slope sets it",
+}
+"""Settings that a live walk does not take, and why."""
+LYING_SECONDS = 1.0
+"""Time for which a fallen body is shown before it walks anew [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wishes:
+    """What is asked of the walk. Slope, body and feet begin it anew, all else acts while it runs."""
+
+    ankle_source: Source = "policy"
+    toe_source: Source = "policy"
+    ankle_factor: float = 1.0
+    """On the policy's K where the source is `scaled` [-]."""
+    toe_factor: float = 1.0
+    ankle_stiffness: float = 300.0
+    """K where the source is `by hand` [N m/rad], of this body."""
+    toe_stiffness: float = 40.0
+    ankle_offset_deg: float = 0.0
+    """Added to theta_eq of both feet, dorsiflexion positive [deg]."""
+    toe_offset_deg: float = 0.0
+    """The same of the toe, up positive."""
+    speed: float = BipedSettings.speed
+    """Commanded [m/s]; the walk approaches it at the setting `speed_rate`."""
+    slope_deg: float = BipedSettings.slope_deg
+    height: float = BipedSettings.height
+    mass: float = BipedSettings.mass
+    left_foot: str | dict[str, Any] = BipedSettings.left_foot
+    right_foot: str | dict[str, Any] = BipedSettings.right_foot
+
+
+OFFSETS = ("ankle_offset_deg", "toe_offset_deg")
+"""Wishes that move theta_eq."""
+ANEW = ("slope_deg", "height", "mass", "left_foot", "right_foot")
+"""Wishes that begin the walk anew."""
+WISH_RANGES = {
+    "ankle_factor": LIVE_FACTORS,
+    "toe_factor": LIVE_FACTORS,
+    "ankle_offset_deg": OFFSETS_DEG,
+    "toe_offset_deg": OFFSETS_DEG,
+    "speed": LIVE_SPEEDS,
+    "height": LIVE_HEIGHTS,
+    "mass": LIVE_MASSES,
+}
+"""Allowed wishes that no setting bounds already."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frame:
+    """What is told of one step; sides are left and right, joints ankle and toe."""
+
+    time: float
+    """Since the walk began [s]."""
+    stiffness: NDArray
+    """(side, joint) K that acted in the simulation in the step's last control window [N m/rad]."""
+    equilibrium: NDArray
+    """(side, joint) theta_eq that acted in it [rad]."""
+    force: NDArray
+    """(side, 4) ground reaction force of each foot: where it acts, forward and up [m], and its parts, forward and up
+    [body weights]."""
+    speed: float
+    """Forward speed of the CoM [m/s]."""
+    push: float
+    """Push on the trunk in this step [N]."""
+    fell: str
+    """Why the body fell, "" while it walks."""
+
+
+class LiveSession:
+    """One walk, steered by `ask`, `push` and `restart`, and advanced by `step`.
+
+    Args:
+        policy: any name that `springfoot evaluate` takes.
+        given: settings asked for, none of those `ELSEWHERE`. What `Wishes` says is asked from there on.
+        seed: of the walk.
+
+    Raises `SpringfootError` for an unknown policy or a bad setting.
+    """
+
+    def __init__(self, policy: str, given: dict[str, Any] | None = None, seed: int = 0):
+        for name, instead in ELSEWHERE.items():
+            if (given or {}).get(name):  # 0 pushes and no range are what it does
+                raise SpringfootError(f"live takes no {name}: {instead}")
+        own = {"speed_range": LIVE_SPEEDS, "height_range": LIVE_HEIGHTS, "mass_range": LIVE_MASSES, "push_newton": 0.0}
+        asked = (given or {}) | own | {"episode_seconds": LONGEST_EPISODE}
+        self._policy, self._settings = prepare(policy, asked, seed)
+        self.name = policy
+        self._seed = seed
+        self._pushed, self._push_steps, self._lying = 0.0, 0, 0
+        self.falls = 0
+        """Falls so far."""
+        names = {item.name for item in fields(Wishes)}
+        self.wishes = Wishes(**{name: value for name, value in (given or {}).items() if name in names})
+        """What is asked now."""
+        self._check(self.wishes)
+        self._biped = self._make(self.wishes)
+        self.frame: Frame
+        """What the last step told."""
+        self.restart()
+
+    @property
+    def dt(self) -> float:
+        """Time of one step [s]."""
+        return self._biped.dt
+
+    @property
+    def body(self) -> Body:
+        """The body that walks."""
+        return body_of(replace(self._settings, height=self.wishes.height, mass=self.wishes.mass))
+
+    @property
+    def model(self) -> MjModel:
+        """The compiled model of the body that walks, another object whenever it is another body or other feet."""
+        return self._biped.model_of(0)
+
+    def data(self) -> MjData:
+        """A copy of its state, to draw."""
+        return self._biped.data(0)
+
+    def stiffness_ranges(self) -> NDArray:
+        """(joint, (lowest, highest)) K that actions can give to this body [N m/rad]; the legs may exceed it."""
+        ends = np.array([-1.0, 1.0])[:, None]
+        return stiffness_of(ends, self._settings, self.body).T
+
+    def ask(self, **wishes: Any) -> None:
+        """Change wishes, by name; raises `SpringfootError`, nothing changed, for what is no walk."""
+        asked = replace(self.wishes, **wishes)
+        self._check(asked)
+        before, biped = self.wishes, self._biped
+        changed = {item.name for item in fields(Wishes) if getattr(asked, item.name) != getattr(before, item.name)}
+        self.wishes = asked
+        try:
+            if changed & {*ANEW}:
+                self._biped = self._make(asked)
+                self.restart()
+            elif changed & {*OFFSETS} or (_offset(asked).any() and "speed" in changed):
+                self._biped = self._make(asked)
+                self._biped.restore(biped.state())
+            if "speed" in changed:
+                self._biped.command(np.arange(1), np.array([asked.speed]))
+        except SpringfootError:
+            self.wishes, self._biped = before, biped
+            raise
+
+    def push(self, newton: float) -> None:
+        """Push the trunk horizontally, forward positive [N], for `PUSH_SECONDS` from the next step on."""
+        self._pushed = require_number("push", newton, *LIVE_PUSHES, unit="N")
+        self._push_steps = ceil(PUSH_SECONDS / self.dt)
+
+    def restart(self) -> None:
+        """Begin the walk anew, with the wishes as they are."""
+        who = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
+        self._biped.reset(np.arange(1), [self._seed], None, who)
+        self._observation, self._steps = self._biped.observe(), 0
+        self._push_steps = self._lying = 0
+        still = np.zeros((len(SIDES), len(SPRINGS)))
+        speed = float(self._biped.measurement.com_velocity[0, 0])
+        self.frame = Frame(
+            time=0.0,
+            stiffness=still,
+            equilibrium=still,
+            force=np.zeros((len(SIDES), 4)),
+            speed=speed,
+            push=0.0,
+            fell="",
+        )
+
+    def step(self) -> Frame:
+        """Walk one step of the environment. A fallen body lies for `LYING_SECONDS`, then walks anew."""
+        if self._lying:
+            self._lying -= 1
+            if not self._lying:
+                self.restart()
+            return self.frame
+        force = self._pushed if self._push_steps else 0.0
+        self._push_steps = max(0, self._push_steps - 1)
+        self._biped.push(np.array([force]))
+        ticks: list[Tick] = []
+        self._biped.on_tick = ticks.append
+        result = self._biped.step(self._action())
+        self._observation, self._steps = result.observation, self._steps + 1
+        last, fell = ticks[-1], str(result.reasons[0])
+        self.frame = Frame(
+            time=self._steps * self.dt,
+            stiffness=last.stiffness[0][:, FEET],
+            equilibrium=last.equilibrium[0][:, FEET],
+            force=self._force(last),
+            speed=float(last.measurement.com_velocity[0, 0]),
+            push=force,
+            fell=fell,
+        )
+        if fell:
+            self.falls, self._lying = self.falls + 1, ceil(LYING_SECONDS / self.dt)
+        return self.frame
+
+    def _force(self, tick: Tick) -> NDArray:
+        force, contact = tick.measurement.force[0], tick.measurement.contact[0]
+        load = force[..., 1]
+        total = np.maximum(load.sum(axis=-1, keepdims=True), 1e-6)
+        place = (load[..., None] * contact).sum(axis=1) / total
+        return np.concatenate([place, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
+
+    def _action(self) -> NDArray:
+        """(1, 4) the action of K as it is asked; the policy's own, untouched, where K is left to it."""
+        own = np.asarray(self._policy(self._observation), float).reshape(len(SIDES), len(SPRINGS))
+        settings, body, wishes = self._settings, self.body, self.wishes
+        residual = settings.action_mode == "residual"
+        schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(own)
+        stiffness = schedule * np.exp(own) if residual else stiffness_of(own, settings, body)
+        for joint, name in enumerate(SPRINGS):
+            match getattr(wishes, f"{name}_source"):
+                case "policy":
+                    continue
+                case "scaled":
+                    stiffness[:, joint] *= getattr(wishes, f"{name}_factor")
+                case "by hand":
+                    stiffness[:, joint] = getattr(wishes, f"{name}_stiffness")
+            action = np.log(stiffness / schedule) if residual else action_of(stiffness, settings, body)
+            own[:, joint] = np.clip(action[:, joint], -1.0, 1.0)
+        return own.reshape(1, -1)
+
+    def _make(self, wishes: Wishes) -> Biped:
+        """The batch of one with the ground, the feet and the theta_eq of `wishes`."""
+        offset = _offset(wishes)
+        feet = {name: getattr(wishes, name) for name in ("slope_deg", "left_foot", "right_foot")}
+        settings = replace(self._settings, **feet)
+        if not offset.any():
+            return Biped(settings, 1)
+        speeds = tabulated_speeds(settings)
+        equal = float(np.clip(wishes.speed / sqrt(wishes.height / settings.height), speeds[0], speeds[-1]))
+        ((constants, walk),) = rows([reference_walk_at(settings, equal)])
+        return Biped(settings, 1, rest=foot_curves(settings, constants, walk)[0][None] + offset)
+
+    def _check(self, wishes: Wishes) -> None:
+        for name, (low, high) in WISH_RANGES.items():
+            require_number(name, getattr(wishes, name), low, high)
+        for name in ("ankle_stiffness", "toe_stiffness"):
+            require_number(name, getattr(wishes, name), 0.0, inf, "N m/rad", above=True)
+        replace(self._settings, **{name: getattr(wishes, name) for name in ANEW})  # the settings check the rest
+
+
+def _offset(wishes: Wishes) -> NDArray:
+    """(joint,) what is added to theta_eq [rad]."""
+    return np.radians([getattr(wishes, name) for name in OFFSETS])

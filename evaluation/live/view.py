@@ -1,0 +1,209 @@
+"""The live walk in a browser: viser's sliders, buttons and curves around a `LiveSession`, in real time.
+
+No OpenGL is needed here, the browser draws. viser's threads put what is asked into a queue, and one loop obeys, steps
+and shows.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
+from queue import SimpleQueue
+from typing import Any, get_args
+
+import numpy as np
+import viser
+from viser import uplot
+
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.feet import KINDS, kind_of
+from springfoot.envs.settings.settings import SLOPE_RANGE_DEG
+from springfoot.errors import SpringfootError
+from springfoot.gait.springs.stiffness import SPRINGS
+
+from .origin import own_pages_only
+from .scene import LiveScene
+from .steered_walk import (
+    LIVE_FACTORS,
+    LIVE_HEIGHTS,
+    LIVE_MASSES,
+    LIVE_PUSHES,
+    LIVE_SPEEDS,
+    OFFSETS_DEG,
+    Frame,
+    LiveSession,
+    Source,
+)
+
+CURVE_SECONDS = 4.0
+"""How much of the walk the curves show [s]."""
+CURVES_HZ = 10.0
+"""How often curves and words are sent [1/s]; chosen, as they cost more than the body."""
+LATE = 0.25
+"""Delay after which the clock gives up on catching up [s]; chosen."""
+FIRST_PUSH = 150.0
+"""Push that the slider begins with [N]."""
+SIDE_COLOURS = ("#0072B2", "#D55E00")
+"""Of left and right."""
+
+
+class LiveView:
+    """A page that shows and steers `session`; `run` walks it.
+
+    Args:
+        session: what walks.
+        host: address to listen on; the default is reached from this machine alone.
+        port: the first one to try, the next free one is taken; 0 for any.
+    """
+
+    def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 8080):
+        session.step()  # compiles, which takes a while
+        session.restart()
+        self._session = session
+        self._asked: SimpleQueue[dict[str, Any] | Callable[[], None]] = SimpleQueue()
+        with redirect_stdout(StringIO()), own_pages_only(host):  # viser would print a table of addresses
+            self._server = viser.ViserServer(host=host, port=port, label="springfoot live", verbose=False)
+        self._gui = self._server.gui
+        self._gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        self.address = f"http://{host}:{self._server.get_port()}"
+        """Where the page is."""
+        self.frames = 0
+        """Pictures of the body shown so far."""
+        self._history: deque[Frame] = deque([session.frame], maxlen=round(CURVE_SECONDS / session.dt))
+        self._handles: dict[str, Any] = {}
+        self._words = self._gui.add_markdown("")
+        self._add_buttons()
+        self._add_wishes()
+        self._curves = self._add_curves()
+        self._scene = LiveScene(self._server, session)
+        self._show()
+        self._tell()
+
+    def run(self, seconds: float | None = None) -> float:
+        """Walk in real time for `seconds`, for ever if None; returns how many pictures a second were shown."""
+        dt, begin, shown = self._session.dt, time.perf_counter(), self.frames
+        due, between = begin, max(1, round(1 / (CURVES_HZ * dt)))
+        step = 0
+        while seconds is None or time.perf_counter() - begin < seconds:
+            self._obey()
+            self._history.append(self._session.step())
+            due, step = due + dt, step + 1
+            if time.perf_counter() - due < dt:  # else the walk is kept in time, and this picture left out
+                self._show()
+            if step % between == 0:
+                self._tell()
+            late = time.perf_counter() - due
+            due += late if late > LATE else 0.0
+            time.sleep(max(0.0, -late))
+        return (self.frames - shown) / (time.perf_counter() - begin)
+
+    def stop(self) -> None:
+        """Close the page."""
+        with redirect_stdout(StringIO()):
+            self._server.stop()
+
+    def _obey(self) -> None:
+        """Do what was asked since the last step; what cannot be is told, and the page shows what is."""
+        wishes: dict[str, Any] = {}
+        while not self._asked.empty():
+            asked = self._asked.get()
+            if isinstance(asked, dict):
+                wishes |= asked
+            else:
+                asked()
+        try:
+            if wishes:
+                self._session.ask(**wishes)
+        except SpringfootError as error:
+            for client in self._server.get_clients().values():
+                client.add_notification("This cannot be", str(error), auto_close_seconds=8.0, color="red")
+            for name in wishes:
+                self._handles[name].value = _shown(getattr(self._session.wishes, name))
+
+    def _add_buttons(self) -> None:
+        push, restart = self._gui.add_button("Push"), self._gui.add_button("Restart")
+        size = self._gui.add_slider(
+            "Push, N", *LIVE_PUSHES, step=10.0, initial_value=FIRST_PUSH, hint="forward positive"
+        )
+        push.on_click(lambda _: self._asked.put(lambda: self._session.push(size.value)))
+        restart.on_click(lambda _: self._asked.put(self._session.restart))
+
+    def _add_wishes(self) -> None:
+        most = self._session.stiffness_ranges()
+        for joint, name in enumerate(SPRINGS):
+            with self._gui.add_folder(f"{name.capitalize()}: stiffness K"):
+                self._choose(f"{name}_source", "from", get_args(Source))
+                self._slide(f"{name}_factor", "scaled: factor", LIVE_FACTORS, 0.05)
+                low, high = most[joint].tolist()
+                self._slide(f"{name}_stiffness", "by hand, N·m/rad", (round(low), round(high)), 1.0)
+                self._slide(f"{name}_offset_deg", "θ_eq, added deg", OFFSETS_DEG, 0.5)
+        with self._gui.add_folder("Walk"):
+            self._slide("speed", "speed, m/s", LIVE_SPEEDS, 0.05)
+            self._slide("slope_deg", "slope, deg", SLOPE_RANGE_DEG, 0.5)
+        with self._gui.add_folder("Body and feet"):
+            self._slide("height", "height, m", LIVE_HEIGHTS, 0.01)
+            self._slide("mass", "mass, kg", LIVE_MASSES, 1.0)
+            for side in SIDES:
+                self._choose(f"{side}_foot", f"{side} foot", tuple(KINDS))
+
+    def _slide(self, name: str, label: str, ends: tuple[float, float], step: float) -> None:
+        value = float(np.clip(getattr(self._session.wishes, name), *ends))
+        self._handles[name] = self._gui.add_slider(label, *map(float, ends), step=step, initial_value=value)
+        self._listen(name)
+
+    def _choose(self, name: str, label: str, options: tuple[str, ...]) -> None:
+        value = _shown(getattr(self._session.wishes, name))
+        self._handles[name] = self._gui.add_dropdown(label, options, initial_value=value)
+        self._listen(name)
+
+    def _listen(self, name: str) -> None:
+        handle = self._handles[name]
+        handle.on_update(lambda event: self._asked.put({name: handle.value}) if event.client is not None else None)
+
+    def _add_curves(self) -> dict[str, Any]:
+        """Charts by the name of what they show, over time."""
+        titles = {"ankle": "K of the ankles, N·m/rad", "toe": "K of the toes, N·m/rad", "load": "Load, body weights"}
+        panel = self._gui.add_panel()
+        panel.dock_left()
+        with panel.add_tab("Curves, the last seconds"):
+            sides = [
+                {"label": side, "stroke": shade, "width": 2} for side, shade in zip(SIDES, SIDE_COLOURS, strict=True)
+            ]
+            charts = {name: self._chart(title, sides) for name, title in titles.items()}
+            return charts | {"speed": self._chart("Speed of the CoM, m/s", [{"label": "speed", "stroke": "#009E73"}])}
+
+    def _chart(self, title: str, lines: list[dict[str, Any]]) -> Any:
+        empty = np.zeros(1)
+        series: Any = ({"label": "s"}, *lines)
+        time_scale: dict[str, uplot.Scale] = {"x": {"time": False}}
+        return self._gui.add_uplot((empty,) * len(series), series, title=title, scales=time_scale, height=170)
+
+    def _show(self) -> None:
+        self._scene.show()
+        self.frames += 1
+
+    def _tell(self) -> None:
+        """Send words and curves."""
+        frame, session = self._history[-1], self._session
+        rows = "\n".join(
+            f"| {side} | {k[0]:.0f} | {k[1]:.0f} | {rest[0]:.1f} | {rest[1]:.1f} |"
+            for side, k, rest in zip(SIDES, frame.stiffness, np.degrees(frame.equilibrium), strict=True)
+        )
+        state = f"**fell: {frame.fell}**" if frame.fell else f"{frame.speed:.2f} m/s"
+        self._words.content = (
+            f"{session.name}: {frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
+            "| K that acts, N·m/rad | ankle | toe | ankle θ_eq, deg | toe θ_eq, deg |\n|-|-|-|-|-|\n" + rows
+        )
+        seconds = session.dt * np.arange(1 - len(self._history), 1)
+        stiffness, force = (
+            np.array([getattr(each, name) for each in self._history]) for name in ("stiffness", "force")
+        )
+        curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)} | {"load": force[..., -1].T}
+        for name, lines in (curves | {"speed": np.array([[each.speed for each in self._history]])}).items():
+            self._curves[name].data = (seconds, *np.ascontiguousarray(lines))
+
+
+def _shown(wish: Any) -> Any:
+    """A wish as its slider or list shows it: of a foot its kind."""
+    return kind_of(wish) if isinstance(wish, dict) else wish

@@ -1,0 +1,235 @@
+"""What an evaluation must show: criteria on the numbers of metrics.json, each once, and which of them a gait misses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, Literal
+
+from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.settings.settings import settings_from
+
+LOOSENED_BY, LOOSENED_R_BY = 0.2, 0.02
+"""By how much criteria are loosened for each of several seeds: errors and forces as a share of the criterion; r [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """A number of `numbers(metrics)` and the range it must lie in, ends included."""
+
+    name: str
+    path: tuple[str, ...]
+    """Where it stands in `numbers(metrics)`."""
+    low: float = -inf
+    high: float = inf
+    unit: str = ""
+    pattern: str = ".2f"
+    loosen: Literal["share", "r", ""] = ""
+    """How `loosened` widens it."""
+    label: str = ""
+    """What a table of one walk calls it; its name where there is none."""
+
+    def value(self, values: dict[str, Any]) -> float | None:
+        """The number; None where it could not be measured."""
+        place: Any = values
+        for key in self.path:
+            place = place[key]
+        return place
+
+    def holds(self, values: dict[str, Any]) -> bool:
+        """Whether the number was measured and lies in the range."""
+        value = self.value(values)
+        return value is not None and self.low <= value <= self.high
+
+    def loosened(self) -> "Criterion":
+        """With a wider range: by `LOOSENED_BY` of each end, by `LOOSENED_R_BY`, or unchanged, as `loosen` says."""
+        if self.loosen == "share":
+            return replace(
+                self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)
+            )
+        return replace(self, low=self.low - LOOSENED_R_BY) if self.loosen == "r" else self
+
+    @property
+    def text(self) -> str:
+        """The range in words."""
+        low, high = (format(end, self.pattern) for end in (self.low, self.high))
+        if self.low == -inf or self.high == inf:
+            return (f"≤ {high}" if self.low == -inf else f"≥ {low}") + self.unit
+        return low + self.unit if self.low == self.high else f"{low} … {high}{self.unit}"
+
+
+def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
+    """metrics.json with two more keys: `off`, distances from command and plan, and `double_support_percent`."""
+    settings = settings_from(**metrics["environment"])
+    plan = reference_walk_at(settings, settings.speed).plan
+    cadence, support = metrics["cadence_steps_min"], metrics["double_support_s"]
+
+    def share(value: float | None, planned: float) -> float | None:
+        return None if value is None else 100 * abs(value / planned - 1)
+
+    speed = metrics["speed_m_s"]["mean"]
+    off = {
+        "speed_m_s": None if speed is None else abs(speed - settings.speed),
+        "step_length_percent": share(metrics["step_length_m"], plan.step_length),
+        "cadence_percent": share(cadence, 60 / plan.step_time),
+    }
+    percent = None if support is None or not cadence else 100 * support * cadence / 120
+    return metrics | {"off": off, "double_support_percent": percent}
+
+
+def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
+    """The criteria that an evaluation misses, each in words with its number; empty if it meets all."""
+    values = numbers(metrics)
+    return [f"{each.name} {number_text(each, values)}" for each in criteria if not each.holds(values)]
+
+
+def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
+    """The number as it stands in words, with its unit."""
+    value = criterion.value(values)
+    return "?" if value is None else format(value, criterion.pattern) + criterion.unit
+
+
+_FORCES = {
+    "vertical_peak1_bw": "vertical force, peak 1",
+    "vertical_valley_bw": "vertical force, valley",
+    "vertical_peak2_bw": "vertical force, peak 2",
+    "vertical_max_bw": "vertical force, largest 10 ms of any stride",
+    "vertical_r": "vertical force r",
+    "braking_peak_bw": "fore-aft force, braking",
+    "forward_peak_bw": "fore-aft force, forward",
+    "forward_r": "fore-aft force r",
+}
+"""Name in `grf` of metrics.json -> label."""
+
+
+def _force(name: str, low: float = -inf, high: float = inf) -> Criterion:
+    label = _FORCES[name]
+    return Criterion(name=name, path=("grf", name), low=low, high=high, unit=" BW", loosen="share", label=label)
+
+
+def _rmse(joint: str, high: float) -> Criterion:
+    return Criterion(
+        name=joint, path=("joints", joint, "rmse_deg"), high=high, unit="°", loosen="share", label=f"RMSE {joint}"
+    )
+
+
+def _r(name: str, path: tuple[str, ...], low: float) -> Criterion:
+    return Criterion(name=name, path=path, low=low, pattern=".3f", loosen="r", label=_FORCES.get(name, ""))
+
+
+NO_FALLS = Criterion(name="falls", path=("falls",), high=0, pattern=".0f")
+
+WALKS = (
+    NO_FALLS,
+    Criterion(name="speed off by", path=("off", "speed_m_s"), high=0.03, unit=" m/s", pattern=".3f"),
+    _rmse("thigh", 3.5),
+    _rmse("knee", 4.5),
+    _rmse("ankle", 4.0),
+    _force("vertical_peak1_bw", high=1.3),
+    _force("vertical_peak2_bw", high=1.3),
+    _r("vertical_r", ("grf", "vertical_r"), 0.93),
+)
+"""Of a walk: angles nearer to people's mean than one person's usually are, no hard landing."""
+
+MOVES_LIKE_PEOPLE = (
+    _rmse("thigh", 2.5),
+    _rmse("knee", 3.5),
+    _rmse("ankle", 2.5),
+    *(_r(f"{joint} r", ("joints", joint, "r"), 0.98) for joint in ("thigh", "knee", "ankle")),
+    *(
+        Criterion(
+            name=f"{joint} within SD", path=("joints", joint, "within_1sd_percent"), low=low, unit=" %", pattern=".0f"
+        )
+        for joint, low in (("thigh", 75.0), ("knee", 75.0), ("ankle", 75.0), ("toe", 80.0))
+    ),
+    Criterion(name="step length off by", path=("off", "step_length_percent"), high=5.0, unit=" %", pattern=".1f"),
+    Criterion(name="cadence off by", path=("off", "cadence_percent"), high=5.0, unit=" %", pattern=".1f"),
+    Criterion(name="toe-off", path=("toe_off_percent",), low=59.0, high=65.0, unit=" %", pattern=".1f"),
+    Criterion(name="double support", path=("double_support_percent",), low=9.0, high=15.0, unit=" %", pattern=".1f"),
+)
+"""Human-like in motion: below the distance of one healthy person from the mean of many."""
+
+LOADS_LIKE_PEOPLE = (
+    _force("vertical_peak1_bw", 1.0, 1.12),
+    _force("vertical_valley_bw", 0.75, 0.88),
+    _force("vertical_peak2_bw", 1.05, 1.22),
+    _force("vertical_max_bw", high=1.3),
+    _r("vertical_r", ("grf", "vertical_r"), 0.97),
+    _force("braking_peak_bw", -0.20, -0.12),
+    _force("forward_peak_bw", 0.16, 0.25),
+    _r("forward_r", ("grf", "forward_r"), 0.95),
+    Criterion(
+        name="ankle moment peak",
+        path=("moments", "ankle", "peak_Nm_kg"),
+        low=1.2,
+        high=1.5,
+        unit=" N·m/kg",
+        loosen="share",
+    ),
+    Criterion(
+        name="ankle moment peak at",
+        path=("moments", "ankle", "peak_percent"),
+        low=42,
+        high=52,
+        unit=" %",
+        pattern=".0f",
+    ),
+    _r("ankle moment r", ("moments", "ankle", "r"), 0.95),
+    _r("knee moment r", ("moments", "knee", "r"), 0.8),
+    _r("hip moment r", ("moments", "hip", "r"), 0.9),
+    Criterion(
+        name="hip moment within 2 SD",
+        path=("moments", "hip", "within_2sd_percent"),
+        low=80.0,
+        unit=" %",
+        pattern=".0f",
+    ),
+    Criterion(
+        name="hip moment in late swing",
+        path=("moments", "hip", "late_swing_peak_Nm_kg"),
+        high=0.35,
+        unit=" N·m/kg",
+        loosen="share",
+    ),
+)
+"""Human-like in force: ground reaction forces and joint moments."""
+
+
+def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
+    name = f"{joint} work {'+' if sign == 'positive' else '−'}"
+    path = ("joint_work_J_kg", joint, sign)
+    return Criterion(name=name, path=path, low=low, high=high, unit=" J/kg", pattern=".3f", loosen="share")
+
+
+def _near_people(joint: str, sign: str, theirs: float) -> Criterion:
+    """Within the larger of 30 % and 0.05 J/kg of people's work in a stride [J/kg]."""
+    band = max(0.3 * theirs, 0.05)
+    return _work(joint, sign, round(max(theirs - band, 0.0), 3), round(theirs + band, 3))
+
+
+WORKS_LIKE_PEOPLE = (
+    _near_people("hip", "positive", 0.18),
+    _near_people("hip", "negative", 0.13),
+    _near_people("knee", "positive", 0.04),
+    _near_people("knee", "negative", 0.24),
+    _work("ankle", "positive", 0.25, 0.45),
+    _work("ankle", "negative", 0.08, 0.20),
+    Criterion(name="cost of transport", path=("cost_of_transport",), high=0.115, pattern=".3f", loosen="share"),
+)
+"""Human-like in energy: work of each leg's joints in a stride; people's from their mean power at 1.2 m/s."""
+HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE, *WORKS_LIKE_PEOPLE)
+
+FOLLOWS_THE_PLAN = (
+    Criterion(name="CoM x off by", path=("com", "x_rmse_m"), high=0.02, unit=" m", pattern=".4f"),
+    Criterion(name="CoM z off by", path=("com", "z_rmse_m"), high=0.006, unit=" m", pattern=".4f"),
+    _r("CoM z r", ("com", "z_r"), 0.9),
+    _r("forward speed r", ("com", "vx_r"), 0.9),
+    Criterion(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
+    Criterion(
+        name="CoP off in single support", path=("zmp", "cop_rmse_single_support_m"), high=0.02, unit=" m", pattern=".4f"
+    ),
+    Criterion(name="CoP off", path=("zmp", "cop_rmse_m"), high=0.04, unit=" m", pattern=".4f"),
+    _r("CoP r", ("zmp", "r"), 0.95),
+    Criterion(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
+    Criterion(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
+)
+"""Its CoM against the ZMP plan, and feet that neither slide nor stub."""

@@ -1,0 +1,42 @@
+"""Mean and spread of curves over many strides."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.gait.people.cycle import PERCENT
+
+
+@dataclass(kw_only=True, eq=False)
+class StrideCurves:
+    """Mean and spread over strides of C curves, added block by block; NaN before the first stride."""
+
+    names: tuple[str, ...]
+    count: int = 0
+    total: NDArray | float = 0.0
+    squares: NDArray | float = 0.0
+
+    def add(self, curves: NDArray) -> None:
+        """Add strides (S, 101, C)."""
+        self.count += len(curves)
+        self.total = self.total + curves.sum(axis=0)
+        self.squares = self.squares + np.square(curves).sum(axis=0)
+
+    def mean(self, name: str) -> NDArray:
+        """Mean curve (101,)."""
+        return self._pick(np.asarray(self.total) / max(self.count, 1), name) if self.count else self._missing()
+
+    def sd(self, name: str) -> NDArray:
+        """Standard deviation over strides (101,), n - 1."""
+        if self.count < 2:
+            return self._missing()
+        total, squares = np.asarray(self.total), np.asarray(self.squares)
+        variance = (squares - total**2 / self.count) / (self.count - 1)
+        return self._pick(np.sqrt(np.maximum(variance, 0.0)), name)
+
+    def _pick(self, values: NDArray, name: str) -> NDArray:
+        return values[:, self.names.index(name)]
+
+    def _missing(self) -> NDArray:
+        return np.full(len(PERCENT), np.nan)

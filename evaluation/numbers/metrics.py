@@ -1,0 +1,229 @@
+"""The numbers of an evaluation: how human the walk is.
+
+`measure` is a pure function of a recording, so that anyone can recompute every number from `strides.npz`. Human-facing
+edge: angles in degrees, forces in body weights (BW), moments in N m/kg, work in J/kg.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.physics.model import JOINTS
+from springfoot.envs.physics.timing import ACTION_STEP
+from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, body_of, reference_gait, settings_to_json
+from springfoot.envs.task.reward import TERMS
+from springfoot.gait.people import scores as score
+from springfoot.gait.people.cycle import PERCENT
+
+from ..recording.open_loop import feedback
+from ..recording.recording import REWARD, TICK, Recording
+from .curves import StrideCurves
+from .per_leg import ANGLE_COLUMNS, asymmetry, differ, kinds_of, leg_numbers
+from .tally import StrideTally, tally_strides
+
+MOMENT_CURVES = {
+    "hip": "hip_moment_Nm_per_kg",
+    "knee": "knee_moment_Nm_per_kg",
+    "ankle": "ankle_moment_Nm_per_kg",
+    "toe": "mtp_moment_Nm_per_kg",
+}
+
+
+@dataclass(kw_only=True, eq=False)
+class Gait:
+    """A measured gait: `metrics` as written to metrics.json, and the mean curves it stands on."""
+
+    metrics: dict[str, Any] = field(default_factory=dict)
+    """Plain JSON values; None where something could not be measured."""
+    tally: StrideTally = field(default_factory=StrideTally)
+    """What the numbers are computed from."""
+
+    @property
+    def feet(self) -> tuple[StrideCurves, StrideCurves]:
+        """Curves over the stride of the left and the right foot."""
+        return self.tally.feet
+
+    @property
+    def both(self) -> StrideCurves:
+        """Curves over the stride of both feet."""
+        return self.tally.both
+
+    @property
+    def com(self) -> StrideCurves:
+        """CoM over the step, as in `StrideTally`."""
+        return self.tally.com
+
+
+def measure(recording: Recording) -> Gait:
+    """Every number of metrics.json and the mean curves, from the recording alone."""
+    tally = tally_strides(recording)
+    return Gait(metrics=_metrics(recording, tally), tally=tally)
+
+
+def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
+    settings, both = recording.settings, tally.both
+    human = reference_gait(settings)
+    phase = PERCENT / 100
+    reasons = Counter(str(reason) for reason in recording.fall_reason if reason)
+    features = score.force_features(both.mean("grf_vertical_bw"), both.mean("grf_forward_bw"))
+    toe_off = _mean(tally.toe_off)
+    plan_x, plan_z = recording.plan_com.T
+    com_z = tally.com.mean("z")
+
+    def joint(name: str) -> dict[str, Any]:
+        curve, people = both.mean(ANGLE_COLUMNS[name]), np.degrees(human.mean(name, phase))
+        return {
+            "rmse_deg": score.rmse(curve, people),
+            "r": score.correlation(curve, people),
+            "within_1sd_percent": score.share_within_sd(curve, people, np.degrees(human.sd(name, phase))),
+        }
+
+    def moment(name: str) -> dict[str, Any]:
+        curve = both.mean(MOMENT_CURVES[name])
+        peak, percent = score.largest(curve)
+        late = score.largest(curve[LATE_SWING_PERCENT:])[0]
+        entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late}
+        if name == "toe":
+            return entry | {"r": None, "within_2sd_percent": None}
+        people, sd = human.mean(f"{name}_moment", phase), human.sd(f"{name}_moment", phase)
+        return entry | {
+            "r": score.correlation(curve, people),
+            "within_2sd_percent": score.share_within_sd(curve, people, 2 * sd),
+        }
+
+    def force_r(name: str) -> float | None:
+        return score.correlation(both.mean(f"{name}_bw"), human.mean(name, phase))
+
+    def stiffness(name: str) -> dict[str, Any]:
+        return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), 60.0 if toe_off is None else toe_off)
+
+    work = _joint_work(tally)
+    legs = leg_numbers(tally) if differ(settings) else None
+    return {
+        "policy": recording.policy,
+        "environment": settings_to_json(settings),
+        "reference": {
+            "condition": human.condition,
+            "speed_m_s": human.speed,
+            "borrowed": list(human.borrowed),
+        },
+        "feet": kinds_of(settings),
+        "seed": recording.seed,
+        "episodes": len(recording.ticks),
+        "falls": sum(reasons.values()),
+        "fall_reasons": dict(reasons),
+        "came_to_rest": None if settings.stop_at is None else tally.at_rest,
+        "seconds_mean": float(recording.ticks.mean() * TICK),
+        "return": score.mean_sd(recording.returns),
+        "reward_terms": _reward_terms(recording),
+        "strides": {"count": both.count, "in_episodes_that_fell": tally.strides_of_falls},
+        "speed_m_s": score.mean_sd(tally.speed),
+        "step_length_m": _mean(tally.step_length),
+        "cadence_steps_min": 60 / float(np.mean(tally.step_time)) if tally.step_time else None,
+        "double_support_s": _mean(tally.double_support),
+        "toe_off_percent": toe_off,
+        "joints": {name: joint(name) for name in ANGLE_COLUMNS},
+        "com": {
+            "x_rmse_m": score.rmse(tally.com.mean("x"), plan_x),
+            "z_rmse_m": score.rmse(com_z, plan_z),
+            "z_r": score.correlation(com_z, plan_z),
+            "vx_r": score.correlation(tally.com.mean("vx"), np.gradient(plan_x)),
+            "rise_m": float(np.ptp(com_z)) if tally.com.count else None,
+        },
+        "grf": {
+            "vertical_peak1_bw": features.vertical_peak1,
+            "vertical_valley_bw": features.vertical_valley,
+            "vertical_peak2_bw": features.vertical_peak2,
+            "vertical_max_bw": float(max(tally.vertical_max)) if tally.vertical_max else None,
+            "vertical_r": force_r("grf_vertical"),
+            "braking_peak_bw": features.braking_peak,
+            "forward_peak_bw": features.forward_peak,
+            "forward_r": force_r("grf_forward"),
+        },
+        "moments": {name: moment(name) for name in MOMENT_CURVES},
+        "ankle_work_J_kg": work["ankle"],
+        "joint_work_J_kg": work,
+        "energy_J_kg": _energy(tally),
+        "springs_J_kg": _springs(tally),
+        "zmp": _zmp(recording.plan_zmp, tally),
+        "cost_of_transport": score.cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
+        "stiffness_Nm_rad": {name: stiffness(name) for name in ("ankle", "toe")},
+        "feedback": feedback(recording),
+        "per_leg": legs,
+        "asymmetry": None if legs is None else asymmetry(legs),
+        "contact_travel_m": _mean(tally.travel),
+        "toe_clearance_m": float(np.median(tally.clearance)) if tally.clearance else None,
+    }
+
+
+def _reward_terms(recording: Recording) -> dict[str, dict[str, float]]:
+    """`reward_terms`: what each term brings to the return of an episode."""
+    terms = np.nan_to_num(recording.series[REWARD].astype(float))
+    weights = DEFAULT_WEIGHTS | recording.settings.reward_weights
+    alive = terms[..., TERMS.index("alive")]
+    return {
+        name: {
+            "weight": float(weights[name]),
+            "return_mean": float(weights[name] * (alive * terms[..., term]).sum(1).mean() * TICK / ACTION_STEP),
+        }
+        for term, name in enumerate(TERMS)
+    }
+
+
+def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
+    """`joint_work_J_kg`."""
+    if not tally.joint_work:
+        return {joint: {"positive": None, "negative": None} for joint in JOINTS}
+    mean = np.mean(tally.joint_work, axis=0)
+    return {
+        joint: {"positive": float(up), "negative": float(-down)} for joint, (up, down) in zip(JOINTS, mean, strict=True)
+    }
+
+
+LATE_SWING_PERCENT = 80
+"""Percent of the stride from which the hip holds the leg back before it lands."""
+SPRING_SOURCES = ("stiffness_changes", "equilibrium_changes", "spring_damping")
+"""What gives a spring its energy, and takes it, between the plan and the joint (`springfoot.envs.physics.energy`)."""
+
+
+def _energy(tally: StrideTally) -> dict[str, float | None]:
+    """`energy_J_kg`: both legs, a stride, into the body positive."""
+    order = ("actuators", "stiffness_changes", "equilibrium_changes", "passive_damping", "spring_damping", "contact")
+    names = (*order, "pushes", "mechanical_change", "residual")
+    if not tally.energy:
+        return dict.fromkeys(names)
+    entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
+    for source in SPRING_SOURCES:
+        entry[source] = sum(entry[f"{source}/{joint}"] for joint in JOINTS)
+    change = entry["mechanical_change"] = entry["mechanical"]
+    entry["residual"] = change - sum(entry[name] for name in ("actuators", "passive_damping", "contact", "pushes"))
+    return {name: entry[name] for name in names}
+
+
+def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
+    """`springs_J_kg`: of one leg, a stride."""
+    if not tally.energy:
+        return {joint: dict.fromkeys(SPRING_SOURCES) for joint in JOINTS}
+    entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
+    return {joint: {source: 0.5 * entry[f"{source}/{joint}"] for source in SPRING_SOURCES} for joint in JOINTS}
+
+
+def _zmp(planned: NDArray, tally: StrideTally) -> dict[str, float | None]:
+    """`zmp`: the mean CoP against the plan over percent 0 to 99 of the step; at 100 % the plan is at the next foot."""
+    cop = tally.cop.mean("x")[:-1]
+    alone = np.full(len(cop), False)
+    if tally.step_time:
+        alone = PERCENT[:-1] >= 100 * np.mean(tally.double_support) / np.mean(tally.step_time)
+    return {
+        "cop_rmse_single_support_m": score.rmse(cop[alone], planned[:-1][alone]) if alone.any() else None,
+        "cop_rmse_m": score.rmse(cop, planned[:-1]),
+        "r": score.correlation(cop, planned[:-1]),
+    }
+
+
+def _mean(values: list[float]) -> float | None:
+    return float(np.mean(values)) if values else None

@@ -1,0 +1,93 @@
+"""The numbers of each leg by itself, where the feet differ, and how far the legs are apart."""
+
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.model import JOINTS, SIDES
+from springfoot.envs.settings.feet import feet_of, kind_of
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.gait.people import scores as score
+
+from .tally import StrideTally
+
+ANGLE_COLUMNS = {
+    "thigh": "thigh_flexion_deg",
+    "knee": "knee_flexion_deg",
+    "ankle": "ankle_dorsiflexion_deg",
+    "toe": "mtp_dorsiflexion_deg",
+}
+"""Joint -> column of the curves over the stride."""
+
+
+def kinds_of(settings: BipedSettings) -> dict[str, str]:
+    """`feet` of metrics.json: the kind of the left and of the right foot."""
+    return {"left": kind_of(settings.left_foot), "right": kind_of(settings.right_foot)}
+
+
+def differ(settings: BipedSettings) -> bool:
+    """Whether the two feet are not the same."""
+    left, right = feet_of(settings.left_foot, settings.right_foot)
+    return left != right
+
+
+def leg_numbers(tally: StrideTally) -> dict[str, dict[str, Any]]:
+    """`per_leg` of metrics.json: the numbers of the left and of the right leg."""
+    return {side: _of_leg(tally, index) for index, side in enumerate(SIDES)}
+
+
+def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
+    """`asymmetry` of metrics.json: right less left over their mean, 0 for legs that do the same."""
+    names = ("step_length_m", "stance_percent", "vertical_max_mean_bw")
+    return {name.rpartition("_")[0]: _apart(*(legs[side][name] for side in SIDES)) for name in names}
+
+
+def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
+    curves, mine = tally.feet[side], np.array(tally.stride_sides, int) == side
+    features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))
+    work = _chosen(tally.joint_work, mine)
+    stance = _mean(_chosen(tally.toe_off, mine))
+    return {
+        "strides": int(mine.sum()),
+        "step_length_m": _mean(_chosen(tally.step_length, np.array(tally.step_sides, int) == side)),
+        "stance_percent": stance,
+        "joint_range_deg": {
+            joint: float(np.ptp(curves.mean(column))) if curves.count else None
+            for joint, column in ANGLE_COLUMNS.items()
+        },
+        "vertical_peak1_bw": features.vertical_peak1,
+        "vertical_peak2_bw": features.vertical_peak2,
+        "vertical_max_mean_bw": _mean(_chosen(tally.vertical_max, mine)),
+        "braking_peak_bw": features.braking_peak,
+        "forward_peak_bw": features.forward_peak,
+        "joint_work_J_kg": {
+            joint: dict(zip(("positive", "negative"), _signs(work, index), strict=True))
+            for index, joint in enumerate(JOINTS)
+        },
+        "toe_clearance_m": float(np.median(_chosen(tally.clearance, mine))) if mine.any() else None,
+        "stiffness_Nm_rad": {
+            name: score.phase_means(curves.mean(f"{name}_stiffness_Nm_per_rad"), 60.0 if stance is None else stance)
+            for name in ("ankle", "toe")
+        },
+    }
+
+
+def _chosen(values: list[Any], mine: NDArray) -> NDArray:
+    return np.array(values)[mine] if len(values) else np.empty(0)
+
+
+def _mean(values: NDArray) -> float | None:
+    return float(values.mean()) if len(values) else None
+
+
+def _signs(work: NDArray, joint: int) -> tuple[float | None, float | None]:
+    """Positive work, and negative work as a positive number, of one joint; from (strides, joint, 2)."""
+    if not len(work):
+        return None, None
+    up, down = work[:, joint].mean(0)
+    return float(up), float(-down)
+
+
+def _apart(left: float | None, right: float | None) -> float | None:
+    return None if left is None or right is None else 2 * (right - left) / (right + left)

@@ -1,0 +1,108 @@
+"""The strides of one recorded episode: when each begins and ends, and its curves over percent of it.
+
+Human-facing edge: angles in degrees, forces in body weights (BW), moments in N m/kg.
+"""
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
+
+from ..recording.recording import TICK
+
+GAIT_CYCLE_COLUMNS = (
+    "hip_flexion_deg",
+    "knee_flexion_deg",
+    "ankle_dorsiflexion_deg",
+    "pelvis_anterior_tilt_deg",
+    "thigh_flexion_deg",
+    "shank_pitch_deg",
+    "foot_pitch_deg",
+    "hip_moment_Nm_per_kg",
+    "knee_moment_Nm_per_kg",
+    "ankle_moment_Nm_per_kg",
+    "hip_power_W_per_kg",
+    "knee_power_W_per_kg",
+    "ankle_power_W_per_kg",
+    "grf_vertical_bw",
+    "grf_forward_bw",
+    "mtp_dorsiflexion_deg",
+    "mtp_moment_Nm_per_kg",
+    "ankle_stiffness_Nm_per_rad",
+    "toe_stiffness_Nm_per_rad",
+    "ankle_equilibrium_deg",
+    "mtp_equilibrium_deg",
+)
+"""Columns of gait_cycle.csv. Hip: thigh to trunk; shank pitch: foot ahead; foot pitch: toes up. Moments are internal
+(actuator and joint damping), hip and knee extension, ankle and toe (mtp) plantarflexion positive; power: generation."""
+
+
+def foot_contacts(series: dict[str, NDArray], body: Body) -> list[Contacts]:
+    """Heel strikes and toe-offs of the left and of the right foot."""
+    vertical = series["force"][..., 1].sum(axis=2)
+    threshold = CONTACT_THRESHOLD_BW * body.mass * GRAVITY
+    # Forces and moments are means over a tick, so they belong to its middle; states to its end.
+    return [find_contacts(vertical[:, side], TICK, threshold, first=TICK / 2) for side in range(len(SIDES))]
+
+
+def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
+    """(S, 3) heel strike, toe-off and next heel strike [s] of the complete strides within the `steady` time [s]."""
+    strides = foot.strides(after=steady[0])
+    return strides[strides[:, 2] <= steady[1]]
+
+
+def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
+    """(S, 101, C) `GAIT_CYCLE_COLUMNS` of one leg over `strides` (S, 3)."""
+    begin, _, end = strides.T
+    return np.concatenate(
+        [
+            on_percent(_states(series, side, body), begin, end, TICK, first=TICK),
+            on_percent(_means(series, side, body), begin, end, TICK, first=TICK / 2),
+        ],
+        axis=-1,
+    )[..., _ORDER]
+
+
+def mid_tick(state: NDArray) -> NDArray:
+    """What is known at the ends of ticks (T, ...) at their middles."""
+    return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
+
+
+def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without those of `_means`."""
+    angle = np.degrees(series["angle"][:, side])
+    pitch = np.degrees(series["base"][:, 2])
+    thigh = angle[:, HIP] - pitch
+    shank = thigh - angle[:, KNEE]
+    equilibrium = np.degrees(series["equilibrium"][:, side])
+    return np.column_stack(
+        [
+            *(angle[:, joint] for joint in (HIP, KNEE, ANKLE)),
+            pitch,
+            thigh,
+            shank,
+            shank + angle[:, ANKLE],
+            angle[:, TOE],
+            series["stiffness"][:, side],
+            equilibrium,
+        ]
+    )
+
+
+def _means(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+    """(T, C) curves that are means over ticks, in the order of `_MEANS`."""
+    force = series["force"][:, side].sum(axis=1) / (body.mass * GRAVITY)
+    moment = -series["joint_torque"][:, side] / body.mass
+    power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass
+    return np.column_stack([force[:, ::-1], moment, power[:, :TOE]])
+
+
+_MEANS = (
+    *("grf_vertical_bw", "grf_forward_bw"),
+    *(f"{joint}_moment_Nm_per_kg" for joint in ("hip", "knee", "ankle", "mtp")),
+    *(f"{joint}_power_W_per_kg" for joint in ("hip", "knee", "ankle")),
+)
+_STATES = tuple(name for name in GAIT_CYCLE_COLUMNS if name not in _MEANS)
+_ORDER = [(_STATES + _MEANS).index(name) for name in GAIT_CYCLE_COLUMNS]

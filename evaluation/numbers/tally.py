@@ -1,0 +1,186 @@
+"""From the 100 Hz series of a recording to curves over the stride and one value for each stride, step and episode.
+
+Human-facing edge: angles in degrees, forces in body weights (BW), moments in N m/kg, work in J/kg.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.physics.contact import CONTACTS
+from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.physics.model import SIDES, contact_material
+from springfoot.envs.settings.settings import body_of
+from springfoot.envs.task.reward import TERMS
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait.people import scores as score
+from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
+
+from ..recording.recording import REWARD, TICK, WARM_UP, Recording
+from .curves import StrideCurves
+from .series import GAIT_CYCLE_COLUMNS, foot_contacts, mid_tick, stride_curves, strides_within
+
+SHORTEST_SPEED = 1.0
+"""An episode that ends earlier than this after the warm-up [s] does not count for the speed."""
+CLEARANCE_SWING = (0.25, 0.75)
+"""Part of the swing over which toe clearance is measured [share of the swing]."""
+
+
+@dataclass(kw_only=True, eq=False)
+class StrideTally:
+    """What is collected stride by stride, step by step and episode by episode."""
+
+    feet: tuple[StrideCurves, StrideCurves] = field(
+        default_factory=lambda: (StrideCurves(names=GAIT_CYCLE_COLUMNS), StrideCurves(names=GAIT_CYCLE_COLUMNS))
+    )
+    """Curves over the stride of the left and the right foot."""
+    both: StrideCurves = field(default_factory=lambda: StrideCurves(names=GAIT_CYCLE_COLUMNS))
+    """Curves over the stride of both feet."""
+    com: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x", "z", "vx")))
+    """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
+    cop: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x",)))
+    """CoP of both feet over the step, x from the same ankle [m]."""
+    reward: StrideCurves = field(default_factory=lambda: StrideCurves(names=TERMS))
+    """The reward's terms over the step, unweighted [-]."""
+    strides_of_falls: int = 0
+    """Strides of episodes that ended in a fall."""
+    at_rest: int = 0
+    """Episodes that ended standing still."""
+    speed: list[float] = field(default_factory=list)
+    """Of each episode [m/s]."""
+    distance: float = 0.0
+    """Walked in all episodes together [m]."""
+    work: float = 0.0
+    """Positive work of all joints in all episodes together [J]."""
+    step_length: list[float] = field(default_factory=list)
+    """Of each step [m]."""
+    step_time: list[float] = field(default_factory=list)
+    """Of each step [s]."""
+    double_support: list[float] = field(default_factory=list)
+    """Of each step [s]."""
+    step_sides: list[int] = field(default_factory=list)
+    """Foot that makes each step: 0 the left one swings and lands at the step's end, 1 the right one."""
+    stride_sides: list[int] = field(default_factory=list)
+    """Leg of each stride, 0 left, 1 right."""
+    toe_off: list[float] = field(default_factory=list)
+    """Of each stride [%]."""
+    vertical_max: list[float] = field(default_factory=list)
+    """Largest vertical force of each stride [BW]."""
+    joint_work: list[NDArray] = field(default_factory=list)
+    """(joint, 2) positive and negative work of one leg in each of its strides [J/kg]."""
+    energy: list[NDArray] = field(default_factory=list)
+    """What each entry of the body's ledger (`springfoot.envs.physics.energy`) comes to in each stride [J/kg]."""
+    travel: list[float] = field(default_factory=list)
+    """Distance the loaded sole slides in each stance [m]."""
+    clearance: list[float] = field(default_factory=list)
+    """Least height of ball and toe in the middle of each swing [m]."""
+
+
+def tally_strides(recording: Recording) -> StrideTally:
+    """Every stride, step and episode of a recording, its steady walk only, without the warm-up."""
+    tally, body = StrideTally(), body_of(recording.settings)
+    fell = recording.fall_reason != ""
+    begin, end = steady_walk(recording.settings)
+    for episode, ticks in enumerate(recording.ticks):
+        series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
+        if ticks:
+            _add_episode(tally, series, body, (begin + WARM_UP, end), bool(fell[episode]))
+            tally.at_rest += not fell[episode] and score.at_rest(
+                series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
+            )
+    return tally
+
+
+def _add_episode(
+    tally: StrideTally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool
+) -> None:
+    """`steady` is the time [s] the numbers are taken from."""
+    weight = body.mass * GRAVITY
+    com = series["com"]
+    begin, end = (round(min(time / TICK, len(com))) for time in steady)
+    if end > begin:
+        distance, seconds = com[end - 1, 0] - com[begin - 1, 0], (end - begin) * TICK
+        tally.distance += distance
+        tally.work += float(series["joint_work"][begin:end, ..., 0].sum())
+        if seconds >= SHORTEST_SPEED:
+            tally.speed.append(distance / seconds)
+
+    vertical = series["force"][..., 1].sum(axis=2)
+    contacts = foot_contacts(series, body)
+    material = contact_material(body, series["contact"], series["base"], series["angle"])
+    for side, foot in enumerate(contacts):
+        strides = strides_within(foot, steady)
+        heel_strike, toe_off, end = strides.T
+        curves = stride_curves(series, side, body, strides)
+        tally.feet[side].add(curves)
+        tally.both.add(curves)
+        tally.strides_of_falls += fell * len(strides)
+        tally.stride_sides += [side] * len(strides)
+        tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
+        tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, end) / body.mass)
+        tally.energy += list(_energies(series["energy"], heel_strike, end) / body.mass)
+        contact, load = series["contact"][:, side], series["force"][:, side, :, 1]
+        for start, leave, stop in np.floor(strides / TICK).astype(int):
+            tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
+            stance = slice(start, leave + 1)
+            tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
+            first, last = (round(leave + share * (stop - leave)) for share in CLEARANCE_SWING)
+            tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
+    _add_steps(tally, series, contacts, steady)
+
+
+def _add_steps(
+    tally: StrideTally, series: dict[str, NDArray], contacts: list[Contacts], steady: tuple[float, float]
+) -> None:
+    steps, sides = find_steps(contacts[0], contacts[1], after=steady[0])
+    in_time = steps[:, 1] <= steady[1]
+    steps, sides = steps[in_time], sides[in_time]
+    for side in range(len(SIDES)):
+        begin, end = steps[sides == side].T
+        relative = np.column_stack(
+            [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
+        )
+        tally.com.add(on_percent(relative, begin, end, TICK, first=TICK))
+        cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
+        tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
+        tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
+        # Step length: where the other foot lands at the step's end, less where this one landed at its start.
+        at = np.floor(np.stack([begin, end]) / TICK).astype(int)
+        ankle = series["ankle"][..., 0]
+        tally.step_length += list(ankle[at[1], 1 - side] - ankle[at[0], side])
+        tally.step_time += list(end - begin)
+        tally.step_sides += [1 - side] * len(begin)
+        # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
+        support = next_after(contacts[1 - side].toe_offs, begin) - begin
+        tally.double_support += list(np.where(support < end - begin, support, 0.0))
+
+
+def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+    """(S, ...) sums of (T, ...) over spans from `begin` to `end` (S,) [s], ticks that lie in part counted in part."""
+    total = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
+
+    def at(time: NDArray) -> NDArray:
+        place = time / TICK
+        index = np.minimum(place.astype(int), len(per_tick) - 1)
+        share = (place - index).reshape(-1, *[1] * (total.ndim - 1))
+        return total[index] + share * (total[index + 1] - total[index])
+
+    return at(end) - at(begin)
+
+
+def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+    """(S, entries) of the ledger (T, entries) in strides from `begin` to `end` (S,): its works, and the rise of the
+    mechanical energy [J]."""
+    flow, state = energy.copy(), ledger_entries().index("mechanical")
+    flow[1:, state] = np.diff(energy[:, state])
+    return _sums(flow, begin, end)
+
+
+def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
+    """(T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
+    load, place = series["force"][..., 1], mid_tick(series["contact"][..., 0])
+    total = load.sum(axis=(1, 2))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (load * place).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)

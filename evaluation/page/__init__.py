@@ -1,0 +1,1 @@
+"""The pages that a browser opens offline: report.html and play.html."""

@@ -1,0 +1,193 @@
+"""What `report.html` draws of one policy, as plain JSON values: table, curves, schedules, loops, and the body.
+
+None stands for what could not be measured. Numbers are rounded to what a screen shows; those of metrics.json are not.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.settings import body_of, reference_gait
+from springfoot.envs.task.reward import TERMS
+from springfoot.gait import HumanGait
+from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.springs.stiffness import SPRINGS, thesis_schedule
+
+from ..numbers.curves import StrideCurves
+from ..numbers.metrics import MOMENT_CURVES, Gait
+from ..numbers.per_leg import ANGLE_COLUMNS, differ
+from ..recording.recording import Recording
+from ..report.schedule_tables import schedule_curves
+from .page_figure import figure_data, shown_numbers
+
+FORCE_PANELS = {
+    "grf_vertical": ("Vertical force", "up, body weights"),
+    "grf_forward": ("Fore-aft force", "forward, body weights"),
+}
+
+
+def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
+    """All that the page shows of one policy but its words and its table."""
+    human, apart = reference_gait(recording.settings), differ(recording.settings)
+    return {
+        "name": recording.policy,
+        "metrics": gait.metrics,
+        "people": f"people at {human.speed:.2f} m/s" if recording.settings.human is None else human.condition,
+        "toe_off": shown_numbers(
+            np.array([np.nan if (t := gait.metrics["toe_off_percent"]) is None else t, 100 * human.toe_off])
+        ),
+        "panels": [
+            *_angles(gait, human, apart),
+            *_kinetics(gait, human, apart),
+            *_com(recording, gait),
+            *_springs(recording),
+            *_reward(gait),
+        ],
+        "loops": _loops(recording, gait, human, apart),
+        "figure": figure_data(recording),
+    }
+
+
+def _panel(group: str, title: str, unit: str, own: tuple[NDArray, NDArray], **more: Any) -> dict[str, Any]:
+    return {
+        "group": group,
+        "title": title,
+        "unit": unit,
+        "mean": shown_numbers(own[0]),
+        "sd": shown_numbers(own[1]),
+    } | more
+
+
+def _of(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
+    return curves.mean(name), curves.sd(name)
+
+
+def _legs(gait: Gait, name: str, apart: bool) -> dict[str, Any]:
+    """`legs`: the same curve of the left and of the right leg, where the feet are `apart`."""
+    if not apart:
+        return {}
+    return {
+        "legs": [{"mean": shown_numbers(own.mean(name)), "sd": shown_numbers(own.sd(name))} for own in gait.plan.foot],
+    }
+
+
+def _people(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any]:
+    unit = np.degrees(1.0) if degrees else 1.0
+    phase = PERCENT / 100
+    return {
+        "people": shown_numbers(unit * human.mean(name, phase)),
+        "people_sd": shown_numbers(unit * human.sd(name, phase)),
+    }
+
+
+def _angles(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+    positive = {"ankle": "dorsiflexion", "toe": "up"}
+    return [
+        _panel(
+            *("Angles", f"{joint.capitalize()} angle", f"{positive.get(joint, 'flexion')}, deg"),
+            _of(gait.both, column),
+            **_people(human, joint, degrees=True),
+            **_legs(gait, column, apart),
+        )
+        for joint, column in ANGLE_COLUMNS.items()
+    ]
+
+
+def _kinetics(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+    def stride(group: str, title: str, unit: str, column: str, theirs: dict[str, Any]) -> dict[str, Any]:
+        return _panel(group, title, unit, _of(gait.both, column), **theirs, **_legs(gait, column, apart))
+
+    panels = []
+    for joint, column in MOMENT_CURVES.items():
+        unit = f"{'extension' if joint in ('hip', 'knee') else 'plantarflexion'}, N·m/kg"
+        theirs = {} if joint == "toe" else _people(human, f"{joint}_moment")
+        panels.append(stride("Moments", f"{joint.capitalize()} moment", unit, column, theirs))
+    for joint in ("hip", "knee", "ankle"):
+        column, theirs = f"{joint}_power_W_per_kg", _people(human, f"{joint}_power")
+        panels.append(stride("Powers", f"{joint.capitalize()} power", "generation, W/kg", column, theirs))
+    for name, (title, unit) in FORCE_PANELS.items():
+        panels.append(stride("Ground reaction forces", title, unit, f"{name}_bw", _people(human, name)))
+    return panels
+
+
+def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
+    group, axis = "Centre of mass, centre of pressure and their plans, over the step", "step"
+    com, (x, z) = gait.com, recording.plan_com.T
+    cop = gait.tally.cop
+    return [
+        _panel(group, "CoM ahead of the ankle", "forward, m", _of(com, "x"), plan=shown_numbers(x), axis=axis),
+        _panel(group, "CoM height", "above the ground, m", _of(com, "z"), plan=shown_numbers(z), axis=axis),
+        _panel(
+            group,
+            "CoP and planned ZMP",
+            "ahead of the ankle, m",
+            _of(cop, "x"),
+            plan=shown_numbers(recording.plan_zmp),
+            axis=axis,
+        ),
+    ]
+
+
+def _springs(recording: Recording) -> list[dict[str, Any]]:
+    """K and theta_eq over the leg's phase: its mean is the open-loop copy, the SD around it feedback."""
+    curves, group = schedule_curves(recording), "Stiffness and equilibrium over the leg's phase"
+    panels = []
+    for column, words, unit in (
+        ("stiffness_Nm_per_rad", "stiffness K", "N·m/rad"),
+        ("equilibrium_deg", "equilibrium θ_eq", "dorsiflexion or up, deg"),
+    ):
+        for joint in SPRINGS:
+            for side in SIDES:
+                name = f"{joint}_{side}_{column}"
+                title = f"{side.capitalize()} {joint}, {words}"
+                panels.append(
+                    _panel(group, title, unit, (curves[name], curves[f"{name}_sd"]), zero=unit == "N·m/rad", axis=side)
+                )
+    return panels
+
+
+def _reward(gait: Gait) -> list[dict[str, Any]]:
+    """The reward's terms over the step: rewards from 0 to 1, and costs."""
+    group = "Reward terms over the step, unweighted"
+    return [
+        _panel(group, f"Reward term {name}", "dimensionless", _of(gait.tally.reward, name), zero=True, axis="step")
+        for name in TERMS
+    ]
+
+
+def _loops(recording: Recording, gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+    """Moment over angle of ankle and toe; of the ankle also people's, and the thesis's straight lines."""
+    phase = PERCENT / 100
+    body = body_of(recording.settings)
+    lines = [
+        segment for segment in thesis_schedule(body, recording.settings.speed).ankle if segment.start < human.toe_off
+    ]
+    ends = [*(segment.start for segment in lines[1:]), human.toe_off]
+    thesis = []
+    for segment, end in zip(lines, ends, strict=True):
+        angle = human.mean("ankle", np.array([segment.start, end]))
+        moment = segment.stiffness * (angle - segment.equilibrium) / (body.total_mass * body.length_scale)
+        thesis.append(shown_numbers(np.stack([np.degrees(angle), moment], -1)))
+
+    def of(curves: StrideCurves, joint: str) -> dict[str, Any]:
+        angle, moment = curves.mean(f"{joint}_dorsiflexion_deg"), curves.mean(f"{joint}_moment_Nm_per_kg")
+        return {"x": shown_numbers(angle), "y": shown_numbers(moment)}
+
+    def loop(joint: str) -> dict[str, Any]:
+        return of(gait.both, joint) | ({"legs": [of(own, joint) for own in gait.plan.foot]} if apart else {})
+
+    return [
+        {
+            "title": "Ankle: moment over angle",
+            **loop("ankle"),
+            "people_x": shown_numbers(np.degrees(human.mean("ankle", phase))),
+            "people_y": shown_numbers(human.mean("ankle_moment", phase)),
+            "thesis": thesis,
+        },
+        {
+            "title": "Toe: moment over angle",
+            **loop("mtp"),
+        },
+    ]

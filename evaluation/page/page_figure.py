@@ -1,0 +1,135 @@
+"""The body of `report.html`: two strides of it tick by tick, as plain JSON values, and what its feet are."""
+
+from collections.abc import Mapping
+from math import radians, tan
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.foot_springs import stiffness_ranges
+from springfoot.envs.physics.contact import contact_offsets
+from springfoot.envs.physics.foot import LOCK, Foot, FootJoint
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, feet_of, kind_of
+from springfoot.envs.settings.settings import body_of
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts
+
+from ..recording.recording import TICK, Recording
+from ..report.animation import clip_of
+from ..report.exports import opensim_forces
+
+DRAWN_DIGITS = 4
+"""Significant digits of what is drawn; chosen: finer than a pixel."""
+
+
+def shown_numbers(values: NDArray) -> Any:
+    """An array as lists of numbers of `DRAWN_DIGITS` digits, None for NaN."""
+    if values.ndim > 1:
+        return [shown_numbers(row) for row in values]
+    return [float(f"{value:.{DRAWN_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
+
+
+def figure_data(recording: Recording) -> dict[str, Any]:
+    """Two strides of the body, tick by tick: joints, forces, masses and plans, in metres of the world."""
+    settings, body = recording.settings, body_of(recording.settings)
+    _, first, last = clip_of(recording, body)
+    whole = recording.shown()
+    series = {name: values[first:last] for name, values in whole.items()}
+    slope = tan(radians(settings.slope_deg))
+    forces = {name: values[first:last] for name, values in opensim_forces(recording).items()}
+    contacts = [_contacts_of(whole, side, body) for side in range(len(SIDES))]
+    percent = [_percent_of(each.heel_strikes, len(whole["phase"]))[first:last] for each in contacts]
+    steps = np.unique(np.concatenate([each.heel_strikes for each in contacts]))
+    phase = np.append(whole["phase"], whole["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
+    offsets, weight = contact_offsets(body), body.mass * GRAVITY
+    settings_of_feet = settings.left_foot, settings.right_foot
+    acting = {"px": 1.0, "vx": weight, "vy": weight}
+    return {
+        "seconds_a_frame": TICK,
+        "strides": bool(np.isfinite(percent[0]).any()),
+        "slope": slope,
+        "height": body.height,
+        "feet": [_foot(own, foot) for own, foot in zip(settings_of_feet, feet_of(*settings_of_feet), strict=True)],
+        "lengths": {
+            "trunk": body.trunk_length,
+            "thigh": body.thigh_length,
+            "shank": body.shank_length,
+            "toe_joint": [body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height],
+            "heel": list(offsets["heel"]),
+            "ball": list(offsets["ball"]),
+            "toe": list(offsets["toe"]),
+        },
+        "ranges": [[float(value) for value in ends] for ends in zip(*stiffness_ranges(settings, body), strict=True)],
+        "base": shown_numbers(series["base"]),
+        "angle": shown_numbers(series["angle"].reshape(len(series["angle"]), -1)),
+        "com": shown_numbers(series["com"]),
+        "plan": shown_numbers(series["com_reference"]),
+        "zmp": shown_numbers(planned_zmp(recording, whole)[first:last]),
+        "force": [
+            shown_numbers(
+                np.stack([forces[f"ground_force_{side[0]}_{part}"] / unit for part, unit in acting.items()], -1)
+            )
+            for side in SIDES
+        ],
+        "stiffness": shown_numbers(series["stiffness"].reshape(len(series["stiffness"]), -1)),
+        "equilibrium": shown_numbers(np.degrees(series["equilibrium"]).reshape(len(series["equilibrium"]), -1)),
+        "percent": shown_numbers(np.stack(percent, -1)),
+        "step": shown_numbers(_percent_of(steps, len(whole["phase"]))[first:last]),
+        "phase": shown_numbers(phase % 1.0),
+    }
+
+
+def _contacts_of(series: dict[str, NDArray], side: int, body: Body) -> Contacts:
+    vertical = series["force"][:, side, :, 1].sum(axis=1)
+    return find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY, first=TICK / 2)
+
+
+def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
+    """(T,) percent from one of `strikes` [s] to the next at the end of each of `ticks`, NaN outside them."""
+    time = TICK * np.arange(1, ticks + 1)
+    if len(strikes) < 2:
+        return np.full(len(time), np.nan)
+    at = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
+    return 100 * (at % 1.0)
+
+
+def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
+    """(T,) forward place of the planned ZMP [m]: over the step of the leg whose stance began last, from its ankle."""
+    phase = series["phase"] % 1.0
+    side = np.where(phase[:, 0] < phase[:, 1], 0, 1)
+    every = np.arange(len(phase))
+    ahead = np.interp(np.minimum(200 * phase[every, side], 99.0), PERCENT, recording.plan_zmp)
+    return series["ankle"][every, side, 0] + ahead
+
+
+def _foot(setting: str | Mapping[str, Any], foot: Foot) -> dict[str, Any]:
+    """What a foot is, in words; whether it is one piece, without a toe joint; what is at its ankle and its toe."""
+    joints = [_at_joint(joint) for joint in foot.joints]
+    worn = any(joint.orthosis is not None for joint in foot.joints)
+    return {"words": foot_words(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": worn}
+
+
+def _at_joint(joint: FootJoint) -> str:
+    if joint.device is None:
+        return "muscles"
+    return "lock" if joint.device == LOCK else "device"
+
+
+def foot_words(setting: str | Mapping[str, Any]) -> str:
+    """A foot of the settings for people who read: its kind, and the numbers that were given of it."""
+    kind = kind_of(setting)
+    given = {} if isinstance(setting, str) else dict(setting)
+    known = KINDS[kind] | SEGMENT_RATIOS
+    words = [f"{_plain(name)} {given[name]:g} {known[name].unit}" for name in known if name in given]
+    words += [f"{_plain(name)} of {len(given[name])} points" for name in given if name.endswith("_table")]
+    words += ["on a schedule of its own"] if "schedule" in given else []
+    if "orthosis" in given:
+        its = [f"{_plain(name)} {value:g} {ORTHOSIS_NUMBERS[name].unit}" for name, value in given["orthosis"].items()]
+        words.append(f"in an orthosis with {' and '.join(its) or 'no spring'}")
+    return f"{_plain(kind)} ({', '.join(words)})" if words else _plain(kind)
+
+
+def _plain(name: str) -> str:
+    return name.replace("_deg", " rest angle").replace("_", " ")

@@ -1,0 +1,25 @@
+"""The parts that pages share: one style, one script that draws, and data that no text can leave."""
+
+import json
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+SHARED = {"STYLE": "page.css", "DRAWING": "drawing.js"}
+"""Marks in the pages, and the files that stand there."""
+
+
+def filled(name: str, texts: Mapping[str, str]) -> str:
+    """The page `name` with the shared parts, and `texts` in place of their marks."""
+    folder = resources.files("springfoot.evaluation.page")
+    page = folder.joinpath(name).read_text(encoding="utf-8")
+    for mark, file in SHARED.items():
+        page = page.replace(f"/*{mark}*/\n", folder.joinpath(file).read_text(encoding="utf-8"))
+    for mark, text in texts.items():
+        page = page.replace(f"<!--{mark}-->", text)
+    return page
+
+
+def as_json(data: Any) -> str:
+    """JSON that can stand inside a page's script."""
+    return json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")

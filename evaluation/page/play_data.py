@@ -1,0 +1,175 @@
+"""What `play.html` draws: of each recorded walk its mean stride, or where it only fell its last moments.
+
+A walk is an array (MOMENTS, columns). All walks of a page are kept as whole numbers of 16 bits, between the least and
+the largest value of each column: finer than a pixel, and a fifth of the same in digits.
+"""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.foot import LOCK
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.settings import body_of, reference_gait
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait.people.cycle import PERCENT, sample
+
+from ..numbers.metrics import MOMENT_CURVES, measure
+from ..numbers.per_leg import ANGLE_COLUMNS
+from ..numbers.series import foot_contacts, strides_within
+from ..recording.recording import TICK, WARM_UP, Recording
+from .page_figure import figure_data, planned_zmp, shown_numbers
+
+MOMENTS = 51
+"""Moments of a stride, every 2 %; of a fall, evenly over its time."""
+FALL_SECONDS = 1.5
+"""How much of a fall is shown, its end [s]."""
+STIFFNESS_UNIT = "K, N·m/rad"
+PANELS = {
+    "Thigh angle": (ANGLE_COLUMNS["thigh"], "flexion, deg", "thigh"),
+    "Knee angle": (ANGLE_COLUMNS["knee"], "flexion, deg", "knee"),
+    "Ankle angle": (ANGLE_COLUMNS["ankle"], "dorsiflexion, deg", "ankle"),
+    "Toe angle": (ANGLE_COLUMNS["toe"], "up, deg", "toe"),
+    "Ankle moment": (MOMENT_CURVES["ankle"], "plantarflexion, N·m/kg", "ankle_moment"),
+    "Vertical force": ("grf_vertical_bw", "up, body weights", "grf_vertical"),
+    "Fore-aft force": ("grf_forward_bw", "forward, body weights", "grf_forward"),
+    "Ankle stiffness": ("ankle_stiffness_Nm_per_rad", STIFFNESS_UNIT, None),
+    "Toe stiffness": ("toe_stiffness_Nm_per_rad", STIFFNESS_UNIT, None),
+}
+"""Title -> column of the curves over the stride, unit, and what of people stands behind it, if anything."""
+BODY_PARTS = {"base": 3, "angle": 8, "com": 2, "plan": 2, "zmp": 1, "forward": 2, "up": 2, "lever": 2, "stiffness": 4}
+"""What the body is drawn from, and how many columns that has; see `_figure_series`."""
+PLAY_COLUMNS = (
+    *(name for name, size in BODY_PARTS.items() for _ in range(size)),
+    *(title for title in PANELS for _ in SIDES),
+)
+"""The columns of a walk, in order."""
+LARGEST = 65535
+"""Largest whole number of 16 bits."""
+
+
+def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
+    """Numbers, and series (MOMENTS, len(PLAY_COLUMNS)), of one recorded walk.
+
+    Of the episodes without a fall the mean stride of the left leg, after the warm-up; where there is none, as every one
+    fell, the end of the longest, and `ended` says why. Places are forward of the hip, which itself goes on by `length`
+    [m] in `seconds` [s].
+    """
+    standing = recording.fall_reason == ""
+    told = {"falls": int((~standing).sum()), "episodes": len(standing)}
+    if not standing.any():
+        return _end(recording, told)
+    upright = episodes_of(recording, standing)
+    gait, body = measure(upright), body_of(recording.settings)
+    strides, times, lengths = [], [], []
+    for episode, ticks in enumerate(upright.ticks):
+        series = {name: values[episode, :ticks].astype(float) for name, values in upright.series.items()}
+        begin, _, end = strides_within(foot_contacts(series, body)[0], (WARM_UP, np.inf)).T
+        drawn = _figure_series(upright, series, body)
+        at = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, MOMENTS)
+        found = sample(drawn, at, TICK, TICK)
+        length = found[:, -1, 0] - found[:, 0, 0]
+        found[..., 0] -= found[:, :1, 0] + length[:, None] * np.linspace(0, 1, MOMENTS)
+        strides, times, lengths = [*strides, *found], [*times, *(end - begin)], [*lengths, *length]
+    if not (strides and all(foot.count for foot in gait.plan.foot)):
+        return _end(recording, told)
+    curves = [foot.mean(column)[:: 100 // (MOMENTS - 1)] for column, _, _ in PANELS.values() for foot in gait.plan.foot]
+    metrics = gait.metrics
+    told |= {
+        "seconds": float(np.mean(times)),
+        "length": float(np.mean(lengths)),
+        "speed": metrics["speed_m_s"]["mean"],
+        "cost": metrics["cost_of_transport"],
+        "work": metrics["joint_work_J_kg"]["ankle"]["positive"],
+        "toe_off": metrics["toe_off_percent"],
+        **{joint: metrics["joints"][joint]["rmse_deg"] for joint in ("thigh", "knee", "ankle")},
+    }
+    return told, np.concatenate([np.mean(strides, axis=0), np.stack(curves, -1)], axis=-1)
+
+
+def episodes_of(recording: Recording, rows: NDArray) -> Recording:
+    """Some episodes of a recording."""
+    named = {name: getattr(recording, name)[rows] for name in ("ticks", "returns", "fall_reason")}
+    return replace(recording, **named, series={name: values[rows] for name, values in recording.series.items()})
+
+
+def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], NDArray]:
+    series = recording.shown()
+    drawn = _figure_series(recording, series, body_of(recording.settings))
+    end = TICK * len(drawn)
+    seconds = min(FALL_SECONDS, end - TICK)
+    found = sample(drawn, np.linspace(end - seconds, end, MOMENTS)[None], TICK, TICK)[0]
+    found[:, 0] -= found[0, 0]
+    told |= {
+        "seconds": seconds,
+        "length": 0.0,
+        "ended": str(recording.fall_reason[recording.example]) or "without a stride of both legs",
+        "after": end,
+    }
+    return told, np.concatenate([found, np.zeros((MOMENTS, len(PLAY_COLUMNS) - found.shape[1]))], axis=-1)
+
+
+def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body) -> NDArray:
+    """(T, 26) columns of `BODY_PARTS`.
+
+    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP, forward of the hip; forces in body weights;
+    `up` times where it acts forward of the hip, 0 without a force; K.
+    """
+    hip = series["base"][:, :1]
+    ahead = np.array([[1.0, 0.0]]) * hip
+    force = series["force"] / (body.total_mass * GRAVITY)
+    lever = (force[..., 1] * (series["contact"][..., 0] - hip[:, :, None])).sum(axis=-1)
+    parts = {
+        "base": series["base"],
+        "angle": series["angle"],
+        "com": series["com"] - ahead,
+        "plan": series["com_reference"] - ahead,
+        "zmp": planned_zmp(recording, series)[:, None] - hip,
+        "forward": force[..., 0].sum(axis=-1),
+        "up": force[..., 1].sum(axis=-1),
+        "lever": lever,
+        "stiffness": series["stiffness"],
+    }
+    return np.concatenate([parts[name].reshape(len(hip), size) for name, size in BODY_PARTS.items()], axis=-1)
+
+
+def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
+    """All series of a page as text: `low` and `high` of each column, and whole numbers between them."""
+    values = np.stack(walks)
+    values = np.where(values < LOCK.stiffness, values, 0.0)  # of a locked joint no K is drawn
+    low, high = values.min(axis=(0, 1)), values.max(axis=(0, 1))
+    share = (values - low) / np.where(high > low, high - low, 1.0)
+    whole = np.round(share * LARGEST).astype("<u2")
+    return {
+        "samples": MOMENTS,
+        "columns": PLAY_COLUMNS,
+        "low": shown_numbers(low),
+        "high": shown_numbers(high),
+        "data": b64encode(whole.tobytes()).decode(),
+    }
+
+
+def people_behind(recording: Recording) -> dict[str, Any]:
+    """People's mean and SD behind each panel, over percent of the stride, and their toe-off [%]."""
+    human, phase = reference_gait(recording.settings), PERCENT / 100
+    curves = {}
+    for title, (_, unit, name) in PANELS.items():
+        if name is None:
+            continue
+        turn = np.degrees(1.0) if unit.endswith("deg") else 1.0
+        curves[title] = {
+            "people": shown_numbers(turn * human.mean(name, phase)),
+            "people_sd": shown_numbers(turn * human.sd(name, phase)),
+        }
+    return {"toe_off": 100 * human.toe_off, "curves": curves}
+
+
+def drawn_body(recording: Recording) -> dict[str, Any]:
+    """Lengths, feet and colours of the body."""
+    names = ("slope", "height", "feet", "lengths", "ranges")
+    whole = figure_data(recording)
+    return {name: whole[name] for name in names}

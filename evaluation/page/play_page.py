@@ -1,0 +1,58 @@
+"""play.html: recorded walks, between which sliders blend; one file that opens offline, and says what it is."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from ..recording.recording import Recording
+from .page_parts import as_json, filled
+from .play_data import PANELS, drawn_body, packed, people_behind, walk_of
+
+
+class Grid(NamedTuple):
+    """Where walks are recorded: all combinations, the last axis fastest."""
+
+    feet: Sequence[str]
+    """Kinds of the right foot."""
+    speed: Sequence[float]
+    """Commanded [m/s]."""
+    toe: Sequence[float]
+    """Factors on K of the toes."""
+    ankle: Sequence[float]
+    """Factors on K of the ankles."""
+
+    @property
+    def size(self) -> int:
+        """How many combinations."""
+        return len(self.feet) * len(self.speed) * len(self.toe) * len(self.ankle)
+
+
+class PlayPage(NamedTuple):
+    """A page, and what was found on the way."""
+
+    text: str
+    """HTML."""
+    told: list[dict[str, Any]]
+    """The numbers of each walk, as `play_data.walk_of`."""
+
+
+def play_page(grid: Grid, recordings: Sequence[Recording], what: str, made: str) -> PlayPage:
+    """The page of `recordings`, one for each combination of `grid` in its order.
+
+    `what` was recorded, in a sentence; `made` says how.
+    """
+    told, walks = zip(*map(walk_of, recordings), strict=True)
+    a_foot = len(recordings) // len(grid.feet)
+    a_speed = a_foot // len(grid.speed)
+    middle = {"ankle": len(grid.ankle) // 2, "toe": len(grid.toe) // 2, "pace": len(grid.speed) // 2}
+    data = {
+        "grid": grid._asdict(),
+        "begin": middle,
+        "walks": told,
+        "series": packed(walks),
+        "units": {title: unit for title, (_, unit, _) in PANELS.items()},
+        "people": [people_behind(recordings[at * a_speed]) for at in range(len(grid.speed))],
+        "bodies": [drawn_body(recordings[at * a_foot]) for at in range(len(grid.feet))],
+        "what": f"{what} Between these points, the marks of the sliders, the page blends what was recorded.",
+        "made": made,
+    }
+    return PlayPage(filled("play.html", {"DATA": as_json(data)}), list(told))

@@ -1,0 +1,107 @@
+"""report.html: one page that opens offline, with the verdict in words and all that a walk's numbers come from.
+
+Its drawings are SVG by a small script of its own (`drawing.js`, 18 kB): the bundle that pip brings with plotly is
+4.8 MB, and would not draw the body.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from springfoot.envs.settings.settings import reference_gait, settings_from
+from springfoot.files.provenance import source
+
+from ..numbers.criteria import LOADS_LIKE_PEOPLE, MOVES_LIKE_PEOPLE, WORKS_LIKE_PEOPLE, Criterion, number_text, numbers
+from ..numbers.metrics import Gait
+from ..recording.recording import Recording
+from ..report.gait_table import leg_rows, people_metrics, table_rows
+from .page_data import policy_data
+from .page_parts import as_json, filled
+
+PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
+JUDGED_SPEED = 1.2
+"""Commanded speed for which the criteria were chosen [m/s]."""
+
+
+def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str = "") -> None:
+    """Write one page of one or several evaluated policies; `command` says how it was made."""
+    data = {
+        "policies": [policy_data(recording, gait) for recording, gait in walks],
+        "tables": [table_rows(gait.metrics) for _, gait in walks],
+        "legs": [leg_rows(gait.metrics) for _, gait in walks],
+        "made": _made(walks, command),
+    }
+    verdicts = "\n".join(_verdict(index, gait.metrics) for index, (_, gait) in enumerate(walks))
+    path.write_text(filled("page.html", {"VERDICT": verdicts, "DATA": as_json(data)}), encoding="utf-8")
+
+
+def _made(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
+    made = source(PAGE_PACKAGES)
+    commit = made["commit"] or "none: not in a clone of the project"
+    lines = [f"command: {command}"] if command else []
+    lines += [f"{recording.policy}: episodes seeded from {recording.seed} on" for recording, _ in walks]
+    lines += [f"commit: {commit}{' and changes to it' if made['modified'] else ''}"]
+    lines += [f"{name} {number}" for name, number in made["versions"].items()]
+    settings = [
+        f"settings of {recording.policy}: {json.dumps(gait.metrics['environment'])}" for recording, gait in walks
+    ]
+    return "\n".join([*lines, *settings])
+
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Of the policies, in their order; as in page.html."""
+
+
+def _verdict(index: int, metrics: dict[str, Any]) -> str:
+    colour = COLOURS[index % len(COLOURS)]
+    items = "".join(f"<dt>{escape(term)}</dt><dd>{escape(said)}</dd>" for term, said in spoken_verdict(metrics).items())
+    return (
+        f'<section class="verdict" aria-label="Verdict on {escape(metrics["policy"])}">'
+        f'<h2 class="name" style="border-color:{colour}">{escape(metrics["policy"])}</h2><dl>{items}</dl></section>'
+    )
+
+
+def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
+    """Falls, speed, joints, forces and energy in words."""
+    environment = metrics["environment"]
+    people = people_metrics(reference_gait(settings_from(**environment)))
+    judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
+    falls, episodes = metrics["falls"], metrics["episodes"]
+    reasons = ", ".join(f"{count} × {reason}" for reason, count in metrics["fall_reasons"].items())
+    counted = f"{episodes} episode{'s' * (episodes != 1)}"
+    fell = f"Fell in {falls} of {counted}: {reasons}." if falls else f"Never fell in {counted}."
+    joints, grf, work = metrics["joints"], metrics["grf"], metrics["joint_work_J_kg"]["ankle"]
+    said = {"Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s."}
+    if metrics["strides"]["count"] == 0:
+        return said | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
+    angles = ", ".join(f"{name} {_text(each['rmse_deg'], '.1f')}°" for name, each in joints.items())
+    peaks = " / ".join(_text(grf[name], ".2f") for name in _PEAKS)
+    theirs = " / ".join(_text(people["grf"][name], ".2f") for name in _PEAKS)
+    return said | {
+        "Speed": f"{_text(metrics['speed_m_s']['mean'], '.2f')} m/s, asked for {environment['speed']:.2f}.",
+        "Joints": f"Off people's mean by {angles} (rms). {_judged(metrics, MOVES_LIKE_PEOPLE, judged)}",
+        "Forces": f"Vertical peak, valley, peak {peaks} body weights, people {theirs}. "
+        f"{_judged(metrics, LOADS_LIKE_PEOPLE, judged)}",
+        "Energy": f"Cost of transport {_text(metrics['cost_of_transport'], '.3f')}; the ankle gives "
+        f"{_text(work['positive'], '.2f')} J/kg a stride, people's {people['ankle_work_J_kg']['positive']:.2f}. "
+        f"{_judged(metrics, WORKS_LIKE_PEOPLE, judged)}",
+    }
+
+
+_PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
+
+
+def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: bool) -> str:
+    if not judged:
+        return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
+    values = numbers(dict(metrics))
+    missed = [f"{each.label or each.name}: {number_text(each, values)}" for each in criteria if not each.holds(values)]
+    if not missed:
+        return f"Meets all {len(criteria)} criteria of a human-like walk."
+    return f"Misses {len(missed)} of {len(criteria)} criteria ({'; '.join(missed)})."
+
+
+def _text(value: float | None, pattern: str) -> str:
+    return "–" if value is None else format(value, pattern)

@@ -1,0 +1,106 @@
+"""A policy by its name, and the environment it is evaluated in: the one place where names of policies are understood.
+
+A name is a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `predicted`, `module:function`, a
+baseline (`springfoot.agents.policies.baselines`), or `frozen:POLICY`, the open-loop copy of one that was trained.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from springfoot.agents.policies.baselines import (
+    BASELINES,
+    FROZEN,
+    SCHEDULE_SUFFIXES,
+    PolicyFunction,
+    baseline,
+    has_feedback,
+    is_schedule_file,
+    own_settings,
+)
+from springfoot.agents.policies.foreign import is_function
+from springfoot.agents.policies.policy import SHIPPED, load_policy
+from springfoot.agents.policies.schedules import schedule_file
+from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
+from springfoot.errors import SpringfootError
+
+from .open_loop import Watch, open_loop_copy
+
+LONGEST_LABEL = 60
+"""Letters of what results call a policy; chosen, in any script a folder may have so long a name."""
+CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
+"""The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
+
+
+def prepare(
+    name: str,
+    given: dict[str, Any],
+    seed: int = 0,
+    threads: int = 2,
+    watch: Watch = lambda seconds: lambda walked: None,
+) -> tuple[PolicyFunction, BipedSettings]:
+    """A policy by name and the environment it is evaluated in.
+
+    Args:
+        name: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, `module:function`, a
+            baseline of `agents.policies.baselines`, or `frozen:POLICY`, the mean K of one of the first four, which
+            first walks for it (`open_loop_copy`).
+        given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
+        seed: of the baseline `random`.
+        threads: of the physics where a copy is made; any number gives the same bits.
+        watch: as for `open_loop_copy`.
+
+    Raises `SpringfootError` for an unknown name or a bad setting.
+    """
+    wanted, kind = CONDITIONS | given, name.partition(":")[0]
+    if kind == FROZEN:
+        return _prepare_copy(name, given, threads, watch)
+    if kind in BASELINES:
+        conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
+        settings = settings_from(**(own_settings(name, conditions) | wanted))
+        return baseline(name, settings, seed), settings
+    if is_schedule_file(name):
+        own, make = schedule_file(name, settings_from(**{key: wanted[key] for key in CONDITIONS}))
+        settings = settings_from(**(own | wanted))
+        return make(settings), settings
+    if name not in SHIPPED and not Path(name).exists() and not is_function(name):
+        known = ", ".join([*SHIPPED, *BASELINES])
+        raise SpringfootError(
+            f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, module:function, or one of {known}, "
+            f"or {FROZEN}:POLICY"
+        )
+    policy = load_policy(name)
+    return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
+
+
+def _prepare_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -> tuple[PolicyFunction, BipedSettings]:
+    """`frozen:POLICY`: its K is of the policy's own decisions, whenever the copy decides."""
+    other = name.partition(":")[2]
+    if not other:
+        raise SpringfootError(f"{FROZEN} is the copy of a policy, as in {FROZEN}:pretrained, got {name!r}")
+    if other.partition(":")[0] == FROZEN:
+        raise SpringfootError(f"a copy has no copy of its own: give {other}, got {name!r}")
+    if not has_feedback(other):
+        raise SpringfootError(f"{other} has no feedback to leave out, it is its own copy: give {other}, got {name!r}")
+    policy, settings = prepare(other, {key: value for key, value in given.items() if key != "decisions"})
+    decisions = given.get("decisions", settings.decisions)
+    copy, absolute = open_loop_copy(policy, settings, name=other, threads=threads, watch=watch)
+    return copy, replace(absolute, decisions=decisions)
+
+
+def policy_label(name: str) -> str:
+    """What results call a policy: its own name, that of its run or that of its file, without folders.
+
+    It names a folder inside that of the results, whatever `name` is: printable, no path, not hidden, not too long.
+    """
+    kind, _, other = name.partition(":")
+    label = f"{FROZEN}-{policy_label(other)}" if kind == FROZEN and other else _own_name(name)
+    safe = "".join(letter if letter.isprintable() and letter not in "/\\" else "-" for letter in label)
+    return safe.lstrip(".")[:LONGEST_LABEL] or "policy"
+
+
+def _own_name(name: str) -> str:
+    path = Path(name)
+    if path.suffix not in (".safetensors", ".onnx", *SCHEDULE_SUFFIXES):
+        return path.resolve().name.replace(":", "-").replace(",", "-")
+    return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem

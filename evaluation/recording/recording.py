@@ -1,0 +1,300 @@
+"""Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.agents.policies.baselines import PolicyFunction
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.step_result import INFO, Tick
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.control.subjects import DRAWN
+from springfoot.envs.physics.contact import CONTACTS
+from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.physics.foot import Feet
+from springfoot.envs.physics.model import JOINTS, SIDES
+from springfoot.envs.physics.simulation import MjModel
+from springfoot.envs.settings.settings import (
+    DRAWN_SETTINGS,
+    BipedSettings,
+    settings_from,
+    settings_to_json,
+)
+from springfoot.envs.task.reward import TERMS
+from springfoot.errors import SpringfootError
+from springfoot.files.array_file import read_arrays, write_arrays
+from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.plan.com_plan import ComPlan
+
+TICK = Biped.tick_dt
+"""Time between two samples [s]."""
+WARM_UP = 3.0
+"""Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
+LONGEST_RECORDING = 100_000
+"""Longest recording, all episodes together [s]; chosen: its series have some 6 GB."""
+BATCH = 32
+"""Episodes simulated side by side."""
+
+SERIES: dict[str, Callable[[Tick], NDArray]] = {
+    "base": lambda tick: tick.measurement.base,  # (3,) hip x [m], hip z [m], trunk pitch [rad]
+    "angle": lambda tick: tick.measurement.angle,  # (side, joint) [rad]
+    "velocity": lambda tick: tick.measurement.velocity,  # (side, joint) [rad/s]
+    "torque": lambda tick: tick.measurement.torque,  # (side, joint) actuator torque [N m]
+    "joint_torque": lambda tick: tick.work.torque,  # (side, joint) actuator + joint damping, mean of the tick [N m]
+    "joint_work": lambda tick: tick.work.work,  # (side, joint, (positive, negative)) work of it in the tick [J]
+    "energy": lambda tick: tick.work.energy.view(float).reshape(len(tick.active), -1),  # (LEDGER,) [J]
+    "com": lambda tick: tick.measurement.com,  # (x, z) [m]
+    "com_velocity": lambda tick: tick.measurement.com_velocity,  # (x, z) [m/s]
+    "com_reference": lambda tick: tick.com_reference,  # (x, z) where the plan wants it now [m]
+    "ankle": lambda tick: tick.measurement.ankle,  # (side, (x, z)) ankle axes [m]
+    "contact": lambda tick: tick.measurement.contact,  # (side, contact, (x, z)) lowest points [m]
+    "force": lambda tick: tick.measurement.force,  # (side, contact, (forward, up)) mean of the tick [N]
+    "phase": lambda tick: tick.phase,  # (side,) of the leg controller [0, 1)
+    "stiffness": lambda tick: tick.stiffness[..., FEET],  # (side, (ankle, toe)) [N m/rad]
+    "equilibrium": lambda tick: tick.equilibrium[..., FEET],  # (side, (ankle, toe)) [rad]
+}
+"""Name -> what is taken of a tick.
+
+Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.physics.model`.
+"""
+REWARD = "reward"
+"""The series (TERMS,) that no tick knows: the reward's terms, unweighted, of the step that a tick is part of."""
+_TERMS = slice(INFO.index(f"reward/{TERMS[0]}"), INFO.index(f"reward/{TERMS[-1]}") + 1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """E episodes of up to T ticks of 10 ms; sample k stands at its end, (k + 1) * 10 ms; forces are its mean."""
+
+    policy: str
+    """What was run."""
+    settings: BipedSettings
+    """The environment it was run in."""
+    seed: int
+    """Episode i was seeded with seed + i."""
+    ticks: NDArray
+    """(E,) samples of each episode; series hold NaN beyond."""
+    returns: NDArray
+    """(E,) sum of the reward over each episode."""
+    fall_reason: NDArray
+    """(E,) why an episode ended early, "" where it did not."""
+    plan_com: NDArray
+    """(101, 2) planned CoM over percent of the step: x from the ankle of the foot whose stance began last, z [m]."""
+    plan_zmp: NDArray
+    """(101,) planned ZMP over percent of the step, x from the same ankle [m]."""
+    series: dict[str, NDArray]
+    """Name -> (E, T, ...) float32, as listed in `SERIES`, and `REWARD`."""
+
+    @property
+    def example(self) -> int:
+        """The episode that pictures and exports show: the first without a fall, else the longest."""
+        standing = np.flatnonzero(self.fall_reason == "")
+        return int(standing[0]) if len(standing) else int(np.argmax(self.ticks))
+
+    def shown(self) -> dict[str, NDArray]:
+        """Name -> (T, ...) float64 series of the `example`, without the samples after its end."""
+        episode = self.example
+        return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
+
+    def save(self, path: Path) -> None:
+        """Write `strides.npz`: the series and, as JSON text, what they are of. No object arrays."""
+        header = {
+            "policy": self.policy,
+            "settings": settings_to_json(self.settings),
+            "seed": self.seed,
+            "tick_s": TICK,
+            "axes": {"side": SIDES, "joint": JOINTS, "contact": CONTACTS, "energy": ledger_entries(), "term": TERMS},
+        }
+        arrays: dict[str, Any] = {
+            name: getattr(self, name) for name in ("ticks", "returns", "fall_reason", "plan_com", "plan_zmp")
+        }
+        write_arrays(path, header, arrays | self.series)
+
+
+def load_recording(path: str | Path) -> Recording:
+    """The recording in a `strides.npz`; raises `SpringfootError` for any other file, and for one of another version."""
+    header, arrays = read_arrays(Path(path), "strides.npz written by evaluate.py")
+    try:
+        if missing := [name for name in ("plan_zmp", *SERIES, REWARD) if name not in arrays]:
+            raise SpringfootError(f"it has no {missing[0]}: another version of springfoot wrote it; evaluate again")
+        series = {name: arrays.pop(name) for name in (*SERIES, REWARD)}
+        settings = settings_from(**header["settings"])
+        recording = Recording(policy=header["policy"], seed=header["seed"], settings=settings, series=series, **arrays)
+        _require_whole(recording)
+        return recording
+    except (SpringfootError, KeyError, TypeError) as error:
+        raise SpringfootError(f"{path}: {error}") from None
+
+
+def _require_whole(recording: Recording) -> None:
+    """Raise `SpringfootError` for arrays that are not of the same episodes."""
+    episodes, length = recording.series["phase"].shape[:2]
+    for name in ("ticks", "returns", "fall_reason"):
+        if getattr(recording, name).shape != (episodes,):
+            raise SpringfootError(f"{name} must be ({episodes},), is {getattr(recording, name).shape}")
+    for name, values in recording.series.items():
+        if values.shape[:2] != (episodes, length) or values.dtype != np.float32:
+            raise SpringfootError(f"{name} must be float32 ({episodes}, {length}, ...), is {values.shape}")
+    if recording.ticks.dtype.kind != "i" or not ((recording.ticks > 0) & (recording.ticks <= length)).all():
+        raise SpringfootError(f"ticks must be whole numbers in [1, {length}]")
+
+
+def require_recordable(settings: BipedSettings, episodes: int) -> None:
+    """Raise `SpringfootError` for episodes whose series would fill the memory."""
+    if episodes * settings.episode_seconds > LONGEST_RECORDING:
+        raise SpringfootError(
+            f"a recording must be of at most {LONGEST_RECORDING:,} s in all, got {episodes} episodes of "
+            f"{settings.episode_seconds:g} s"
+        )
+
+
+def record(
+    policy: PolicyFunction,
+    settings: BipedSettings,
+    *,
+    name: str,
+    episodes: int = 20,
+    seed: int = 0,
+    threads: int = 2,
+    model: MjModel | None = None,
+    legs: LegConstants | None = None,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> Recording:
+    """Run `episodes` episodes of `settings.episode_seconds` each, episode i seeded with `seed` + i.
+
+    Args:
+        policy: deterministic, observations to actions.
+        settings: of the environment.
+        name: what the policy is called in reports.
+        episodes: how many.
+        seed: of the first.
+        threads: of the physics; any number gives the same bits.
+        model: the body's with other options, as for `envs.physics.simulation.Simulation`.
+        legs: leg constants in place of the committed ones.
+        progress: told the simulated time [s] of all episodes together after every step.
+
+    Raises `SpringfootError` for settings that draw what may differ between episodes.
+    """
+    if any(getattr(settings, name) is not None for name in DRAWN_SETTINGS):
+        raise SpringfootError(
+            f"a recording is of one body at one speed in one world: {', '.join(DRAWN_SETTINGS)} must be None"
+        )
+    seeds, other = range(seed, seed + episodes), (model, legs, None)
+    ticks, returns, reason, series = walk_all(policy, settings, {}, seeds, threads, other, progress)
+    return Recording(
+        policy=name,
+        settings=settings,
+        seed=seed,
+        ticks=ticks,
+        returns=returns,
+        fall_reason=reason,
+        **planned_course(reference_walk_at(settings, settings.speed).plan),
+        series=series,
+    )
+
+
+def record_each(
+    policy: PolicyFunction,
+    settings: BipedSettings,
+    who: Mapping[str, ArrayLike],
+    *,
+    name: str,
+    seed: int = 0,
+    threads: int = 2,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> list[Recording]:
+    """As `record`, one episode for each of E bodies and speeds, side by side; a recording each, with its own settings.
+
+    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from. Raises
+    `SpringfootError` for settings whose commanded speed changes within an episode.
+    """
+    if settings.speed_interval is not None:
+        raise SpringfootError(
+            f"a recording is at one speed: speed_interval must be None, got {settings.speed_interval}"
+        )
+    columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
+    given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
+    seeds = range(seed, seed + episodes)
+    ticks, returns, reason, series = walk_all(policy, settings, given, seeds, threads, (None, None, None), progress)
+    recordings = []
+    for index in range(episodes):
+        own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
+        alone, row = replace(settings, **own), slice(index, index + 1)
+        recordings.append(
+            Recording(
+                policy=name,
+                settings=alone,
+                seed=seed + index,
+                ticks=ticks[row],
+                returns=returns[row],
+                fall_reason=reason[row],
+                **planned_course(reference_walk_at(alone, alone.speed).plan),
+                series={key: values[row] for key, values in series.items()},
+            )
+        )
+    return recordings
+
+
+def walk_all(
+    policy: PolicyFunction,
+    settings: BipedSettings,
+    given: Mapping[str, NDArray],
+    seeds: Sequence[int],
+    threads: int,
+    other: tuple[MjModel | None, LegConstants | None, Sequence[Feet] | None],
+    progress: Callable[[float], object],
+) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
+    """Ticks, returns, fall reasons and series of E episodes of `seeds`, as in `Recording`; `given` as in `Biped.reset`;
+    `other` model and leg constants as in `record`, and the feet of each episode."""
+    (model, legs, feet), episodes = other, len(seeds)
+    require_recordable(settings, episodes)
+    step = settings.step_seconds
+    length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
+    ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
+    reason = np.full(episodes, "", dtype="U64")
+    series: dict[str, NDArray] = {REWARD: np.full((episodes, length, len(TERMS)), np.nan, np.float32)}
+    for first in range(0, episodes, BATCH):
+        rows = slice(first, min(first + BATCH, episodes))
+        count = rows.stop - first
+        worn = feet and feet[rows]
+        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs], feet=worn)
+        biped.reset(np.arange(count), list(seeds[rows]), None, {k: v[rows] for k, v in given.items()})
+
+        def keep(tick: Tick, rows: slice = rows) -> None:
+            index = int(ticks[rows].max())
+            for key, take in SERIES.items():
+                value = take(tick)
+                if key not in series:
+                    series[key] = np.full((episodes, length, *value.shape[1:]), np.nan, np.float32)
+                series[key][rows, index] = np.where(tick.active.reshape(-1, *[1] * (value.ndim - 1)), value, np.nan)
+            ticks[rows] += tick.active
+
+        biped.on_tick = keep
+        active = np.ones(count, bool)
+        observation = biped.observe()
+        while active.any():
+            begun = int(ticks[rows].max())
+            result = biped.step(policy(observation), active=active)
+            observation = result.observation
+            series[REWARD][rows, begun : int(ticks[rows].max())][active] = result.values[active, None, _TERMS]
+            returns[rows][active] += result.reward[active]
+            fell = active & result.terminated
+            reason[rows][fell] = result.reasons[fell]
+            progress(float(active.sum()) * biped.dt)
+            active &= ~(result.terminated | result.truncated)
+    return ticks, returns, reason, series
+
+
+def planned_course(plan: ComPlan) -> dict[str, NDArray]:
+    """`plan_com` and `plan_zmp` of a `Recording`."""
+    # Percent 100 is the end of this step, not the beginning of the next.
+    step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
+    return {"plan_com": np.stack(plan.com(step_phase), -1), "plan_zmp": plan.zmp(step_phase)}

@@ -1,0 +1,232 @@
+"""walk.gif: two strides of the walk as a stick figure with its ground reaction forces; needs no GL."""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.foot_springs import stiffness_ranges
+from springfoot.envs.physics.contact import contact_offsets
+from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
+from springfoot.envs.settings.settings import body_of
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, find_contacts
+
+from ..numbers.per_leg import differ, kinds_of
+from ..recording.recording import TICK, WARM_UP, Recording
+
+SIZE = (460, 420)
+"""Width and height of a frame [px]."""
+OVERSAMPLING = 3
+"""Frames are drawn larger by this factor and then reduced, for smooth edges."""
+TICKS_PER_FRAME = 3
+"""Ticks of 10 ms in a frame; GIF delays are whole hundredths of a second."""
+STRIDES = 2
+LONGEST = 3.0
+"""Longest clip [s], for gaits without strides."""
+FORCE_LENGTH = 0.55
+"""Length of an arrow of one body weight [m at 1.70 m]."""
+
+PAPER, INK, FAINT, GROUND = (255, 255, 255), (34, 34, 34), (140, 140, 140), (244, 246, 247)
+TRUNK, NEAR, FAR = (64, 78, 92), (11, 110, 143), (158, 196, 209)
+FORCE, FAR_FORCE, PLAN = (226, 88, 34), (243, 178, 145), (209, 73, 91)
+SOFT, STIFF = np.array([255, 236, 179]), np.array([122, 18, 60])
+
+
+def save_animation(path: Path, recording: Recording) -> None:
+    """Write the animation: two strides from a left heel strike, or the last seconds of a walk that only fell."""
+    body = body_of(recording.settings)
+    episode, first, last = clip_of(recording, body)
+    series = {name: values[episode, first:last].astype(float) for name, values in recording.series.items()}
+    canvas = _Canvas(body, series, recording)
+    frames = [canvas.frame(tick) for tick in range(0, last - first, TICKS_PER_FRAME)]
+    indexed = [frame.quantize(palette=_palette(), dither=Image.Dither.NONE) for frame in frames]
+    delay = round(1000 * TICKS_PER_FRAME * TICK)
+    indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=delay, loop=0, optimize=True)
+
+
+def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
+    """Episode, first and last tick of what is shown."""
+    episode = recording.example
+    ticks = int(recording.ticks[episode])
+    if not recording.fall_reason[episode]:
+        vertical = recording.series["force"][episode, :ticks, LEFT, :, 1].sum(axis=1)
+        contacts = find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY)
+        strikes = np.round(contacts.heel_strikes / TICK).astype(int)
+        strikes = strikes[strikes >= round(WARM_UP / TICK)]
+        if len(strikes) > STRIDES:
+            return episode, int(strikes[0]), int(strikes[STRIDES])
+    return episode, max(0, ticks - round(LONGEST / TICK)), ticks
+
+
+class _Canvas:
+    """Draws one frame after another, world metres to pixels, by a camera that moves at the walk's mean speed."""
+
+    def __init__(self, body: Body, series: dict[str, NDArray], recording: Recording):
+        self._body, self._series = body, series
+        self._scale = OVERSAMPLING * SIZE[1] / (1.30 * body.height)
+        self._floor = OVERSAMPLING * SIZE[1] * 0.865
+        ticks = np.arange(len(series["com"]))
+        slope, start = np.polyfit(ticks, series["com"][:, 0], 1) if len(ticks) > 1 else (0.0, series["com"][0, 0])
+        self._camera = start + slope * ticks
+        settings = recording.settings
+        self._title = recording.policy
+        self._subtitle = f"{settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s"
+        if differ(settings):
+            self._subtitle += " · feet: " + ", ".join(
+                f"{side} ({shade}) {kind}"
+                for (side, kind), shade in zip(kinds_of(settings).items(), ("dark", "light"), strict=True)
+            )
+        self._fonts = {size: ImageFont.load_default(OVERSAMPLING * size) for size in (11, 15)}
+        self._stiffness_range = np.log(np.stack(stiffness_ranges(settings, body), axis=-1))
+
+    def frame(self, tick: int) -> Image.Image:
+        image = Image.new("RGB", (OVERSAMPLING * SIZE[0], OVERSAMPLING * SIZE[1]), PAPER)
+        self._draw, self._tick = ImageDraw.Draw(image), tick
+        self._ground()
+        self._leg(RIGHT, FAR)
+        self._force(RIGHT, FAR_FORCE)
+        self._trunk()
+        self._leg(LEFT, NEAR)
+        self._force(LEFT, FORCE)
+        self._masses()
+        self._words()
+        return image.reduce(OVERSAMPLING)
+
+    def _at(self, name: str) -> NDArray:
+        return self._series[name][self._tick]
+
+    def _pixel(self, point: NDArray) -> tuple[float, float]:
+        x = OVERSAMPLING * SIZE[0] * 0.5 + (point[0] - self._camera[self._tick]) * self._scale
+        return x, self._floor - point[1] * self._scale
+
+    def _disc(self, centre: NDArray, radius: float, **style) -> None:
+        (x, y), r = self._pixel(centre), radius * self._scale
+        self._draw.ellipse((x - r, y - r, x + r, y + r), **style)
+
+    def _capsule(self, start: NDArray, end: NDArray, radius: float, colour: tuple) -> None:
+        """A round-ended line, `radius` in metres."""
+        width = max(1, round(2 * radius * self._scale))
+        self._draw.line([self._pixel(start), self._pixel(end)], fill=colour, width=width)
+        self._disc(start, radius, fill=colour)
+        self._disc(end, radius, fill=colour)
+
+    def _ground(self) -> None:
+        width, height = OVERSAMPLING * SIZE[0], OVERSAMPLING * SIZE[1]
+        self._draw.rectangle((0, self._floor, width, height), fill=GROUND)
+        self._draw.line((0, self._floor, width, self._floor), fill=FAINT, width=OVERSAMPLING)
+        reach = 0.5 * width / self._scale
+        middle = self._camera[self._tick]
+        for mark in range(int(np.floor((middle - reach) * 4)), int(np.ceil((middle + reach) * 4)) + 1):
+            x, _ = self._pixel(np.array([mark / 4, 0.0]))
+            long = 12 if mark % 4 == 0 else 6
+            self._draw.line((x, self._floor, x, self._floor + long * OVERSAMPLING), fill=FAINT, width=OVERSAMPLING)
+            if mark % 4 == 0:
+                self._text((x, self._floor + 13 * OVERSAMPLING), f"{mark // 4} m", 11, FAINT, "ma")
+
+    def _trunk(self) -> None:
+        hip, pitch, size = self._at("base")[:2], self._at("base")[2], self._body.length_scale
+        along = np.array([np.sin(pitch), np.cos(pitch)])
+        shoulder = hip + self._body.trunk_length * along
+        self._capsule(hip + 0.02 * size * along, shoulder - 0.05 * size * along, 0.058 * size, TRUNK)
+        self._capsule(shoulder, shoulder + 0.06 * size * along, 0.025 * size, TRUNK)
+        self._disc(shoulder + 0.165 * size * along, 0.095 * size, fill=TRUNK)
+
+    def _leg(self, side: int, colour: tuple) -> None:
+        body, size = self._body, self._body.length_scale
+        angle = self._at("angle")[side]
+        thigh = angle[HIP] - self._at("base")[2]
+        shank = thigh - angle[KNEE]
+        hip = self._at("base")[:2]
+        knee = hip + body.thigh_length * np.array([np.sin(thigh), -np.cos(thigh)])
+        ankle = knee + body.shank_length * np.array([np.sin(shank), -np.cos(shank)])
+        foot = shank + angle[ANKLE]
+        offsets = contact_offsets(body)
+        drop = body.ankle_height - body.toe_joint_height
+        toe_joint = ankle + _turned((body.ankle_to_toe_joint, -drop), foot)
+        heel, ball = (ankle + _turned(offsets[name][:2], foot) for name in ("heel", "ball"))
+        tip = toe_joint + _turned(offsets["toe"][:2], foot + angle[TOE])
+
+        self._capsule(hip, knee, 0.048 * size, colour)
+        self._capsule(knee, ankle, 0.034 * size, colour)
+        # The sole's outline runs below the spheres' centres, by their radii.
+        under = [ankle + _turned((f, u - r), foot) for f, u, r in (offsets["heel"], offsets["ball"])]
+        self._draw.polygon([self._pixel(p) for p in (ankle, heel, *under, ball)], fill=colour)
+        self._disc(heel, offsets["heel"][2], fill=colour)
+        self._capsule(ankle, ball, offsets["ball"][2], colour)
+        self._capsule(ball, tip, 0.85 * offsets["toe"][2], colour)
+        for joint, centre, radius in ((0, ankle, 0.026), (1, toe_joint, 0.017)):
+            self._disc(
+                centre, radius * size, fill=self._stiffness_colour(side, joint), outline=PAPER, width=OVERSAMPLING
+            )
+        self._disc(knee, 0.014 * size, fill=PAPER)
+
+    def _stiffness_colour(self, side: int, joint: int) -> tuple[int, int, int]:
+        low, high = self._stiffness_range[joint]
+        share = np.clip((np.log(max(self._at("stiffness")[side, joint], 1.0)) - low) / (high - low), 0, 1)
+        red, green, blue = (SOFT + share * (STIFF - SOFT)).astype(int)
+        return int(red), int(green), int(blue)
+
+    def _force(self, side: int, colour: tuple) -> None:
+        force, contact = self._at("force")[side], self._at("contact")[side]
+        vertical = force[:, 1].sum()
+        weight = self._body.mass * GRAVITY
+        if vertical < CONTACT_THRESHOLD_BW * weight:
+            return
+        foot = np.array([(force[:, 1] * contact[:, 0]).sum() / vertical, 0.0])
+        arrow = force.sum(axis=0) / weight * FORCE_LENGTH * self._body.length_scale
+        end, length = foot + arrow, np.hypot(*arrow)
+        along, head = arrow / length, min(0.07 * self._body.length_scale, length)
+        across, neck = np.array([-along[1], along[0]]), end - head * along
+        line = round(0.016 * self._body.length_scale * self._scale)
+        self._draw.line([self._pixel(foot), self._pixel(neck)], fill=colour, width=line)
+        corners = [end, neck + 0.4 * head * across, neck - 0.4 * head * across]
+        self._draw.polygon([self._pixel(point) for point in corners], fill=colour)
+
+    def _masses(self) -> None:
+        size = self._body.length_scale
+        self._disc(self._at("com_reference"), 0.034 * size, outline=PLAN, width=round(1.8 * OVERSAMPLING))
+        self._disc(self._at("com"), 0.020 * size, fill=PAPER, outline=INK, width=OVERSAMPLING)
+        self._disc(self._at("com"), 0.008 * size, fill=INK)
+
+    def _words(self) -> None:
+        unit, (width, height) = OVERSAMPLING, SIZE
+        self._text((14 * unit, 10 * unit), self._title, 15, INK, "la")
+        self._text((14 * unit, 31 * unit), self._subtitle, 11, FAINT, "la")
+        y = (height - 12) * unit
+        draw, x = self._draw, 14 * unit
+        draw.ellipse((x, y - 4 * unit, x + 8 * unit, y + 4 * unit), fill=PAPER, outline=INK, width=unit)
+        self._text((x + 13 * unit, y), "CoM", 11, FAINT, "lm")
+        x += 48 * unit
+        draw.ellipse((x, y - 5 * unit, x + 10 * unit, y + 5 * unit), outline=PLAN, width=2 * unit)
+        self._text((x + 15 * unit, y), "its plan", 11, FAINT, "lm")
+        x += 70 * unit
+        draw.line((x, y, x + 18 * unit, y), fill=FORCE, width=3 * unit)
+        self._text((x + 23 * unit, y), "ground force", 11, FAINT, "lm")
+        x = (width - 128) * unit
+        self._text((x - 6 * unit, y), "ankle, toe: soft", 11, FAINT, "rm")
+        for step in range(60):
+            colour = tuple(int(c) for c in SOFT + step / 59 * (STIFF - SOFT))
+            draw.rectangle((x + step * unit, y - 4 * unit, x + (step + 1) * unit, y + 4 * unit), fill=colour)
+        self._text((x + 66 * unit, y), "stiff", 11, FAINT, "lm")
+
+    def _text(self, place: tuple[float, float], words: str, size: int, colour: tuple, anchor: str) -> None:
+        self._draw.text(place, words, font=self._fonts[size], fill=colour, anchor=anchor)
+
+
+def _palette() -> Image.Image:
+    """One palette for all frames: every colour drawn, and its blends with the paper where edges are smoothed."""
+    drawn = np.array([INK, FAINT, TRUNK, NEAR, FAR, FORCE, FAR_FORCE, PLAN], float)
+    drawn = np.concatenate([drawn, SOFT + np.linspace(0, 1, 24)[:, None] * (STIFF - SOFT)])
+    share = np.linspace(0, 1, 7)[:-1, None, None]  # the last blend is the paper itself
+    colours = np.unique((drawn + share * (np.array(PAPER) - drawn)).round().astype(np.uint8).reshape(-1, 3), axis=0)
+    image = Image.new("P", (1, 1))
+    image.putpalette([*np.append(colours, [PAPER, GROUND]).astype(int).tolist()])
+    return image
+
+
+def _turned(offset: tuple[float, float], angle: float) -> NDArray:
+    """An offset (forward, up) in a segment's frame, in the world; toes-up positive."""
+    forward, up = offset
+    return np.array([forward * np.cos(angle) - up * np.sin(angle), forward * np.sin(angle) + up * np.cos(angle)])

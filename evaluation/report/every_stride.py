@@ -1,0 +1,70 @@
+"""every_stride.csv and every_stride.parquet: each stride's own curves as one tidy table, a row for each percent of it.
+
+Parquet needs pyarrow (extra `parquet`), which other tools read a hundred times faster than text.
+"""
+
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.settings import body_of
+from springfoot.gait.people.cycle import PERCENT
+
+from ..numbers.series import GAIT_CYCLE_COLUMNS, foot_contacts, stride_curves, strides_within
+from ..recording.recording import WARM_UP, Recording
+
+STRIDE_KEYS = ("episode", "side", "stride", "begin_s", "stride_time_s", "fell", "percent")
+"""Columns that say which stride a row is of, before `GAIT_CYCLE_COLUMNS`."""
+
+
+def write_every_stride(folder: Path, recording: Recording) -> None:
+    """Write `every_stride.csv`, and `every_stride.parquet` where pyarrow is installed."""
+    strides = list(each_stride(recording))
+    with (folder / "every_stride.csv").open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join((*STRIDE_KEYS, *GAIT_CYCLE_COLUMNS)) + "\n")
+        for keys, curves in strides:
+            start = ",".join(str(value) for value in keys.values())
+            numbers = ",".join(["%.7g"] * curves.shape[1])
+            rows = map(tuple, curves.tolist())
+            file.writelines(f"{start},{percent},{numbers % row}\n" for percent, row in enumerate(rows))
+    if find_spec("pyarrow") is not None:
+        _write_parquet(folder / "every_stride.parquet", strides)
+
+
+def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]]:
+    """The strides that the mean curves are of, in their order: which one (`STRIDE_KEYS` without percent), and its
+    curves (101, C) as float32 in the order of `GAIT_CYCLE_COLUMNS`."""
+    body = body_of(recording.settings)
+    begin, end = steady_walk(recording.settings)
+    for episode, ticks in enumerate(recording.ticks.tolist()):
+        if not ticks:
+            continue
+        series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
+        fell = int(recording.fall_reason[episode] != "")
+        for side, foot in enumerate(foot_contacts(series, body)):
+            strides = strides_within(foot, (begin + WARM_UP, end))
+            curves = stride_curves(series, side, body, strides).astype(np.float32)
+            for stride, ((start, _, stop), own) in enumerate(zip(strides.tolist(), curves, strict=True)):
+                of = (episode, SIDES[side], stride, round(start, 6), round(stop - start, 6), fell)
+                yield dict(zip(STRIDE_KEYS, of, strict=False)), own
+
+
+def _write_parquet(path: Path, strides: Sequence[tuple[dict[str, Any], NDArray]]) -> None:
+    import pyarrow as pa  # pyright: ignore[reportMissingImports]  # optional
+    import pyarrow.parquet as pq  # pyright: ignore[reportMissingImports]
+
+    kinds = (pa.int32(), pa.string(), pa.int32(), pa.float64(), pa.float64(), pa.int8())
+    columns = {
+        name: pa.array([keys[name] for keys, _ in strides for _ in PERCENT], kind)
+        for name, kind in zip(STRIDE_KEYS, kinds, strict=False)
+    }
+    columns["percent"] = pa.array(np.tile(PERCENT, len(strides)), pa.int8())
+    curves = np.concatenate([np.empty((0, len(GAIT_CYCLE_COLUMNS)), np.float32), *(own for _, own in strides)])
+    columns |= {name: pa.array(curve) for name, curve in zip(GAIT_CYCLE_COLUMNS, curves.T, strict=True)}
+    pq.write_table(pa.table(columns), path, compression="zstd")

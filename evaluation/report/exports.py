@@ -1,0 +1,118 @@
+"""What other tools read of a walk: OpenSim's motion and storage files, and the body as a MuJoCo model.
+
+OpenSim: x forward, y up, z to the right. Coordinates are named as in its full-body models of walking, in which the
+knee's flexion is positive (Rajagopal et al. 2016); gait2392 has it negative. The pelvis is the trunk: `pelvis_tx` and
+`pelvis_ty` are the hips', `pelvis_tilt` is positive backward. Moments are positive as their coordinates.
+"""
+
+from collections.abc import Mapping
+from math import cos, radians, sin, tan
+from pathlib import Path
+
+import numpy as np
+from mujoco import MjSpec
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics.contact import ground_name
+from springfoot.envs.physics.model import JOINTS, SIDES, build_spec
+from springfoot.envs.physics.model_file import model_text
+from springfoot.envs.settings.feet import feet_of
+from springfoot.envs.settings.settings import BipedSettings, body_of
+
+from ..numbers.series import mid_tick
+from ..recording.recording import TICK, Recording
+
+COORDINATES = dict(zip(JOINTS, ("hip_flexion", "knee_angle", "ankle_angle", "mtp_angle"), strict=True))
+"""Joint -> OpenSim's coordinate, of the same sign."""
+
+
+def write_opensim(folder: Path, recording: Recording) -> None:
+    """Write `walk.mot`, the coordinates, and `walk.sto`, ground reaction forces and joint moments, of one episode."""
+    _write_storage(folder / "walk.mot", "coordinates", opensim_coordinates(recording), in_degrees=True)
+    _write_storage(folder / "walk.sto", "forces and moments", opensim_forces(recording), in_degrees=False)
+
+
+def opensim_coordinates(recording: Recording) -> dict[str, NDArray]:
+    """Column of `walk.mot` -> (T,): time at the end of each tick [s], angles [deg], places [m]."""
+    series = recording.shown()
+    x, above, pitch = series["base"].T
+    columns = {
+        "time": TICK * np.arange(1, len(x) + 1),
+        "pelvis_tilt": -np.degrees(pitch),
+        "pelvis_tx": x,
+        "pelvis_ty": above + _slope(recording.settings) * x,
+    }
+    for side, name in enumerate(SIDES):
+        for joint, coordinate in enumerate(COORDINATES.values()):
+            columns[f"{coordinate}_{name[0]}"] = np.degrees(series["angle"][:, side, joint])
+    return columns
+
+
+def opensim_forces(recording: Recording) -> dict[str, NDArray]:
+    """Column of `walk.sto` -> (T,): time in the middle of each tick [s], forces [N], places [m], moments [N m].
+
+    Each foot's force acts at its centre of pressure on the mean ground, about which it has no moment; a foot that
+    bears nothing has it below its ankle.
+    """
+    series, slope = recording.shown(), _slope(recording.settings)
+    columns = {"time": TICK * (np.arange(len(series["base"])) + 0.5)}
+    for side, name in enumerate(SIDES):
+        force, place = series["force"][:, side], mid_tick(series["contact"][:, side, :, 0])
+        pressing = force[..., 1] - slope * force[..., 0]  # times the slope's cosine: what presses on the ground
+        total = pressing.sum(axis=1)
+        loaded = total > 0.0
+        centre = (pressing * place).sum(axis=1) / np.where(loaded, total, 1.0)
+        centre = np.where(loaded, centre, mid_tick(series["ankle"][:, side, 0]))
+        zero, start = np.zeros(len(centre)), f"ground_force_{name[0]}"
+        columns |= {f"{start}_vx": force[..., 0].sum(axis=1), f"{start}_vy": force[..., 1].sum(axis=1)}
+        columns |= {f"{start}_vz": zero, f"{start}_px": centre, f"{start}_py": slope * centre, f"{start}_pz": zero}
+        columns |= {f"ground_torque_{name[0]}_{axis}": zero for axis in "xyz"}
+    for side, name in enumerate(SIDES):
+        for joint, coordinate in enumerate(COORDINATES.values()):
+            columns[f"{coordinate}_{name[0]}_moment"] = series["joint_torque"][:, side, joint]
+    return columns
+
+
+def write_model(path: Path, recording: Recording) -> None:
+    """Write the body as MJCF: its key `walk` is the first posture recorded, its ground has the walk's slope."""
+    spec, walk = sloping_spec(recording), postures(recording)
+    if len(walk):
+        spec.add_key(name="walk", qpos=walk[0].tolist())
+    path.write_text(model_text(spec), encoding="utf-8")
+
+
+def sloping_spec(recording: Recording) -> MjSpec:
+    """The model's specification of the recorded body and feet, its ground with the walk's slope."""
+    settings = recording.settings
+    spec = build_spec(body_of(settings), settings.friction, feet_of(settings.left_foot, settings.right_foot))
+    half = radians(settings.slope_deg) / 2
+    for side in SIDES:
+        spec.body(ground_name(side)).quat = (cos(half), 0.0, -sin(half), 0.0)
+    return spec
+
+
+def postures(recording: Recording) -> NDArray:
+    """(T, 11) positions of that model's joints at the end of each tick."""
+    series = recording.shown()
+    x, above, pitch = series["base"].T
+    place = np.stack([x, above + _slope(recording.settings) * x, pitch], axis=-1)
+    return np.concatenate([place, series["angle"].reshape(len(place), -1)], axis=-1)
+
+
+def _slope(settings: BipedSettings) -> float:
+    return tan(radians(settings.slope_deg))
+
+
+def _write_storage(path: Path, what: str, columns: Mapping[str, NDArray], in_degrees: bool) -> None:
+    rows = np.stack(list(columns.values()), axis=-1)
+    head = [
+        f"springfoot {what}",
+        "version=1",
+        f"nRows={len(rows)}",
+        f"nColumns={len(columns)}",
+        f"inDegrees={'yes' if in_degrees else 'no'}",
+        "endheader",
+        "\t".join(columns),
+    ]
+    lines = ("\t".join(f"{value:.10g}" for value in row) for row in rows.tolist())
+    path.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8", newline="")

@@ -1,0 +1,194 @@
+"""gait.png: the gait cycle of the model over that of people."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from springfoot.arrays import NDArray
+from springfoot.envs.settings.settings import reference_gait
+from springfoot.gait import HumanGait
+from springfoot.gait.people.cycle import PERCENT
+
+from ..numbers.curves import StrideCurves
+from ..numbers.metrics import MOMENT_CURVES, Gait
+from ..numbers.per_leg import ANGLE_COLUMNS, differ, kinds_of
+from ..recording.recording import Recording
+
+MODEL, OTHER_LEG, PLAN, PEOPLE = "#0b6e8f", "#c77800", "#d1495b", "#8a8a8a"
+Legs = tuple[tuple[StrideCurves, str], ...]
+"""What is drawn of the model: curves and their colours, both feet together or, where they differ, left and right."""
+STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.linewidth": 0.8,
+    "axes.labelcolor": "#333333",
+    "axes.axisbelow": True,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "text.color": "#222222",
+}
+
+
+def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
+    """Write the picture: angles, moments, forces, CoM and stiffness, people's mean ± SD behind each."""
+    settings, metrics = recording.settings, gait.metrics
+    human = reference_gait(settings)
+    legs: Legs = ((gait.both, MODEL),)
+    if differ(settings):
+        legs = tuple(zip(gait.plan.foot, (MODEL, OTHER_LEG), strict=True))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(12.5, 10.2), layout="constrained")
+        grid = figure.subplots(4, 4)
+        for ax, (joint, column) in zip(grid[0], ANGLE_COLUMNS.items(), strict=True):
+            _angle(ax, legs, human, joint, column, metrics["joints"][joint])
+        for ax, (joint, column) in zip(grid[1], MOMENT_CURVES.items(), strict=True):
+            _moment(ax, legs, human, joint, column, metrics["moments"][joint])
+        _force(grid[2, 0], legs, human, "vertical", "Vertical force", metrics["grf"])
+        _force(grid[2, 1], legs, human, "forward", "Fore-aft force", metrics["grf"])
+        _com(grid[2, 2:], recording, gait)
+        _springs(grid[3], legs, human)
+        for ax in [*grid[0], *grid[1], *grid[2, :2], *grid[3]]:
+            _stride_axis(ax, metrics["toe_off_percent"], 100 * human.toe_off)
+        _header(figure, recording, gait, human)
+        figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
+
+
+def _angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
+    positive = {"ankle": "dorsiflexion", "toe": "up"}.get(joint, "flexion")
+    ax.set(title=f"{joint.capitalize()} angle", ylabel=f"{positive} (deg)")
+    phase = PERCENT / 100
+    _people(ax, np.degrees(human.mean(joint, phase)), np.degrees(human.sd(joint, phase)))
+    _model(ax, legs, column)
+    _note(ax, numbers["rmse_deg"], "RMSE {:.1f}°", numbers["r"])
+
+
+def _moment(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
+    positive = "extension" if joint in ("hip", "knee") else "plantarflexion"
+    ax.set(title=f"{joint.capitalize()} moment", ylabel=f"{positive} (N·m/kg)")
+    if joint != "toe":
+        _people(ax, human.mean(f"{joint}_moment", PERCENT / 100), human.sd(f"{joint}_moment", PERCENT / 100))
+    _model(ax, legs, column)
+    _note(ax, numbers["peak_Nm_kg"], "peak {:.2f}", numbers["r"])
+
+
+def _force(ax: Axes, legs: Legs, human: HumanGait, direction: str, title: str, numbers: dict) -> None:
+    ax.set(title=title, ylabel=f"{'up' if direction == 'vertical' else 'forward'} (body weights)")
+    name = f"grf_{direction}"
+    _people(ax, human.mean(name, PERCENT / 100), human.sd(name, PERCENT / 100))
+    _model(ax, legs, f"{name}_bw")
+    keys = (
+        ("vertical_peak1_bw", "vertical_peak2_bw")
+        if direction == "vertical"
+        else ("braking_peak_bw", "forward_peak_bw")
+    )
+    if numbers[keys[0]] is not None:
+        text = f"{numbers[keys[0]]:.2f} / {numbers[keys[1]]:.2f}"
+        _note(ax, numbers[f"{direction}_r"], text + ", r {:.2f}", None)
+
+
+def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
+    for ax, name, title, ylabel, column in (
+        (axes[0], "x", "CoM ahead of ankle", "forward (m)", 0),
+        (axes[1], "z", "CoM height", "above the floor (m)", 1),
+    ):
+        ax.plot(PERCENT, recording.plan_com[:, column], color=PLAN, lw=1.3, ls=(0, (4, 2)))
+        _model(ax, ((gait.com, MODEL),), name)
+        ax.set(title=title, ylabel=ylabel, xlabel="% of step", xlim=(0, 100), xticks=range(0, 101, 25))
+        ax.grid(color="#ededed", lw=0.6)
+        numbers = gait.metrics["com"]
+        error = numbers[f"{name}_rmse_m"]
+        _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", numbers["z_r"] if name == "z" else None)
+    low, high = axes[1].get_ylim()
+    middle, half = (low + high) / 2, max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
+    axes[1].set_ylim(middle - half, middle + half)
+
+
+def _springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
+    for ax, name in zip(axes[:2], ("ankle", "toe"), strict=True):
+        ax.set(title=f"{name.capitalize()} stiffness K", ylabel="N·m/rad")
+        _model(ax, legs, f"{name}_stiffness_Nm_per_rad")
+        ax.set_ylim(0, 1.05 * ax.get_ylim()[1])
+    ax = axes[2]
+    ax.set(title="Ankle and its equilibrium", ylabel="dorsiflexion (deg)")
+    _people(ax, np.degrees(human.mean("ankle", PERCENT / 100)), np.degrees(human.sd("ankle", PERCENT / 100)))
+    _model(ax, legs, "ankle_dorsiflexion_deg")
+    for curves, colour in legs:
+        ax.plot(PERCENT, curves.mean("ankle_equilibrium_deg"), color=colour, lw=1.2, ls=(0, (1, 1.2)))
+    axes[3].set(title="Ankle power", ylabel="generation (W/kg)")
+    _people(axes[3], human.mean("ankle_power", PERCENT / 100), human.sd("ankle_power", PERCENT / 100))
+    _model(axes[3], legs, "ankle_power_W_per_kg")
+
+
+def _people(ax: Axes, mean: NDArray, sd: NDArray) -> None:
+    ax.fill_between(PERCENT, mean - sd, mean + sd, color=PEOPLE, alpha=0.25, lw=0)
+    ax.plot(PERCENT, mean, color=PEOPLE, lw=1.3)
+
+
+def _model(ax: Axes, legs: Legs, name: str) -> None:
+    for curves, colour in legs:
+        mean, sd = curves.mean(name), curves.sd(name)
+        ax.fill_between(PERCENT, mean - sd, mean + sd, color=colour, alpha=0.22, lw=0)
+        ax.plot(PERCENT, mean, color=colour, lw=1.8)
+
+
+def _note(ax: Axes, value: float | None, pattern: str, r: float | None) -> None:
+    """Numbers above the panel, flush right."""
+    parts = [] if value is None else [pattern.format(value)]
+    parts += [] if r is None else [f"r {r:.2f}"]
+    ax.text(1.0, 1.02, ", ".join(parts), transform=ax.transAxes, ha="right", va="bottom", fontsize=8, color="#666666")
+
+
+def _stride_axis(ax: Axes, toe_off: float | None, people_toe_off: float) -> None:
+    ax.set(xlim=(0, 100), xticks=range(0, 101, 20), xlabel="% of stride")
+    ax.grid(color="#ededed", lw=0.6)
+    ax.axhline(0, color="#bbbbbb", lw=0.7, zorder=0.5)
+    ax.axvline(people_toe_off, color=PEOPLE, lw=0.8, ls=(0, (2, 2)), zorder=0.6)
+    if toe_off is not None:
+        ax.axvline(toe_off, color=MODEL, lw=0.8, ls=(0, (2, 2)), zorder=0.6)
+
+
+def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) -> None:
+    settings, metrics = recording.settings, gait.metrics
+    falls = f"{metrics['falls']} fall{'s' * (metrics['falls'] != 1)}"
+    figure.suptitle(
+        f"{recording.policy}    {settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s commanded    "
+        f"{metrics['episodes']} episodes, {falls}, {metrics['strides']['count']} strides",
+        x=0.01,
+        ha="left",
+        fontsize=12,
+        fontweight="bold",
+    )
+    who = "people" if settings.human is None else human.condition
+    note = " (end of the measured range)" if human.clamped else ""
+    names = {"model": MODEL}
+    if differ(settings):
+        kinds = kinds_of(settings)
+        names = {f"left, {kinds['left']}": MODEL, f"right, {kinds['right']}": OTHER_LEG}
+    handles: dict[str, Any] = {
+        f"{name}, mean ± SD over strides": (Patch(color=colour, alpha=0.22, lw=0), Line2D([], [], color=colour, lw=1.8))
+        for name, colour in names.items()
+    }
+    handles |= {
+        f"{who} at {human.speed:.2f} m/s{note}, mean ± SD": (
+            Patch(color=PEOPLE, alpha=0.25, lw=0),
+            Line2D([], [], color=PEOPLE, lw=1.3),
+        ),
+        "plan": Line2D([], [], color=PLAN, lw=1.3, ls=(0, (4, 2))),
+        "equilibrium angle": Line2D([], [], color=MODEL, lw=1.2, ls=(0, (1, 1.2))),
+        "toe-off": Line2D([], [], color="#777777", lw=0.8, ls=(0, (2, 2))),
+    }
+    figure.legend(
+        list(handles.values()), list(handles), loc="outside lower center", ncols=len(handles), frameon=False, fontsize=9
+    )

@@ -1,0 +1,134 @@
+"""A walk's springs as tables for a controller: K and theta_eq over the stride, and as a few finite states.
+
+Both are read back as policies (`springfoot.agents.policies.schedules`).
+"""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.decisions import gait_events
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.physics.model import SIDES, damping_times
+from springfoot.envs.settings.settings import body_of, reference_gait
+from springfoot.errors import SpringfootError
+from springfoot.files.digest import BLANK, SEAL, sealed
+from springfoot.files.writing import csv_text
+from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.springs.stiffness import SPRINGS
+
+from ..recording.open_loop import MEAN_KNOTS, decided, deciding_legs, mean_over_phase
+from ..recording.recording import TICK, WARM_UP, Recording
+
+STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "late push-off", "swing")
+"""Phases of the stride in which a finite-state controller holds K and theta_eq."""
+
+
+def write_schedules(folder: Path, recording: Recording) -> None:
+    """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`."""
+    curves = schedule_curves(recording)
+    settings, body = recording.settings, body_of(recording.settings)
+    whose = {
+        "policy": recording.policy,
+        "height_m": body.height,
+        "mass_kg": body.total_mass,
+        "speed_m_s": settings.speed,
+        "equilibrium": settings.equilibrium,
+    }
+    values = ([*whose.values(), *(curve[percent] for curve in curves.values())] for percent in PERCENT)
+    rows = ([int(percent), *row, BLANK] for percent, row in zip(PERCENT, values, strict=True))
+    text = sealed(csv_text(["percent", *whose, *curves, SEAL], rows))
+    (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
+    if deciding_legs(settings):
+        states = finite_states(recording) | {SEAL: BLANK}
+        table = sealed(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+        (folder / "finite_states.json").write_text(table, encoding="utf-8")
+
+
+def schedule_curves(recording: Recording) -> dict[str, NDArray]:
+    """Column of `stiffness_schedule.csv` -> (101,) over percent of the leg's phase: mean K [N m/rad] and theta_eq [deg]
+    of each spring at the moments of decision, and their standard deviation at equal phase. NaN without decisions.
+    """
+    curves: dict[str, NDArray] = {}
+    for side, name in enumerate(SIDES):
+        for series, column, unit in (
+            ("stiffness", "stiffness_Nm_per_rad", 1.0),
+            ("equilibrium", "equilibrium_deg", np.degrees(1.0)),
+        ):
+            phase, values = decided(recording, [side], series)
+            mean, sd = _over_phase(phase, values * unit)
+            for joint, spring in enumerate(SPRINGS):
+                curves[f"{spring}_{name}_{column}"] = mean[:, joint]
+                curves[f"{spring}_{name}_{column}_sd"] = sd[:, joint]
+    return dict(sorted(curves.items(), key=lambda item: "equilibrium" in item[0]))
+
+
+def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """Mean and standard deviation (101, 2) at equal phase of `values` (n, 2) at `phase` (n,)."""
+    if not len(phase):
+        nothing = np.full((len(PERCENT), values.shape[1]), np.nan)
+        return nothing, nothing
+    knots = np.clip(mean_over_phase(phase, values), values.min(0), values.max(0))
+    squares = (values - _between_knots(knots, phase)) ** 2
+    variance = np.maximum(mean_over_phase(phase, squares), 0.0)
+    return _between_knots(knots, PERCENT / 100), np.sqrt(_between_knots(variance, PERCENT / 100))
+
+
+def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
+    at = np.arange(MEAN_KNOTS) / MEAN_KNOTS
+    return np.stack([np.interp(phase, at, curve, period=1.0) for curve in knots.T], -1)
+
+
+def finite_states(recording: Recording) -> dict[str, Any]:
+    """`finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of the `deciding_legs` together.
+
+    K is the mean over the state; theta_eq is the angle at which the state's spring has its mean torque at its mean
+    angle and rate. None where the walk has no such state; times at which muscles are slack are left out. The states
+    begin at the gait events of the walk that the body is held to (`gait_events`), the inner ones half-way between two.
+    Raises `SpringfootError` where both feet have a device.
+    """
+    settings, body, legs = recording.settings, body_of(recording.settings), deciding_legs(recording.settings)
+    if not legs:
+        raise SpringfootError("a table of finite states needs a foot without a device")
+    strike, flat, heel_off, toe_off = gait_events(reference_gait(settings))
+    starts = [strike, flat, (flat + heel_off) / 2, heel_off, (heel_off + toe_off) / 2, toe_off]
+    events = ["heel strike", "foot flat", None, "heel-off", None, "toe-off"]
+    begin, end = steady_walk(settings)
+    ticks = slice(round((begin + WARM_UP) / TICK), round(end / TICK) if np.isfinite(end) else None)
+    phase = recording.series["phase"][:, ticks, legs].ravel().astype(float)
+    of = {name: recording.series[name][:, ticks][:, :, legs] for name in ("stiffness", "angle", "velocity", "torque")}
+    walked = np.isfinite(phase) & (of["stiffness"] > 0.0).all(-1).ravel()
+    of |= {name: of[name][..., FEET] for name in ("angle", "velocity", "torque")}
+    springs = {name: values.reshape(-1, len(SPRINGS))[walked].astype(float) for name, values in of.items()}
+    phase, beta = phase[walked] % 1.0, damping_times(body)[FEET]
+    states = []
+    for name, event, (start, stop) in zip(STATES, events, pairwise([*starts, 1.0]), strict=True):
+        inside = (phase >= start) & (phase < stop)
+        state: dict[str, Any] = {"name": name, "phase": round(float(start), 6), "event": event}
+        for joint, spring in enumerate(SPRINGS):
+            entry: dict[str, float | None] = dict.fromkeys(
+                ("stiffness_Nm_per_rad", "damping_time_s", "equilibrium_deg")
+            )
+            entry["damping_time_s"] = float(beta[joint])
+            if inside.any():
+                mean = {key: float(values[inside, joint].mean()) for key, values in springs.items()}
+                rest = mean["torque"] / mean["stiffness"] + mean["angle"] + beta[joint] * mean["velocity"]
+                entry |= {"stiffness_Nm_per_rad": mean["stiffness"], "equilibrium_deg": float(np.degrees(rest))}
+            state[spring] = entry
+        states.append(state)
+    return {
+        "format": "springfoot finite states",
+        "version": 1,
+        "policy": recording.policy,
+        "law": "torque = stiffness x (equilibrium - angle - damping_time x rate) in SI; dorsiflexion, toe up positive",
+        "phase": "share of the leg's stride, from its heel strike on; a state holds until the next one begins",
+        "height_m": body.height,
+        "mass_kg": body.total_mass,
+        "speed_m_s": settings.speed,
+        "states": states,
+    }

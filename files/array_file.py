@@ -1,0 +1,67 @@
+"""Arrays with a JSON header in one .npz file, and a digest of both, so that damage is noticed; no objects, no pickles.
+
+The members of the archive are stored, not compressed, so that no file says it is small and fills the memory.
+"""
+
+import io
+import json
+from math import prod
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+from numpy.lib import format as npy
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from .tensor_file import DIGEST, digest_of
+
+HEADER = "header"
+"""Name of the array that holds the JSON text."""
+
+
+def write_arrays(path: Path, header: dict[str, Any], arrays: dict[str, NDArray]) -> None:
+    """Write arrays and a JSON header as an .npz file."""
+    packed = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+    text = json.dumps(header | {DIGEST: digest_of(header, packed)}, allow_nan=False)
+    np.savez(path, **{HEADER: np.array(text)}, **dict[str, Any](packed))
+
+
+def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Header and arrays of a file that `write_arrays` wrote; else `SpringfootError`, which says it is no `what`."""
+    try:
+        with ZipFile(path) as archive:
+            if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
+                raise SpringfootError(f"{path} is no {what}: it is compressed")
+            arrays = {
+                member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in archive.infolist()
+            }
+        header = json.loads(str(arrays.pop(HEADER)))
+        digest = header.pop(DIGEST, None)
+        whole = digest == digest_of(header, arrays)
+    except SpringfootError:
+        raise
+    except BadZipFile as error:
+        raise SpringfootError(f"{path} is no {what}, or it is damaged: {error}") from None
+    except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, MemoryError) as error:
+        reason = f": {error.strerror}" if isinstance(error, OSError) and error.strerror else ""
+        raise SpringfootError(f"{path} is no {what}{reason}") from None
+    if digest is None:
+        raise SpringfootError(f"{path} has no digest: another version of springfoot wrote it; evaluate again")
+    if not whole:
+        raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
+    return header, arrays
+
+
+def _array(content: bytes) -> NDArray:
+    """The array in an .npy file's content; `ValueError` for what says it is larger than it is, and for objects."""
+    file = io.BytesIO(content)
+    read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))
+    if read is None:
+        raise ValueError("another version of the format")
+    shape, _, dtype = read(file)
+    if dtype.hasobject or prod(shape) * dtype.itemsize != len(content) - file.tell():
+        raise ValueError("not the bytes that its shape says")
+    return np.load(io.BytesIO(content))

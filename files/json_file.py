@@ -1,0 +1,51 @@
+"""JSON files: of a size that fits into memory, whole if they are sealed, an object in braces."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from springfoot.errors import SpringfootError, printable
+
+from .digest import BLANK, SEAL, require_whole, sealed
+from .text_table import read_bytes
+
+MOST_JSON_BYTES = 2**23
+"""Largest JSON file that is read; chosen, hundreds of times a usual one: an object takes twenty times its text."""
+
+
+def sealed_object(values: Mapping[str, Any]) -> bytes:
+    """The values as a JSON file's content, with a digest (`seal`)."""
+    return sealed(json.dumps({**values, SEAL: BLANK}, indent=2) + "\n").encode()
+
+
+def read_object(path: Path, what: str) -> dict[str, Any]:
+    """The object in a JSON file, without its digest; else `SpringfootError`, which says that the file is no `what`."""
+    content = read_bytes(path, MOST_JSON_BYTES)
+    require_whole(path, content)
+    try:
+        value = json.loads(content, object_pairs_hook=keys_once)
+    except (ValueError, RecursionError) as error:
+        raise SpringfootError(f"{path} is no {what}: it is not JSON, {json_fault(error)}") from None
+    if not isinstance(value, dict):
+        raise SpringfootError(f"{path} is no {what}: it must be an object in braces")
+    return {name: each for name, each in value.items() if name != SEAL}
+
+
+def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object's keys and values as a dictionary; ValueError for a key that stands twice."""
+    values: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in values:
+            raise ValueError(f"{key!r:.40} stands twice in an object")
+        values[key] = value
+    return values
+
+
+def json_fault(error: Exception) -> str:
+    """What is wrong with a text that is not JSON, in a few words."""
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno}, column {error.colno}: {error.msg[0].lower()}{error.msg[1:]}"
+    if isinstance(error, UnicodeDecodeError):
+        return "it is no UTF-8 text"
+    return "it is nested too deeply" if isinstance(error, RecursionError) else printable(str(error))[:80]

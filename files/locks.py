@@ -1,0 +1,167 @@
+"""One owner a folder: who writes into it, so that nobody else does. What a dead owner left is taken over.
+
+The owner holds a lock on the file `.owner` in the folder, and its process id, host and start stand in that file. The
+system lets go of the lock when the process ends, however it ends; so a lock that is free, of a file that is there, was
+a dead owner's. Locks do not reach from host to host everywhere: the owner touches its file every minute, and one on
+another host counts as dead after ten minutes without.
+"""
+
+import json
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from springfoot.errors import SpringfootError
+
+try:
+    import fcntl
+except ImportError:  # a system without such locks: every owner is taken as one on another host
+    fcntl = None
+
+OWNER = ".owner"
+"""Name of the file that says who owns a folder."""
+BEAT, DEAD = 60.0, 600.0
+"""Time between two signs of life, and time without after which an owner on another host is dead [s]; chosen."""
+
+
+class TakenError(SpringfootError):
+    """Somebody else has the folder."""
+
+
+@contextmanager
+def owned(folder: Path) -> Iterator[None]:
+    """Own `folder`, made where it is not there, until the block ends; one that was made and is empty then vanishes.
+
+    Says so on standard error where it takes the folder over from a dead owner. Raises `SpringfootError`, with nothing
+    changed, where it cannot be made, and `TakenError` where another process owns it.
+    """
+    try:
+        str(folder).encode()
+    except UnicodeEncodeError:  # TensorBoard, JSON and pages could not name it
+        raise SpringfootError(f"cannot make the folder {folder}: its name must be UTF-8 text") from None
+    path = folder / OWNER
+    made: list[Path] = []
+    try:
+        handle, locked = _locked(path, made)
+        mine, over = True, threading.Event()
+        try:
+            former = _read(path)
+            if former and (former.get("host") != socket.gethostname() or (not locked and _runs(former))):
+                silent = time.time() - path.stat().st_mtime
+                mine = silent >= DEAD
+                if silent < -DEAD:
+                    raise TakenError(
+                        _taken(folder, former, f", by a clock {_span(-silent)} ahead; remove {path} if not")
+                    )
+                if not mine:
+                    raise TakenError(_taken(folder, former, f", last heard of {_span(silent)} ago"))
+            if former:
+                print(f"{folder}: taken over from {_named(former)}, which has ended", file=sys.stderr, flush=True)
+            me = {"pid": os.getpid(), "host": socket.gethostname(), "began": datetime.now(UTC).isoformat()}
+            os.ftruncate(handle, 0)
+            os.pwrite(handle, json.dumps(me).encode(), 0)
+            threading.Thread(target=_live, args=(path, over), daemon=True).start()
+            yield
+        finally:
+            over.set()
+            if mine and _same(handle, path):  # it is another's, or nobody's, where the folder was moved
+                path.unlink()
+            os.close(handle)
+    finally:
+        with suppress(OSError):
+            for each in reversed(made):
+                each.rmdir()
+
+
+def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
+    """A handle of the file at `path`, and whether it is locked, as it is where there are locks.
+
+    The folders that it takes are made, and told in `made`.
+    """
+    while True:
+        made += _make(path.parent)
+        try:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except FileNotFoundError:  # the one before has just removed its folder
+            continue
+        locked = fcntl is not None
+        try:
+            if fcntl is not None:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(handle)
+            raise TakenError(_taken(path.parent, _read(path))) from None
+        except OSError:  # a file system without locks
+            locked = False
+        if _same(handle, path):
+            return handle, locked
+        os.close(handle)  # the one before has just removed its file
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder and those above it; return those that were not there, outermost first."""
+    missing = [each for each in (folder, *folder.parents) if not each.exists()][::-1]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpringfootError(f"cannot make the folder {folder}: {error.strerror}") from None
+    return missing
+
+
+def _same(handle: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(handle), path.stat())
+    except OSError:
+        return False
+
+
+def _live(path: Path, over: threading.Event) -> None:
+    while not over.wait(BEAT):
+        with suppress(OSError):
+            os.utime(path)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Who owns; empty for nobody, and for who has only just locked it."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _runs(owner: dict[str, Any]) -> bool:
+    """Whether there is a process of that id on this host."""
+    try:
+        os.kill(int(owner["pid"]), 0)
+    except (ProcessLookupError, KeyError, TypeError, ValueError, OverflowError):
+        return False
+    except OSError:  # somebody else's
+        return True
+    return True
+
+
+def _taken(folder: Path, owner: dict[str, Any], more: str = "") -> str:
+    return f"{folder} is being written by {_named(owner)}{more}; wait for it, or choose another folder"
+
+
+def _named(owner: dict[str, Any]) -> str:
+    try:
+        age = (datetime.now(UTC) - datetime.fromisoformat(owner["began"])).total_seconds()
+        return f"process {int(owner['pid'])} on {owner['host']}, begun {_span(age)} ago"
+    except (KeyError, TypeError, ValueError):
+        return "another process"
+
+
+def _span(seconds: float) -> str:
+    for unit, size in (("d", 86400), ("h", 3600), ("min", 60)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{max(seconds, 0):.0f} s"

@@ -1,0 +1,93 @@
+"""Tensors with a JSON header in one .safetensors file, and a digest of both, so that damage is noticed.
+
+A digest finds what a disk or a copy has changed, down to one bit. It is no signature: whoever changes a file on purpose
+can write a fitting one.
+"""
+
+import json
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save as to_safetensors
+
+from springfoot.errors import SpringfootError, quoted
+
+from .writing import write_atomically
+
+DIGEST = "sha256"
+"""Name of the digest among the entries of the header."""
+MOST_TENSOR_BYTES, MOST_HEADER = 2**27, 2**24
+"""Largest file, and largest header in it, that are read or written [bytes]; chosen, hundreds of times usual ones."""
+
+
+def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping[str, np.ndarray]) -> None:
+    """Write tensors and, under `key`, a JSON header, whole or not at all; equal contents give equal bytes."""
+    json.dumps(header, allow_nan=False)  # raises for what is no JSON
+    packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
+    text = _text(header | {DIGEST: digest_of(header, packed)})  # one entry: safetensors has no order of several
+    content = to_safetensors(packed, {key: text})
+    if len(content) > MOST_TENSOR_BYTES or len(text) > MOST_HEADER:
+        raise SpringfootError(f"{path} must have at most {MOST_TENSOR_BYTES:,} bytes, would have {len(content):,}")
+    write_atomically(path, content)
+
+
+def read_tensors(
+    path: Path, key: str, what: str, entries: AbstractSet[str], finite: bool = True, sealed: bool = False
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """The JSON under `key` of a .safetensors header, and the tensors, all finite; else `SpringfootError`.
+
+    `what` it is called in messages, and `entries` are those that its JSON may have. Unless `finite`, numbers may be of
+    any kind, infinite ones and NaN too. A file without a digest, of an earlier version, is read without that check;
+    with `sealed` it is refused.
+    """
+    try:
+        if (size := path.stat().st_size) > MOST_TENSOR_BYTES:
+            raise SpringfootError(f"{path} must have at most {MOST_TENSOR_BYTES:,} bytes, has {size:,}")
+        with path.open("rb") as opened:
+            if (header_size := int.from_bytes(opened.read(8), "little")) > MOST_HEADER:
+                raise SpringfootError(
+                    f"{path} is not a .safetensors file: its header would have {header_size:,} bytes, at most "
+                    f"{MOST_HEADER:,} are read"
+                )
+        with safe_open(path, framework="numpy") as file:
+            text = (file.metadata() or {}).get(key)
+            if text is None:
+                raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {what}")
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        header = json.loads(text)
+    except (SafetensorError, OSError, TypeError, AttributeError) as error:
+        raise SpringfootError(f"{path} is not a .safetensors file: {error}") from None
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise SpringfootError(f"{path}: the springfoot entry of its header is not JSON: {error}") from None
+    if not isinstance(header, dict):
+        raise SpringfootError(f"{path}: the springfoot entry of its header is not a JSON object")
+    if unknown := sorted(header.keys() - entries - {DIGEST}):
+        raise SpringfootError(f"{path} is damaged: its header has an entry {quoted(unknown[0])}")
+    if DIGEST in header:
+        whole = text == _text(header)
+        if header.pop(DIGEST) != digest_of(header, tensors) or not whole:
+            raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
+    elif sealed:
+        raise SpringfootError(f"{path} is damaged or was changed: it has no {DIGEST}")
+    for tensor_name, tensor in tensors.items() if finite else ():
+        if tensor.dtype not in (np.float32, np.float64) or not np.isfinite(tensor).all():
+            raise SpringfootError(f"{path}: {tensor_name} must be finite float32 or float64 numbers")
+    return header, tensors
+
+
+def _text(header: Mapping[str, Any]) -> str:
+    return json.dumps(header, sort_keys=True)
+
+
+def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
+    """The digest of a JSON header and arrays: of their names, types, shapes and bytes, in whatever order."""
+    found = sha256(_text(header).encode())
+    for name in sorted(tensors):
+        found.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())
+        found.update(np.ascontiguousarray(tensors[name]).data)
+    return found.hexdigest()

@@ -1,0 +1,136 @@
+"""Text files of numbers under a line of names, of sizes that fit into memory; errors name file, line and column."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from .digest import require_whole
+
+MOST_TEXT_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_000_000
+"""Largest text file that is read: bytes, letters of a line, columns, cells; chosen: 25 minutes of 20 curves at 100 Hz,
+which take less than half a gigabyte."""
+LARGEST_VALUE = 1e12
+"""Largest magnitude of a number in a cell; chosen: means and squares of such are numbers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Rows of text with a header; errors name file, line and column."""
+
+    name: str
+    columns: list[str]
+    rows: list[tuple[int, list[str]]]
+    """Line number in the file, cells."""
+
+    def has(self, column: str) -> bool:
+        """Whether there is such a column, not all empty."""
+        return column in self.columns and any(cells[self.columns.index(column)].strip() for _, cells in self.rows)
+
+    def numbers(self, column: str) -> NDArray:
+        """A column's cells, all finite numbers, or `SpringfootError`."""
+        at = self.columns.index(column)
+        return np.array([self._number(line, column, cells[at]) for line, cells in self.rows])
+
+    def ascending(self, column: str) -> NDArray:
+        """As `numbers`, each greater than the one before, or `SpringfootError`."""
+        values = self.numbers(column)
+        for (line, _), before, value in zip(self.rows[1:], values[:-1], values[1:], strict=True):
+            if value <= before:
+                raise self.error(line, column, f"{value:g} must be greater than {before:g} in the row before")
+        return values
+
+    def error(self, line: int, column: str, what: str) -> SpringfootError:
+        """The error that says in one line what is wrong with a cell."""
+        return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
+
+    def _number(self, line: int, column: str, cell: str) -> float:
+        try:
+            value = float(cell)
+        except ValueError:
+            raise self.error(line, column, f"must be a number, got {cell.strip()!r:.40}") from None
+        if not isfinite(value):
+            raise self.error(line, column, f"must be a finite number, got {cell.strip()}")
+        if abs(value) > LARGEST_VALUE:
+            raise self.error(line, column, f"must be within ±{LARGEST_VALUE:g}, got {value:.4g}")
+        return value
+
+
+def existing(path: Path) -> Path:
+    """The path of a file that is there, or `SpringfootError`."""
+    if not path.is_file():
+        raise SpringfootError(f"no file {path}")
+    return path
+
+
+def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
+    """What a file holds; `SpringfootError` if there is none, or more than `most` bytes, which are then not read."""
+    with existing(path).open("rb") as file:
+        size = path.stat().st_size
+        content = file.read(most + 1) if size <= most else b""
+    if max(size, len(content)) > most:
+        raise SpringfootError(f"{path.name} must have at most {most:,} bytes, has {max(size, len(content)):,}")
+    return content
+
+
+def read_csv(path: Path) -> Table:
+    """A CSV file: header, then rows of as many cells. Raises `SpringfootError` for anything else."""
+    try:
+        return make_table(path.name, enumerate(csv.reader(text_lines(path), strict=True), 1))
+    except csv.Error as error:
+        raise SpringfootError(f"{path.name} is not a CSV file: {error}") from None
+
+
+def text_lines(path: Path) -> Iterator[str]:
+    """The lines of a text file, whole if it is sealed; `SpringfootError` for any other file."""
+    content = read_bytes(path)
+    require_whole(path, content)
+    if b"\0" in content:
+        raise SpringfootError(f"{path.name} is not a text file")
+    try:
+        for number, line in enumerate(io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig"), 1):
+            if len(line) > LONGEST_LINE:
+                raise SpringfootError(f"{path.name}, line {number}: more than {LONGEST_LINE:,} letters")
+            yield line
+    except UnicodeDecodeError:
+        raise SpringfootError(f"{path.name} is not a text file") from None
+
+
+def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
+    """Numbered lines of cells, the first the header, empty ones left out."""
+    filled = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
+    header, names = next(filled, (0, []))
+    columns = [_coordinate(column.strip()) for column in names]
+    if len(columns) > MOST_COLUMNS:
+        raise SpringfootError(
+            f"{name}, line {header}: must have at most {MOST_COLUMNS:,} columns, has {len(columns):,}"
+        )
+    if len(columns) == 1 and (separator := next((each for each in ";\t" if each in names[0]), None)):
+        raise SpringfootError(
+            f"{name}, line {header}: cells must be separated by commas, with decimal points, got {separator!r}"
+        )
+    if twice := next((column for column, times in Counter(columns).items() if times > 1), None):
+        raise SpringfootError(f"{name}, line {header}: column {twice} stands twice")
+    rows = []
+    for line, cells in filled:
+        if len(cells) != len(columns):
+            raise SpringfootError(f"{name}, line {line}: {len(cells)} cells, but {len(columns)} columns")
+        if (len(rows) + 1) * len(columns) > MOST_CELLS:
+            raise SpringfootError(f"{name}, line {line}: more than {MOST_CELLS:,} cells; leave out columns or samples")
+        rows.append((line, cells))
+    if not rows:
+        raise SpringfootError(f"{name} has no data: it needs a line of column names and rows of numbers")
+    return Table(name=name, columns=columns, rows=rows)
+
+
+def _coordinate(name: str) -> str:
+    """`/jointset/knee_r/knee_angle_r/value` -> `knee_angle_r`."""
+    return name.split("/")[-2] if name.startswith("/") and name.endswith("/value") else name

@@ -1,0 +1,178 @@
+"""Files and folders of results: written whole or not at all, and never over an older one."""
+
+import csv
+import io
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import count
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from springfoot.errors import SpringfootError
+
+from .locks import OWNER, TakenError, owned
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a whole file or nothing, on the disk: readers see the old content or the new, never a part of it."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)  # mkstemp makes it private; a result is as readable as its neighbours
+        os.replace(temporary, path)
+        _sync_folder(path.parent)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """Have a folder's entries on the disk, where the system can say so of a folder."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def remove_temporary(folder: Path) -> None:
+    """Remove what a process that was killed in `write_atomically` left in a folder that nobody else writes into."""
+    for path in folder.glob(".*"):
+        if _is_temporary(path):
+            path.unlink(missing_ok=True)
+
+
+def _is_temporary(path: Path) -> bool:
+    return re.fullmatch(r"\..+\.(safetensors|json|png)\.[a-z0-9_]{8}", path.name) is not None
+
+
+def write_new(contents: Mapping[Path, bytes]) -> None:
+    """Write several new files, all of them or none; raise `SpringfootError`, with nothing written, if one exists."""
+    require_new_files(contents)
+    written: list[Path] = []
+    try:
+        for path, content in contents.items():
+            make_folder(path.parent)
+            write_atomically(path, content)
+            written.append(path)
+    except BaseException:
+        for path in written:
+            path.unlink(missing_ok=True)
+        raise
+
+
+def require_new_files(paths: Iterable[Path]) -> None:
+    """Raise `SpringfootError` if one of these files exists."""
+    for path in paths:
+        if path.exists():
+            raise SpringfootError(f"{path} already exists; out must be a new file")
+
+
+@contextmanager
+def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
+    """A folder to write into, and the new folder that it becomes where the block ends well; elsewhere it vanishes.
+
+    That one is `out`, or if None the first of `free`-1, `free`-2, … that neither exists nor is being made. What a
+    process that was killed had written for it is removed. Raises `SpringfootError` for an `out` that is taken.
+    """
+    with ExitStack() as stack:
+        names = (free.with_name(f"{free.name}-{number}") for number in count(1)) if out is None else [out]
+        for name in names:
+            try:
+                part = stack.enter_context(_part(name))
+            except TakenError:
+                if out is not None:
+                    raise
+            else:
+                yield part, name
+                break
+
+
+@contextmanager
+def _part(out: Path) -> Iterator[Path]:
+    """The hidden folder that becomes `out`; raises `TakenError` where `out` exists or another process makes it."""
+    part = out.parent / f".{out.name}.part"
+    try:
+        with owned(part):
+            if out.exists():
+                raise TakenError(f"{out} exists already; out must be a new folder")
+            try:
+                _empty(part)
+                yield part
+                _settle(part, out)
+            except BaseException:
+                _empty(part)
+                raise
+    finally:
+        with suppress(OSError):
+            part.rmdir()
+
+
+def _settle(part: Path, out: Path) -> None:
+    """Give a folder its name; another, and say so, where somebody has taken that one meanwhile."""
+    name = out
+    for number in count(2):
+        try:
+            if not name.exists():
+                part.rename(name)
+                break
+        except OSError:
+            if not name.exists():
+                raise
+        name = out.with_name(f"{out.name}-{number}")
+    (name / OWNER).unlink(missing_ok=True)
+    if name != out:
+        print(f"{out} exists by now: the results are in {name}", file=sys.stderr, flush=True)
+
+
+def _empty(folder: Path) -> None:
+    """Remove all that a folder holds but who owns it."""
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        elif path.name != OWNER:
+            path.unlink(missing_ok=True)
+
+
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A CSV file: numbers to six significant digits, nothing for None and for what is not finite."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return f"{value:.6g}" if isfinite(value) else ""
+
+
+def require_new(out: str | Path) -> Path:
+    """Return `out` as a path; raise `SpringfootError` if it exists and is not an empty folder.
+
+    What a process leaves that was killed before it wrote its first file counts as nothing.
+    """
+    out = Path(out)
+    if out.exists() and not (out.is_dir() and all(path.name == OWNER or _is_temporary(path) for path in out.iterdir())):
+        raise SpringfootError(f"{out} already exists; out must be a new or an empty folder")
+    return out
+
+
+def make_folder(out: Path) -> None:
+    """Make the folder and those above it; raise `SpringfootError` where that is impossible."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SpringfootError(f"cannot make the folder {out}: {error.strerror}") from None

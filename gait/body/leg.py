@@ -1,0 +1,262 @@
+"""One leg as a chain of rigid segments: its motion and load, and the joint moments they take.
+
+Thigh, shank, foot and toe hang below the hip. The frame is fixed to the ground: x forward along it, z up at right
+angles to it. A *turn* is a segment's angle in that frame, positive where its front goes up; the thigh's is its
+flexion. A *moment* is the internal joint moment [N m], what muscles and springs apply: extension of hip and knee,
+plantarflexion of ankle and toe positive, so that moment = -torque where torque is positive as the angle. Segment
+masses, centres and inertias are `Body`'s. All arrays share their leading axes, written "..." below.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_number
+
+from .body import ANGLES, Body, gravity
+from .rockers import turned
+
+JOINTS = ("hip", "knee", "ankle", "toe")
+"""Joints of a leg from the top; joint i holds segment i of `LEG_SEGMENTS`."""
+LEG_SEGMENTS = ("thigh", "shank", "foot", "toe")
+FOOT_SEGMENT, TOE_SEGMENT = LEG_SEGMENTS.index("foot"), LEG_SEGMENTS.index("toe")
+
+_MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
+"""Internal moment over the turning moment on the segment below, in the order of `JOINTS`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegMotion:
+    """How one leg moves; from `leg_motion`, or filled in exactly. Segments in the order of `LEG_SEGMENTS`."""
+
+    turn: NDArray
+    """(..., 4) segment turns [rad]."""
+    rate: NDArray
+    """(..., 4) [rad/s]."""
+    acceleration: NDArray
+    """(..., 4) [rad/s^2]."""
+    hip: NDArray
+    """(..., 2) hip (x, z) [m]; only its place relative to the load's points matters."""
+    hip_acceleration: NDArray
+    """(..., 2) [m/s^2]."""
+
+    def __post_init__(self) -> None:
+        leading = self.hip.shape[:-1]
+        _require_shapes(self, {"turn": 4, "rate": 4, "acceleration": 4, "hip": 2, "hip_acceleration": 2}, leading)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FootLoad:
+    """What the ground does to one foot, on its two segments: foot (first), toe (second)."""
+
+    force: NDArray
+    """(..., 2, 2) force (forward, up) [N]."""
+    point: NDArray
+    """(..., 2, 2) a point (x, z) [m] of its line of action; of no account where the force is 0."""
+
+    def __post_init__(self) -> None:
+        _require_shapes(self, {"force": 2, "point": 2}, (*self.force.shape[:-2], 2))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointLoads:
+    """What passes through the joints, by name."""
+
+    moment: dict[str, NDArray]
+    """(...) internal joint moments [N m], signs as in the module's head."""
+    force: dict[str, NDArray]
+    """(..., 2) net joint force (forward, up) [N] on the segment below, without that of muscles across the joint."""
+
+
+# Motion and load ------------------------------------------------------------------------------------------
+
+
+def segment_turns(angles: Mapping[str, ArrayLike], slope: float = 0.0) -> NDArray:
+    """Segment turns (..., 4) [rad] from the angles thigh (to the true vertical), knee, ankle, toe [rad].
+
+    On a `slope` [rad], uphill positive, the frame leans with the ground.
+    """
+    thigh, knee, ankle, toe = np.broadcast_arrays(*(np.asarray(angles[name], float) for name in ANGLES))
+    shank = thigh - slope - knee
+    return np.stack([thigh - slope, shank, shank + ankle, shank + ankle + toe], -1)
+
+
+def leg_motion(angles: Mapping[str, ArrayLike], hip: ArrayLike, tick: float, slope: float = 0.0) -> LegMotion:
+    """The motion of a leg from samples every `tick` [s]: angles (T,) as in `segment_turns`, hip (T, 2) (x, z) [m].
+
+    Rates and accelerations are those of the cubic splines through the samples: exact for cubics, else with an error
+    of the order of tick^2, and larger in the first and last few samples. Nothing is smoothed: noise of e in the
+    samples is noise of about 3 e / tick^2 in the accelerations, so filter measured data first. Raises `SpringfootError`
+    for fewer than 4 samples or values that are not finite.
+    """
+    turns, hips = segment_turns(angles, slope), np.asarray(hip, float)
+    if hips.shape != (len(turns), 2) or turns.ndim != 2:
+        raise SpringfootError(
+            f"angles and hip must have shapes (T,) and (T, 2), got {turns.shape[:-1]} and {hips.shape}"
+        )
+    samples = np.concatenate([turns, hips], -1)
+    require_number("tick", tick, 0.0, unit="s", above=True)
+    if len(samples) < 4 or not np.isfinite(samples).all():
+        raise SpringfootError(f"angles and hip must be at least 4 finite samples, got {len(samples)}")
+    spline = CubicSpline(tick * np.arange(len(samples)), samples)
+    return motion_of(*(spline(spline.x, derivative) for derivative in range(3)))
+
+
+def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArray]:
+    """Joints (..., 2) (x, z) [m] by name, from segment turns (..., 4) [rad] and the hip (..., 2) [m]."""
+    joints = [hip]
+    for index, offset in enumerate(_far_ends(body)):
+        joints.append(joints[-1] + np.stack(turned(turn[..., index], *offset), -1))
+    return dict(zip(JOINTS, joints, strict=True))
+
+
+def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion:
+    """From columns of four turns, hip x, hip z, and their time derivatives."""
+    return LegMotion(
+        turn=value[..., :4],
+        rate=rate[..., :4],
+        acceleration=acceleration[..., :4],
+        hip=value[..., 4:],
+        hip_acceleration=acceleration[..., 4:],
+    )
+
+
+def mass_acceleration(body: Body, motion: LegMotion) -> NDArray:
+    """Sum of mass times acceleration (..., 2) [N] over the segments of a leg."""
+    joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    return np.sum([mass * _com(body, motion, joints, i)[1] for i, (mass, _) in enumerate(_inertial(body))], axis=0)
+
+
+def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
+    """Rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive as a turn.
+
+    `centre` is the CoM of the whole body, so that its own acceleration does not count in the sum over all parts.
+    """
+    joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    rate = np.zeros(motion.hip.shape[:-1])
+    for index, (mass, inertia) in enumerate(_inertial(body)):
+        com, acceleration = _com(body, motion, joints, index)
+        rate = rate + mass * _cross(com - centre, acceleration) + inertia * motion.acceleration[..., index]
+    return rate
+
+
+def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
+    """The load of one force (..., 2) [N] at `cop` (..., 2) (x, z) [m]: ahead of the toe joint (x, [m]) it is the toe's.
+
+    As the centre of pressure passes the joint the toe's moment starts with what the forward force has about it: its
+    lever is the height of the joint.
+    """
+    ahead = (cop[..., 0] > np.asarray(toe_joint_x))[..., None]
+    return FootLoad(
+        force=np.stack([np.where(ahead, 0.0, force), np.where(ahead, force, 0.0)], -2),
+        point=np.stack([cop, cop], -2),
+    )
+
+
+def resultant(force: NDArray, point: NDArray) -> tuple[NDArray, NDArray]:
+    """One force (..., 2) [N] and its point (..., 2) [m] in place of several, (..., K, 2) each, on one segment.
+
+    Same force, same moment: the centre of pressure, at the mean height weighted by upward force. Without load 0, at
+    the mean of the points.
+    """
+    total = force.sum(-2)
+    up = total[..., 1]
+    loaded = up != 0.0
+    divisor = np.where(loaded, up, 1.0)
+    height = (point[..., 1] * force[..., 1]).sum(-1) / divisor
+    moment = _cross(point, force).sum(-1)
+    centre = np.stack([(moment + height * total[..., 0]) / divisor, height], -1)
+    return total, np.where(loaded[..., None], centre, point.mean(-2))
+
+
+# Moments ----------------------------------------------------------------------------------------------------
+
+
+def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[str, NDArray]:
+    """Equation (3): joint moments (...) [N m] by name from the ground reaction alone, r x F from each joint.
+
+    Wells 1981 (Bulletin of Prosthetics Research 18, 15-19): weight and inertia of the segments are left out. The toe
+    joint carries the toe's load, the joints above both segments'. In the thesis's Equation (3) r runs from the ZMP to
+    the joint, which is the torque with which the joint holds the load: the internal moment.
+    """
+    moments = {}
+    for index, (name, joint) in enumerate(joint_positions(body, motion.turn, motion.hip).items()):
+        turning = -_cross(load.point - joint[..., None, :], load.force)
+        moments[name] = _MOMENT_SIGN[index] * (turning[..., 1] if index == TOE_SEGMENT else turning.sum(-1))
+    return moments
+
+
+def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> JointLoads:
+    """Planar Newton-Euler inverse dynamics of toe, foot, shank and thigh, from the toe upwards.
+
+    Exact for the turns, rates and accelerations given. At the upper joint of each segment F = m (a - g) less the other
+    forces on it, and the moment is I times the turn's acceleration less the other moments about the CoM, that of F
+    included (Winter 2009, section 5.1).
+    """
+    joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    force, turning = np.zeros(motion.hip.shape), np.zeros(motion.hip.shape[:-1])
+    moments, forces = {}, {}
+    for index in reversed(range(len(LEG_SEGMENTS))):
+        mass, inertia = _inertial(body)[index]
+        com, acceleration = _com(body, motion, joints, index)
+        below = force, turning
+        force = mass * (acceleration - gravity(slope)) + below[0]
+        turning = inertia * motion.acceleration[..., index] + below[1]
+        if index >= FOOT_SEGMENT:
+            push, point = load.force[..., index - FOOT_SEGMENT, :], load.point[..., index - FOOT_SEGMENT, :]
+            force = force - push
+            turning = turning - _cross(point - com, push)
+        if index < TOE_SEGMENT:
+            turning = turning + _cross(joints[index + 1] - com, below[0])
+        turning = turning - _cross(joints[index] - com, force)
+        moments[JOINTS[index]], forces[JOINTS[index]] = _MOMENT_SIGN[index] * turning, force
+    return JointLoads(moment={name: moments[name] for name in JOINTS}, force={name: forces[name] for name in JOINTS})
+
+
+# Parts ------------------------------------------------------------------------------------------------------
+
+
+def _require_shapes(holder: object, last: Mapping[str, int], leading: tuple[int, ...]) -> None:
+    for name, size in last.items():
+        shape = getattr(holder, name).shape
+        if shape != (*leading, size):
+            raise SpringfootError(f"{name} must have shape {(*leading, size)} as its companions, got {shape}")
+
+
+def _cross(r: NDArray, force: NDArray) -> NDArray:
+    """r x F in the plane, positive from x towards z: the sense of a turn."""
+    return r[..., 0] * force[..., 1] - r[..., 1] * force[..., 0]
+
+
+def _far_ends(body: Body) -> tuple[tuple[float, float], ...]:
+    """The next joint (forward, up) [m] from the upper joint of thigh, shank, foot, at turn 0."""
+    drop = body.ankle_height - body.toe_joint_height
+    return (0.0, -body.thigh_length), (0.0, -body.shank_length), (body.ankle_to_toe_joint, -drop)
+
+
+def _inertial(body: Body) -> tuple[tuple[float, float], ...]:
+    """Mass [kg] and sagittal inertia about the CoM [kg m^2] of each segment."""
+    return (
+        (body.thigh_mass, body.thigh_inertia),
+        (body.shank_mass, body.shank_inertia),
+        (body.foot_mass, body.foot_inertia),
+        (body.toe_mass, body.toe_inertia),
+    )
+
+
+def _com(body: Body, motion: LegMotion, joints: list[NDArray], index: int) -> tuple[NDArray, NDArray]:
+    """CoM (..., 2) [m] of a segment and its acceleration [m/s^2], along the chain from the hip."""
+    forward, below = body.foot_com
+    own = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
+    com = joints[index] + np.stack(turned(motion.turn[..., index], *own[index]), -1)
+    acceleration = motion.hip_acceleration
+    for segment, (start, end) in enumerate(zip(joints[: index + 1], [*joints[1 : index + 1], com], strict=True)):
+        across = end - start
+        spun = np.stack([-across[..., 1], across[..., 0]], -1)
+        acceleration = acceleration + motion.acceleration[..., segment, None] * spun
+        acceleration = acceleration - motion.rate[..., segment, None] ** 2 * across
+    return com, acceleration

@@ -1,0 +1,49 @@
+"""How a foot turns over the ground: pitches that rise with time, and the path of the ankle of a foot that turns."""
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+
+from .body import Body
+
+
+def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:
+    """The vector (forward, up) of a flat foot, in a foot at `pitch`."""
+    return forward * np.cos(pitch) - up * np.sin(pitch), forward * np.sin(pitch) + up * np.cos(pitch)
+
+
+def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float | tuple[float, float]) -> NDArray:
+    """(3, ...): 0 until `start`, then to `top` at `end`, with two phase derivatives.
+
+    The `shape` is a power, or the share of `top` half-way and the rate at the end over the mean rate: of a polynomial
+    of 2nd to 4th order.
+    """
+    lasts = end - start
+    done = np.maximum((np.asarray(phase) - start) / lasts, 0.0)
+    if isinstance(shape, tuple):
+        half, fast = shape
+        # a + b + c = 1, 4 a + 2 b + c = 16 half, 2 a + 3 b + 4 c = fast
+        a = 16 * half - 5 + fast
+        b = 14 - 32 * half - 3 * fast
+        way = Polynomial([0.0, 0.0, a, b, 1 - a - b])
+        return top * np.stack([way.deriv(n)(done) / lasts**n for n in range(3)])
+    power = shape
+    rate = top * power / lasts * done ** (power - 1)
+    return np.stack([top * done**power, rate, top * power * (power - 1) / lasts**2 * done ** (power - 2)])
+
+
+def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
+    """(3, 3, ...): x, z, pitch of an ankle whose foot turns about a point of its flat place, two phase derivatives."""
+    ankle = turning(pitch, -pivot[0], body.ankle_height - pivot[1])
+    ankle[0, 0] += pivot[0]
+    ankle[0, 1] += pivot[1]
+    return np.concatenate([ankle, pitch[:, None]], axis=1)
+
+
+def turning(pitch: NDArray, forward: float, up: float) -> NDArray:
+    """(3, 2, ...): the vector (forward, up) of a flat foot and its two phase derivatives; `pitch` (3, ...) with its."""
+    angle, rate, curvature = pitch
+    x, z = turned(angle, forward, up)
+    return np.stack([[x, z], [-z * rate, x * rate], [-z * curvature - x * rate**2, x * curvature - z * rate**2]])

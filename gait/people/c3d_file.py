@@ -1,0 +1,196 @@
+"""C3D files of a motion laboratory -> curves in the names, signs and units of `HumanGait`; needs ezc3d, an extra.
+
+The x components of Plug-in Gait's angles and moments have our signs; its pelvis is positive forward, so thigh = hip -
+pelvis. If the ankle moment is negative on average, the moments are external ones, and the signs of all are turned.
+"""
+
+from collections.abc import Iterable, Mapping
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+from springfoot.files.text_table import read_bytes
+
+from .cycle import Contacts
+from .human import FORCES
+from .motion_files import FILE_SIDES, Series, Trial, not_empty
+
+PLATE_LOAD = 20.0
+"""A force plate bears a foot above this force [N]; chosen, as usual in gait laboratories."""
+_PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles", "toe": "HXFFA"} | {
+    f"{joint}_moment": f"{joint.capitalize()}Moment" for joint in ("hip", "knee", "ankle")
+}
+
+
+def read_c3d(path: Path) -> Trial:
+    """A C3D file with Plug-in Gait output, read in this process (`c3d_process` says why to do that in another).
+
+    It reads the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
+    Model's `LHXFFA` (toe) [deg] and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg]; right with R;
+    the events Foot Strike and Foot Off; and the force plates, where the markers LHEE, LTOE, RHEE and RTOE tell which
+    foot stands on them and which way is forward.
+    """
+    import ezc3d  # an extra: only C3D files need it
+
+    _refuse_broken(path)
+    try:
+        try:
+            file = ezc3d.c3d(str(path), extract_forceplat_data=True)
+        except ValueError:  # ezc3d cannot make sense of the plates; it may still read angles
+            file = ezc3d.c3d(str(path))
+    except (OSError, RuntimeError, ValueError, IndexError, MemoryError) as error:
+        raise SpringfootError(f"{path.name} is not a C3D file that ezc3d can read: {error}") from None
+    points, parameters = file["data"]["points"], file["parameters"]
+    rate = float(file["header"]["points"]["frame_rate"])
+    labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
+    found = {label: points[:3, k] for k, label in enumerate(labels)}
+    legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
+    newton_metres = parameters["POINT"].get("MOMENT_UNITS", {}).get("value", ["Nmm"])[0].strip() == "Nm"
+    for side, curves in legs.items():
+        letter = side[0].upper()
+        for curve, label in _PLUG_IN_GAIT.items():
+            if letter + label in found:
+                x = found[letter + label][0]
+                curves[curve] = np.radians(x) if "moment" not in curve else x * (1.0 if newton_metres else 1e-3)
+        if "hip" in curves and f"{letter}PelvisAngles" in found:
+            curves["thigh"] = curves["hip"] - np.radians(found[f"{letter}PelvisAngles"][0])
+        if np.nanmean(curves.get("ankle_moment", [0.0])) < 0:
+            for name in ("hip_moment", "knee_moment", "ankle_moment"):
+                curves[name] = -curves[name]
+    frames = points.shape[2]
+    feet = {side: (found.get(f"{side[0].upper()}HEE"), found.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
+    for side, (vertical, forward) in _plate_forces(file["data"].get("platform") or [], feet, frames).items():
+        legs[side] |= {"grf_vertical": vertical, "grf_forward": forward}
+    legs = not_empty(path.name, legs)
+    whole = _without_gaps(path.name, legs, frames)
+    first = int(file["header"]["points"]["first_frame"])
+    return Trial(
+        name=path.name,
+        time=(first + np.arange(frames)[whole]) / rate,
+        legs={side: {name: values[whole] for name, values in curves.items()} for side, curves in legs.items()},
+        unscaled=FORCES,
+        contacts=_events(parameters.get("EVENT", {})),
+        speed=None,
+    )
+
+
+def _refuse_broken(path: Path) -> None:
+    """Raises `SpringfootError` for a file that is not whole: ezc3d would hang, crash or make up frames.
+
+    Layout as in the C3D User Guide (c3d.org): header, a chain of parameters, the data, in blocks of 512 bytes.
+    """
+    data = read_bytes(path)
+    broken = SpringfootError(f"{path.name} is not a C3D file, or it is damaged")
+    try:
+        start = 512 * (data[0] - 1)
+        order = {84: "little", 85: "little", 86: "big"}[data[start + 3]]  # Intel, DEC, MIPS
+        sign_byte = {84: 15, 85: 13, 86: 12}[data[start + 3]]  # of the scale: negative for floating-point data
+
+        def word(at: int) -> int:
+            return int.from_bytes(data[at : at + 2], order)  # type: ignore[arg-type]
+
+        end = start + 512 * data[start + 2]
+        if data[1] != 80 or start < 512 or not start < end <= len(data):
+            raise broken
+        at = start + 4
+        while length := min(data[at], 256 - data[at]):  # negative for a locked one
+            link = at + 2 + length
+            content, following = link + 2, link + word(link)
+            if data[at + 1] < 128:  # a parameter: type, dimensions, values; groups have negative numbers
+                size, dimensions = data[content], data[content + 2 : content + 2 + data[content + 1]]
+                content += 2 + len(dimensions) + min(size, 256 - size) * prod(dimensions)
+            if following == link:
+                following = end
+            named = data[at + 1] != 0 and data[link - length : link].isascii()
+            if not named or content > following or following > end:
+                raise broken
+            at = following
+            if at == end:
+                break
+        frames = word(8) - word(6) + 1
+        whole = 512 * (word(16) - 1) + frames * (4 * word(2) + word(4)) * (4 if data[sign_byte] & 128 else 2)
+    except (IndexError, KeyError):
+        raise broken from None
+    if len(data) < whole and word(8) < 65535:  # the counter of frames ends there
+        raise SpringfootError(f"{path.name} is cut short: {len(data)} of {whole} bytes")
+
+
+def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
+    """Foot strikes and foot offs that the laboratory has marked."""
+    contexts, labels = (event.get(key, {}).get("value", []) for key in ("CONTEXTS", "LABELS"))
+    times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")
+    seconds = 60 * times[0] + times[1]
+    found: dict[tuple[str, str], list[float]] = {}
+    for context, label, second in zip(contexts, labels, seconds, strict=False):
+        found.setdefault((context.strip().lower(), label.strip().lower()), []).append(float(second))
+    return {
+        side: Contacts(
+            heel_strikes=np.sort(found[side, "foot strike"]), toe_offs=np.sort(found.get((side, "foot off"), []))
+        )
+        for side in FILE_SIDES
+        if (side, "foot strike") in found
+    }
+
+
+def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int) -> dict[str, tuple[NDArray, NDArray]]:
+    """Side -> force up and forward (T,) [N] of each foot, from the plates and the markers of heels and toes (3, T)."""
+    if any(marker is None for pair in feet.values() for marker in pair):
+        return {}
+    total = {side: np.zeros((3, frames)) for side in FILE_SIDES}
+    for plate in plates:
+        force, cop = (_per_frame(np.asarray(plate[key]), frames) for key in ("force", "center_of_pressure"))
+        if plate["unit_force"] == "kN":
+            force = 1000 * force
+        loaded = np.abs(force).max(axis=0) > PLATE_LOAD
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], loaded, [False]]).astype(int)))
+        for start, stop in edges.reshape(-1, 2):
+            at = slice(start, stop)
+            apart = {
+                side: np.nanmean(np.linalg.norm((heel + toe)[:, at] / 2 - cop[:, at], axis=0))
+                for side, (heel, toe) in feet.items()
+                if np.isfinite((heel + toe)[:, at]).all(axis=0).any()
+            }
+            if apart:
+                total[min(apart, key=lambda side: apart[side])][:, at] += force[:, at]
+    whole = np.concatenate(list(total.values()), axis=1)
+    if not whole.any():
+        return {}
+    up = int(np.abs(whole.sum(axis=1)).argmax())
+    ahead = np.mean([np.nanmean(toe - heel, axis=1) for heel, toe in feet.values()], axis=0)
+    ahead[up] = 0.0
+    forward = int(np.abs(ahead).argmax())
+    # A plate reports the force of the foot on it, or its own force on the foot: the latter points up.
+    sign = np.sign(whole.sum(axis=1)[up])
+    return {
+        side: (sign * force[up], sign * np.sign(ahead[forward]) * force[forward])
+        for side, force in total.items()
+        if force.any()
+    }
+
+
+def _per_frame(samples: NDArray, frames: int) -> NDArray:
+    """Analog samples (3, R x T) as their mean around each frame (3, T)."""
+    ratio = max(samples.shape[1] // max(frames, 1), 1)
+    centred = np.pad(np.nan_to_num(samples), ((0, 0), (ratio // 2, 0)), mode="edge")
+    cut = centred[:, : ratio * frames]
+    return cut.reshape(3, -1, ratio).mean(axis=2)
+
+
+def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
+    """The frames between the gaps at the beginning and the end; a gap in between is refused."""
+    broken = {
+        f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()
+    }
+    good = np.flatnonzero(~np.any(list(broken.values()), axis=0))
+    if not len(good):
+        raise SpringfootError(f"{name}: no frame has {', '.join(broken)}")
+    whole = slice(int(good[0]), int(good[-1]) + 1)
+    for curve, flags in broken.items():
+        if flags[whole].any():
+            frame = int(np.flatnonzero(flags[whole])[0]) + whole.start
+            raise SpringfootError(f"{name}, frame {frame + 1}, {curve}: a gap; fill it in the laboratory's software")
+    return whole

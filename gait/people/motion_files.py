@@ -1,0 +1,167 @@
+"""Text files of measured walks, CSV and OpenSim .mot and .sto -> curves in the names, signs and units of `HumanGait`.
+
+OpenSim: hip_flexion, ankle_angle and mtp_angle have our signs. knee_angle is negative in flexion in some models
+(gait2392) and positive in others (Rajagopal): `strides.together` turns it and its moment if its mean is negative.
+pelvis_tilt is positive backward, so thigh = hip_flexion + pelvis_tilt. A coordinate's moment (`hip_flexion_r_moment`,
+of inverse dynamics) is positive as the coordinate, ours opposite.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+from springfoot.files.text_table import Table, make_table, text_lines
+
+from .cycle import Contacts
+from .human import COLUMNS, FORCES
+
+LONGEST_HEADER = 200
+"""Lines among which a header must end; chosen."""
+PELVIS = "pelvis_anterior_tilt_deg"
+"""Column (forward positive) that makes a thigh of a hip where there is no thigh."""
+TIME_COLUMNS = ("time_s", "time")
+FILE_SIDES = ("left", "right")
+WALKING_SPEED = 0.3
+"""A body slower than this in the laboratory is taken to walk on a treadmill [m/s]; chosen."""
+
+Series = dict[str, NDArray]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """A recorded walk."""
+
+    name: str
+    """The file's name."""
+    time: NDArray
+    """(T,) ascending [s]."""
+    legs: Mapping[str, Series]
+    """Side (left, right, or "" where the file has one leg) -> curve of `COLUMNS` -> (T,); rad, N m/kg, body weights."""
+    unscaled: tuple[str, ...] = ()
+    """Curves that are in N or N m, still to be divided by body weight or mass."""
+    knee_as_read: bool = False
+    """Whether knee and knee moment have the sign of the model's coordinate, which only the angle can tell."""
+    contacts: Mapping[str, Contacts] = field(default_factory=dict)
+    """Side -> events that the file itself names."""
+    speed: float | None = None
+    """Walking speed [m/s], where the file tells."""
+
+
+def csv_trial(table: Table) -> Trial:
+    """A walk over time: a column `time_s`, curves as in `COLUMNS`, with `_left` or `_right` behind for two legs."""
+    time = next((name for name in TIME_COLUMNS if name in table.columns), None)
+    if time is None:
+        raise SpringfootError(
+            f"{table.name}, line 1: needs a column percent (mean curves over 0..100) or time_s (a walk over time)"
+        )
+    speed = float(table.numbers("speed_m_s").mean()) if table.has("speed_m_s") else None
+    legs = {side: our_columns(table, f"_{side}" if side else "") for side in ("", *FILE_SIDES)}
+    return Trial(name=table.name, time=table.ascending(time), legs=not_empty(table.name, legs), speed=speed)
+
+
+def our_columns(table: Table, suffix: str = "") -> Series:
+    """Curves of a table in our columns with `suffix` (as `_sd`) behind, in SI; `thigh` of hip and pelvis if need be."""
+    curves = {}
+    for name, column in COLUMNS.items():
+        if table.has(column + suffix):
+            values = table.numbers(column + suffix)
+            curves[name] = np.radians(values) if column.endswith("_deg") else values
+    pelvis = next((PELVIS + end for end in (suffix, "") if table.has(PELVIS + end)), None)
+    if "hip" in curves and "thigh" not in curves and pelvis and suffix != "_sd":
+        curves["thigh"] = curves["hip"] - np.radians(table.numbers(pelvis))
+    return curves
+
+
+_OPENSIM = {"hip_flexion": "hip", "knee_angle": "knee", "ankle_angle": "ankle", "mtp_angle": "toe"}
+_OPENSIM_FORCE = {
+    "right": ("ground_force_v", "ground_force_1_v", "ground_force_r_v", "r_ground_force_v"),
+    "left": ("1_ground_force_v", "ground_force_2_v", "ground_force_l_v", "l_ground_force_v"),
+}
+
+
+def opensim_trial(path: Path) -> Trial:
+    """An OpenSim motion or storage file: header with `inDegrees`, `endheader`, column names, rows.
+
+    Angles `hip_flexion_r`, `knee_angle_r`, `ankle_angle_r`, `mtp_angle_r`, `pelvis_tilt` (also as the paths of OpenSim
+    4, `/jointset/.../value`), the same with `_moment` behind [N m], forces `ground_force_vx` (forward), `_vy` (up) [N],
+    right; left as `_l`, and forces as `1_ground_force_v*`, `ground_force_2_v*` or `ground_force_l_v*`.
+    """
+    lines, header = text_lines(path), []
+    for line in islice(lines, LONGEST_HEADER):
+        if line.strip().lower() == "endheader":
+            break
+        header.append(line)
+    else:
+        raise SpringfootError(f"{path.name}: no line 'endheader', so not an OpenSim .mot or .sto file")
+    in_degrees = next((m[1].lower() for line in header if (m := re.match(r"\s*inDegrees\s*=\s*(\w+)", line))), "")
+    end = len(header)
+    table = make_table(path.name, ((n, _split(line)) for n, line in enumerate(lines, end + 2)))
+    names = table.columns
+    if "time" not in names:
+        raise SpringfootError(f"{path.name}, line {end + 2}: no column time")
+
+    legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
+    tilt = table.numbers("pelvis_tilt") if "pelvis_tilt" in names else None
+    for side, curves in legs.items():
+        for coordinate, curve in _OPENSIM.items():
+            if (column := f"{coordinate}_{side[0]}") in names:
+                curves[curve] = table.numbers(column)
+        if "hip" in curves and tilt is not None:
+            curves["thigh"] = curves["hip"] + tilt
+    if any(legs.values()) and in_degrees not in ("yes", "no"):
+        raise SpringfootError(f"{path.name}: its header must say inDegrees=yes or inDegrees=no")
+    unit = np.pi / 180 if in_degrees == "yes" else 1.0
+    travelled = table.numbers("pelvis_tx")[[0, -1]] if "pelvis_tx" in names else np.zeros(2)
+    time = table.ascending("time")
+    velocity = float(np.diff(travelled)[0] / (time[-1] - time[0])) if len(time) > 1 else 0.0
+    forward = -1.0 if velocity < -WALKING_SPEED else 1.0
+    for side, curves in legs.items():
+        for name in curves:
+            curves[name] = curves[name] * unit
+        for coordinate, curve in _OPENSIM.items():
+            if curve != "toe" and (column := f"{coordinate}_{side[0]}_moment") in names:
+                curves[f"{curve}_moment"] = -table.numbers(column)
+        lower = {name.lower(): name for name in names}
+        start = next((start for start in _OPENSIM_FORCE[side] if f"{start}y" in lower), None)
+        if start:
+            curves["grf_vertical"] = table.numbers(lower[f"{start}y"])
+            if f"{start}x" in lower:
+                curves["grf_forward"] = forward * table.numbers(lower[f"{start}x"])
+    return Trial(
+        name=path.name,
+        time=time,
+        legs=not_empty(path.name, legs),
+        unscaled=("hip_moment", "knee_moment", "ankle_moment", *FORCES),
+        knee_as_read=True,
+        speed=abs(velocity) if abs(velocity) > WALKING_SPEED else None,
+    )
+
+
+def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:
+    """The legs of which anything was measured; `SpringfootError` if there is none."""
+    legs = {side: curves for side, curves in legs.items() if curves}
+    if not legs:
+        raise SpringfootError(
+            f"{name} has none of the known curves: {', '.join(COLUMNS.values())}, or their OpenSim "
+            "or Plug-in Gait names"
+        )
+    return legs
+
+
+def _split(line: str) -> list[str]:
+    return line.strip().split("\t") if "\t" in line.strip() else line.split()
+
+
+def refuse_absurd(name: str, curves: Mapping[str, NDArray]) -> None:
+    """Raises `SpringfootError` for angles [rad] that no leg has."""
+    for joint in ("thigh", "hip", "knee", "ankle", "toe"):
+        if joint in curves and (largest := np.abs(curves[joint]).max()) > np.pi:
+            raise SpringfootError(f"{name}: the {joint} reaches {np.degrees(largest):.0f} deg; degrees or radians?")
+    if "knee" in curves and curves["knee"].mean() < 0:
+        raise SpringfootError(f"{name}: the knee is bent backward; flexion must be positive")

@@ -1,0 +1,293 @@
+"""Curves that users bring: a measured walk in a file -> strides -> mean and spread -> a `HumanGait`.
+
+Read are CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_process`). Heel strikes and toe-offs
+are found in the vertical force; without it, in the events that the file names; without those, in the leg's motion.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_count, require_within
+from springfoot.files.text_table import Table, read_csv
+
+from ..body.body import MASS_RANGE
+from .c3d_process import c3d_trial
+from .checks import AS_IT_IS, require_plausible
+from .cycle import CONTACT_THRESHOLD_BW, PERCENT
+from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
+from .leg_checks import require_plausible_legs
+from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
+from .strides import MeasuredWalk, cut_strides, together
+
+ACCEPTED = {
+    "speed": (0.1, 4.0, "m/s"),
+    "stride_time": (0.4, 4.0, "s"),
+    "step_length": (0.05, 2.0, "m"),
+    "toe_off": (0.3, 0.9, "of the stride"),
+}
+"""Least and largest accepted value, and unit, of each parameter beside the curves; chosen."""
+_PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
+COMFORTABLE_SPEED = 1.2
+"""Speed of the people that curves of unknown speed are held against [m/s]; chosen."""
+SPEEDS_APART = 1.4
+"""Largest factor between a file's speed and that of its step length and stride time; chosen. Who limps here has
+steps of one foot that make 1.21, and mistakes make 2."""
+_MOST_COEFFICIENTS, _LARGEST = 64, 1e3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OwnGait:
+    """Someone's mean curves and their spread over strides, to stand in people's place; made by `read_gait`."""
+
+    name: str
+    """The file's name."""
+    strides: int | None
+    """Strides averaged, both feet together; this and the next four are None where the file does not tell."""
+    speed: float | None
+    """Walking speed [m/s]."""
+    stride_time: float | None
+    """Heel strike to next heel strike of the same foot [s]."""
+    step_length: float | None
+    """Heel strike to heel strike of the other foot [m]."""
+    toe_off: float | None
+    """Phase of toe-off, 0..1."""
+    mean: Mapping[str, NDArray]
+    """Curve -> coefficients as in `HumanGait.mean_series`; only curves that are in the file."""
+    sd: Mapping[str, NDArray]
+    """As `mean`, of the standard deviation."""
+
+    def gait(self, speed: float, height: float, people: str | Path = PEOPLE_FILE) -> HumanGait:
+        """These curves as a `HumanGait`; what is missing is that of `people` of `height` [m] at `speed` [m/s].
+
+        They are taken as they are, whatever `height` and `speed`. An unknown step length follows from the stride time
+        and the file's speed, or else `speed`. `HumanGait.borrowed` names what is taken from people.
+        """
+        others = human_gait(speed, height, people)
+        own: dict[str, float] = {}
+        for name in ("stride_time", "step_length", "toe_off"):
+            if (value := getattr(self, name)) is not None:
+                own[name] = value
+        if "stride_time" in own:
+            own.setdefault("step_length", (self.speed or speed) * own["stride_time"] / 2)
+        borrowed = [name for name in ("stride_time", "step_length", "toe_off") if name not in own]
+        borrowed += [name for name in others.mean_series if name not in self.mean]
+        borrowed += [f"{name} sd" for name in others.sd_series if name not in self.sd]
+        return replace(
+            others,
+            speed=self.speed or speed,
+            condition=self.name,
+            clamped=False,
+            mean_series={**others.mean_series, **self.mean},
+            sd_series={**others.sd_series, **self.sd},
+            borrowed=tuple(borrowed),
+            **own,  # type: ignore[arg-type]
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values, SI units: `OwnGait.from_json` is its inverse."""
+        return asdict(self) | {kind: _rows(getattr(self, kind)) for kind in ("mean", "sd")}
+
+    @classmethod
+    def from_json(cls, values: object) -> "OwnGait":
+        """The gait that `to_json` wrote; raises `SpringfootError` for anything else."""
+        names = set(cls.__dataclass_fields__)
+        if not isinstance(values, Mapping) or set(values) != names or not isinstance(values["name"], str):
+            raise SpringfootError(
+                f"human must be what springfoot.gait.read_gait(FILE).to_json() gives ({', '.join(sorted(names))}), "
+                f"got {values!r:.80}"
+            )
+        own = cls(**{**values, "mean": _series("mean", values["mean"]), "sd": _series("sd", values["sd"])})
+        return _checked(own)
+
+
+def read_gait(
+    *paths: str | Path,
+    condition: str | None = None,
+    side: str = "both",
+    mass: float | None = None,
+    trust_units: bool = False,
+) -> OwnGait:
+    """The mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
+
+    CSV: `percent` 0, 1, ..., 100 and mean curves in our columns (`_sd` behind for the spread; what evaluate.py writes
+    as gait_cycle.csv; `condition` picks one of several below each other), or `time_s` and curves over time, with
+    `_left` or `_right` behind for two legs. OpenSim: .mot, .sto. C3D: needs ezc3d. Strides of both feet are pooled, or
+    those of one `side`. Forces and moments in N and N m are divided by the body weight that the forces bear over whole
+    strides, or by `mass` [kg]; without either, moments are left out. Raises `SpringfootError`, naming file, line and
+    column, for what cannot be read; and, unless you `trust_units`, for curves that no walk has in these units and with
+    these signs (`springfoot.gait.people.checks`), with what was seen and a guess.
+    """
+    if side not in ("both", "left", "right"):
+        raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
+    if mass is not None:
+        require_within("mass", mass, MASS_RANGE, "kg")
+    trials = []
+    for path in map(Path, paths):
+        match path.suffix.lower():
+            case ".csv":
+                table = read_csv(path)
+                if "percent" in table.columns and len(paths) == 1:
+                    return _from_percent(table, condition, trust_units)
+                trials.append(csv_trial(table))
+            case ".mot" | ".sto":
+                trials.append(opensim_trial(path))
+            case ".c3d":
+                trials.append(c3d_trial(path))
+            case _:
+                raise SpringfootError(f"{path.name} must be a .csv, .mot, .sto or .c3d file")
+    if not trials:
+        raise SpringfootError("read_gait needs a file")
+    return _from_walk(together(trials), side, mass, trust_units)
+
+
+def _from_percent(table: Table, condition: str | None, trust_units: bool) -> OwnGait:
+    """Mean curves over percent, as the file has them."""
+    table = _one_condition(table, condition)
+    mean, sd = our_columns(table), our_columns(table, "_sd")
+    if not mean:
+        raise SpringfootError(f"{table.name}, line 1: none of the columns {', '.join(COLUMNS.values())}")
+
+    def parameter(column: str) -> float | None:
+        return float(table.numbers(column)[0]) if table.has(column) else None
+
+    toe_off = parameter("toe_off_percent")
+    if toe_off is None and "grf_vertical" in mean:
+        toe_off = float(PERCENT[mean["grf_vertical"] > CONTACT_THRESHOLD_BW].max(initial=0)) + 1
+    strides = parameter("n")
+    if strides is not None and strides % 1:
+        raise SpringfootError(f"{table.name}: n must be a whole number of strides, got {strides:g}")
+    own = OwnGait(
+        name=table.name,
+        strides=None if strides is None else round(strides),
+        toe_off=None if toe_off is None else toe_off / 100,
+        mean={},
+        sd={},
+        **{name: parameter(column) for name, column in _PARAMETERS.items()},
+    )
+    return _fitted(own, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
+
+
+def _one_condition(table: Table, condition: str | None) -> Table:
+    """The rows of one gait, percent 0 to 100."""
+    percent, size = table.numbers("percent"), len(PERCENT)
+    for k, ((line, _), value) in enumerate(zip(table.rows, percent, strict=True)):
+        if value != k % size:
+            raise table.error(line, "percent", f"must be {k % size} here (0, 1, ..., 100), got {value:g}")
+    if len(percent) % size:
+        line = table.rows[-1][0]
+        raise table.error(line, "percent", f"ends at {percent[-1]:g}, must go on to 100")
+    blocks = [table.rows[k : k + size] for k in range(0, len(percent), size)]
+    if len(blocks) == 1 and condition is None:
+        return table
+    if "condition" not in table.columns:
+        raise SpringfootError(f"{table.name} holds {len(blocks)} gaits and no column condition to tell them apart")
+    names = [block[0][1][table.columns.index("condition")] for block in blocks]
+    if condition not in names:
+        raise SpringfootError(
+            f"{table.name} holds the conditions {', '.join(names)}; condition must be one of them (on the command "
+            f"line {table.name}:{names[0]}), got {condition!r}"
+        )
+    return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
+
+
+def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
+    """The mean of the strides of a walk."""
+    strides, curves = cut_strides(walk, side, mass)
+    mean = {name: values.mean(axis=0) for name, values in curves.items()}
+    for name in ("thigh", "hip"):
+        if name in mean and mean[name][0] <= mean[name][50]:
+            raise SpringfootError(
+                f"{walk.name}: the {name} is behind at heel strike; are left and right, or a sign, interchanged?"
+            )
+    if not trust_units:
+        require_plausible_legs(walk, side, mass, _people_at(walk.speed))
+    duration = strides[:, 2] - strides[:, 0]
+    stride_time = float(np.mean(duration))
+    own = OwnGait(
+        name=walk.name,
+        strides=len(strides),
+        speed=walk.speed,
+        stride_time=stride_time,
+        step_length=None if walk.speed is None else walk.speed * stride_time / 2,
+        toe_off=float(np.mean((strides[:, 1] - strides[:, 0]) / duration)),
+        mean={},
+        sd={},
+    )
+    return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
+
+
+def _require_one_speed(own: OwnGait) -> None:
+    """Refuse a speed that stride time and step length contradict."""
+    if own.speed and own.stride_time and own.step_length:
+        covered = 2 * own.step_length / own.stride_time
+        if not 1 / SPEEDS_APART < own.speed / covered < SPEEDS_APART:
+            raise SpringfootError(
+                f"{own.name}: two steps of {own.step_length:g} m in {own.stride_time:g} s are {covered:.2f} m/s, and "
+                f"the speed is {own.speed:g}: a stride's length, or a step's time? {AS_IT_IS}"
+            )
+
+
+def _people_at(speed: float | None) -> HumanGait:
+    """People at a speed, at a comfortable one if it is unknown or beyond what is accepted."""
+    low, high, _ = ACCEPTED["speed"]
+    return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
+
+
+def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
+    """`own` with series fitted to curves (101,)."""
+
+    def fit(curves: Series) -> dict[str, list]:
+        rows = {}
+        for name, curve in curves.items():
+            rows[name] = stance_series(curve, own.toe_off or 1.0) if name in FORCES else fourier_series(curve)
+        return rows
+
+    refuse_absurd(own.name, mean)
+    if not trust_units:
+        require_plausible(own.name, mean, _people_at(own.speed), sd)
+        _require_one_speed(own)
+    own = _checked(own)
+    return _checked(replace(own, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
+
+
+def _checked(own: OwnGait) -> OwnGait:
+    for name, (low, high, unit) in ACCEPTED.items():
+        if getattr(own, name) is not None:
+            require_within(f"{own.name}: {name}", getattr(own, name), (low, high), unit)
+    if own.strides is not None:
+        require_count(f"{own.name}: strides", own.strides)
+    if own.toe_off is None and any(name in FORCES for name in (*own.mean, *own.sd)):
+        raise SpringfootError(f"{own.name}: forces need a toe_off")
+    return own
+
+
+def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
+    """Coefficients as plain numbers, complex ones as [real, imaginary]."""
+    return {
+        name: (np.stack([np.real(c), np.imag(c)], -1) if np.iscomplexobj(c) else c).tolist()
+        for name, c in series.items()
+    }
+
+
+def _series(kind: str, rows: object) -> dict[str, NDArray]:
+    """The inverse of `_rows`; raises `SpringfootError` for anything else."""
+    if not isinstance(rows, Mapping):
+        raise SpringfootError(f"human {kind} must map curves to coefficients, got {rows!r:.60}")
+    series = {}
+    for name, values in rows.items():
+        if name not in COLUMNS:
+            raise SpringfootError(f"human {kind} has no curve {name!r:.40}; there are {', '.join(COLUMNS)}")
+        try:
+            array = np.array(values, float)
+        except (TypeError, ValueError, OverflowError):
+            array = np.empty(0)
+        shape_fits = array.ndim == 1 if name in FORCES else array.ndim == 2 and array.shape[1:] == (2,)
+        if not shape_fits or not 0 < len(array) <= _MOST_COEFFICIENTS or not (np.abs(array) < _LARGEST).all():
+            raise SpringfootError(f"human {kind} {name} must be finite coefficients, got {values!r:.60}")
+        series[name] = array if name in FORCES else array[:, 0] + 1j * array[:, 1]
+    return series

@@ -1,0 +1,227 @@
+"""Statistics of a gait, each in a function of its own.
+
+Curves are arrays (101,) over percent 0..100 of the stride (`cycle.PERCENT`) unless said otherwise. A statistic that
+cannot be computed (no data, no spread) is None, never NaN. The windows are those in which people's two force peaks and
+the valley between them lie at every walking speed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import SupportsFloat
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from ..body.body import GRAVITY
+
+FIRST_PEAK_PERCENT = (3, 25)
+"""Window of the vertical force's first peak (weight acceptance) [percent of stride]."""
+VALLEY_PERCENT = (15, 45)
+"""Window of the valley between the peaks (mid-stance) [percent of stride]."""
+SECOND_PEAK_PERCENT = (35, 60)
+"""Window of the second peak (push-off) [percent of stride]."""
+LOADING_END_PERCENT = 10
+"""End of the loading response, which begins at 0 [percent of stride]; chosen."""
+PUSH_OFF_BEGIN_PERCENT = 45
+"""Begin of push-off, which ends at toe-off [percent of stride]; chosen. Mid-stance ends where push-off begins."""
+REST_SECONDS, REST_TRAVEL = 1.0, 0.01
+"""A body is at rest if its points stay for this time at the end [s] within this distance in x and z [m]; chosen."""
+
+
+def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
+    """Root mean square difference of two curves, in their unit; no offset removed."""
+    difference = np.asarray(curve, float) - np.asarray(reference, float)
+    return _number(np.sqrt(np.mean(difference**2))) if difference.size else None
+
+
+def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
+    """Pearson's r of two curves; None if either is constant."""
+    a, b = (np.asarray(values, float) for values in (curve, reference))
+    # A constant curve keeps rounding errors of 1e-16 of its mean, which must not pass for a shape.
+    floor = 1e-12 * np.sqrt(np.sum(a * a) * np.sum(b * b))
+    a, b = a - np.mean(a), b - np.mean(b)
+    scale = np.sqrt(np.sum(a * a) * np.sum(b * b))
+    return _number(np.sum(a * b) / scale) if scale > floor else None
+
+
+def share_within_sd(curve: ArrayLike, mean: ArrayLike, sd: ArrayLike) -> float | None:
+    """Percent of the curve's samples inside mean ± sd."""
+    inside = np.abs(np.asarray(curve, float) - np.asarray(mean)) <= np.asarray(sd)
+    return _number(100 * np.mean(inside)) if np.all(np.isfinite(curve)) else None
+
+
+def gait_variable_scores(
+    curves: Mapping[str, ArrayLike], reference: Mapping[str, ArrayLike]
+) -> dict[str, float | None]:
+    """Gait Variable Scores: RMS difference of each of one leg's angle curves to people's mean, in their unit.
+
+    Baker et al., Gait & Posture 30 (2009) 265-269, with the sagittal angles at hand. Curves (n,) over the stride,
+    each with its namesake in `reference`; a score of curves with missing values is None.
+    """
+    missing = sorted(set(curves) - set(reference))
+    if missing:
+        raise SpringfootError(f"no reference for {', '.join(missing)}; there is {', '.join(reference)}")
+    return {name: rmse(curve, reference[name]) for name, curve in curves.items()}
+
+
+def gait_profile_score(*legs: Mapping[str, float | None]) -> float | None:
+    """Gait Profile Score: RMS of the variable scores of one leg, or of both; None if any is missing.
+
+    Baker's GPS takes nine angles of each leg in three planes; of sagittal angles alone it is not to be compared with
+    published ones. A variable that both legs share (a pelvis or trunk angle) is to be given with one leg only.
+    """
+    scores = [score for leg in legs for score in leg.values()]
+    if not scores or any(score is None for score in scores):
+        return None
+    return _number(np.sqrt(np.mean(np.square(np.array(scores, float)))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceFeatures:
+    """Landmarks of one foot's ground reaction force (GRF) over the stride, in the curves' unit (body weights)."""
+
+    vertical_peak1: float | None
+    """Largest vertical force in 3 to 25 %."""
+    vertical_valley: float | None
+    """Smallest in 15 to 45 %."""
+    vertical_peak2: float | None
+    """Largest in 35 to 60 %."""
+    braking_peak: float | None
+    """Smallest fore-aft force, negative: backward on the body."""
+    forward_peak: float | None
+    """Largest fore-aft force."""
+
+
+def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
+    """Peaks and valley of one foot's mean vertical and fore-aft force curves."""
+    return ForceFeatures(
+        vertical_peak1=_number(np.max(_window(vertical, FIRST_PEAK_PERCENT))),
+        vertical_valley=_number(np.min(_window(vertical, VALLEY_PERCENT))),
+        vertical_peak2=_number(np.max(_window(vertical, SECOND_PEAK_PERCENT))),
+        braking_peak=_number(np.min(forward)),
+        forward_peak=_number(np.max(forward)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceTiming:
+    """Where the landmarks of `ForceFeatures` lie [percent of stride]; the first of several equal samples."""
+
+    vertical_peak1: int | None
+    vertical_valley: int | None
+    vertical_peak2: int | None
+    braking_peak: int | None
+    forward_peak: int | None
+
+
+def force_timing(vertical: NDArray, forward: NDArray) -> ForceTiming:
+    """Percent of the stride at which one foot's mean force curves have their peaks and valley.
+
+    A percent at the end of its window is no peak: the curve still rises, or falls, beyond it.
+    """
+
+    def first(curve: NDArray, percent: tuple[int, int] = (0, 100)) -> int | None:
+        inside = _window(curve, percent)
+        return percent[0] + int(np.argmax(inside)) if np.all(np.isfinite(inside)) else None
+
+    return ForceTiming(
+        vertical_peak1=first(vertical, FIRST_PEAK_PERCENT),
+        vertical_valley=first(-vertical, VALLEY_PERCENT),
+        vertical_peak2=first(vertical, SECOND_PEAK_PERCENT),
+        braking_peak=first(-forward),
+        forward_peak=first(forward),
+    )
+
+
+def largest(curve: NDArray) -> tuple[float | None, int | None]:
+    """Largest value of a curve and the percent at which it stands."""
+    if not np.all(np.isfinite(curve)):
+        return None, None
+    percent = int(np.argmax(curve))
+    return float(curve[percent]), percent
+
+
+def positive_work(power: NDArray, tick: float) -> NDArray:
+    """Work done at positive power: integral of max(0, power) over the first axis (T, ...), sampled every `tick` [s]."""
+    return np.maximum(power, 0.0).sum(axis=0) * tick
+
+
+def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]:
+    """Positive and negative work of each stride (S,), negative given as a positive number.
+
+    `power` (S, 101) over percent of strides lasting `stride_time` (S,) [s]; trapezoidal rule.
+    """
+    positive, negative = np.maximum(power, 0.0), np.maximum(-power, 0.0)
+    spacing = np.asarray(stride_time) / 100
+    return np.trapezoid(positive, axis=-1) * spacing, np.trapezoid(negative, axis=-1) * spacing
+
+
+def loop_area(angle: ArrayLike, torque: ArrayLike) -> NDArray:
+    """Area of closed angle-torque loops (..., n): the joint's net work in one stride, the integral of torque d angle.
+
+    Angle [rad], torque [N m, or per kg] positive as the angle (an extension or plantarflexion moment with its sign
+    turned), so that the area [J, or J/kg] is positive where the joint works on the body (an ankle's loop of moment
+    over dorsiflexion then runs counter-clockwise, as in Hansen et al. 2004) and negative where it absorbs. The last
+    sample is joined to the first by a straight line; a spring of constant stiffness has area 0.
+    """
+    angle, torque = np.asarray(angle, float), np.asarray(torque, float)
+    turned = np.roll(angle, -1, axis=-1) - angle
+    return (turned * (torque + np.roll(torque, -1, axis=-1)) / 2).sum(axis=-1)
+
+
+def cost_of_transport(work: float, mass: float, distance: float) -> float | None:
+    """Positive joint work [J] of both legs per body weight and distance, dimensionless; None without progress."""
+    return _number(work / (mass * GRAVITY * distance)) if distance > 0 else None
+
+
+def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | None]:
+    """Mean of a curve in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
+
+    A percent belongs to the phase it begins; percent 100 is percent 0 of the next stride and left out.
+    """
+    percent = np.arange(100)
+    bounds = (0, LOADING_END_PERCENT, PUSH_OFF_BEGIN_PERCENT, toe_off_percent, 100)
+    names = ("loading", "mid_stance", "push_off", "swing")
+    means: dict[str, float | None] = {}
+    for name, low, high in zip(names, bounds[:-1], bounds[1:], strict=True):
+        values = curve[:100][(percent >= low) & (percent < high)]
+        means[name] = _number(np.mean(values)) if values.size else None
+    return means
+
+
+def travel(position: NDArray, force: NDArray, least: float) -> float:
+    """Path [m] along the ground of contact points (T, C) that bear `force` (T, C) [N].
+
+    Each point counts by its share of the foot's load, so that a rigid foot that slides by d travels d whatever the
+    number of its contact points; samples where the foot bears less than `least` [N] at either end do not count.
+    """
+    between = force[1:] + force[:-1]
+    share = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
+    loaded = force.sum(axis=1) > least
+    return float(np.sum((np.abs(np.diff(position, axis=0)) * share)[loaded[1:] & loaded[:-1]]))
+
+
+def at_rest(*points: NDArray, tick: float) -> bool:
+    """Whether points (T, 2) [m], sampled every `tick` [s], rest at the end; False for a series that is too short."""
+    samples = round(REST_SECONDS / tick)
+    return all(len(x) >= samples and np.ptp(x[-samples:], axis=0).max() <= REST_TRAVEL for x in points)
+
+
+def mean_sd(values: ArrayLike) -> dict[str, float | None]:
+    """{"mean", "sd"} of a sample; sd with n - 1, None for fewer than two."""
+    values = np.asarray(values, float)
+    mean = _number(np.mean(values)) if values.size else None
+    return {"mean": mean, "sd": _number(np.std(values, ddof=1)) if values.size > 1 else None}
+
+
+def _window(curve: NDArray, percent: tuple[int, int]) -> NDArray:
+    return curve[percent[0] : percent[1] + 1]
+
+
+def _number(value: SupportsFloat) -> float | None:
+    number = float(value)
+    return number if isfinite(number) else None

@@ -1,0 +1,219 @@
+"""Measured walks cut into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from ..body.body import GRAVITY, Body
+from ..body.leg import FOOT_SEGMENT, joint_positions, segment_turns
+from ..body.rockers import turned
+from .cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
+from .human import COLUMNS, FORCES
+from .motion_files import Series, Trial, refuse_absurd
+
+FEWEST_STRIDES = 2
+"""Fewest strides, of both feet together, for a mean and its spread."""
+LONGEST_TICK = 1 / 30
+"""Longest time between samples [s]; chosen: with a longer one the time of a landing is lost."""
+SHORTEST_TICK = 1e-3
+"""Shortest time between samples [s]; chosen: finer sampling is thinned out to it."""
+LONGEST_GAP = 0.1
+"""Longest time without samples that is bridged by a straight line [s]; chosen."""
+UNEVEN_STRIDE = 0.25
+"""A stride longer or shorter than the median by more than this share is left out, as a missed event or turn; chosen."""
+HEEL_STRIKE_AFTER, TOE_OFF_AFTER = 0.032, 0.006
+"""Time from the farthest heel to heel strike, and from the hindmost toe to toe-off, in people's curves [strides]: 0.030
+to 0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
+CUTOFF = 6.0
+"""Low-pass frequency for angles that events and rates are taken from [Hz]: usual for walking (Winter 2009, ch. 3)."""
+WEIGHT_BEARING = (15, 45)
+"""Percent of the stride between which a foot bears weight; chosen. One that bears none there was not on a plate."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredWalk:
+    """Trials of one walk on common, even samples."""
+
+    name: str
+    """Names of the files."""
+    first: float
+    """Time of the first sample [s]."""
+    tick: float
+    """Time between samples [s]."""
+    legs: dict[str, Series]
+    """Side -> curve -> (T,)."""
+    unscaled: set[tuple[str, str]]
+    """(side, curve) of the curves that are in N, N m or W."""
+    contacts: dict[str, Contacts]
+    """Side -> events that a file names."""
+    speed: float | None
+    """Walking speed [m/s], where a file tells."""
+
+    @property
+    def last(self) -> float:
+        """Time of the last sample [s]."""
+        return self.first + self.tick * (min(len(c) for leg in self.legs.values() for c in leg.values()) - 1)
+
+
+def together(trials: Sequence[Trial]) -> MeasuredWalk:
+    """Trials of the same walk, each curve from the first that has it, and joint powers where they can be computed.
+
+    Raises `SpringfootError` for sampling too coarse, a gap, or no time in common.
+    """
+    name = ",".join(trial.name for trial in trials)
+    for trial in trials:
+        gaps = np.diff(trial.time)
+        if not len(gaps) or (tick := float(np.median(gaps))) > LONGEST_TICK * 1.001:
+            found = f"one every {tick:.3g} s" if len(gaps) else "a single one"
+            raise SpringfootError(f"{trial.name} must have at least 30 samples a second, has {found}")
+        if gaps.max() > LONGEST_GAP:
+            at = int(gaps.argmax())
+            raise SpringfootError(f"{trial.name} has no samples for {gaps[at]:.2f} s after {trial.time[at]:.2f} s")
+    tick = max(min(float(np.median(np.diff(trial.time))) for trial in trials), SHORTEST_TICK)
+    first, last = max(trial.time[0] for trial in trials), min(trial.time[-1] for trial in trials)
+    if last - first < tick:
+        raise SpringfootError(f"{name}: the files have no time in common")
+    time = first + tick * np.arange(int((last - first) / tick * (1 + 1e-12)) + 1)
+    legs: dict[str, Series] = {}
+    unscaled, as_read = set(), {}
+    for trial in trials:
+        for side, curves in trial.legs.items():
+            for curve in curves.keys() - legs.get(side, {}).keys():
+                legs.setdefault(side, {})[curve] = np.interp(time, trial.time, curves[curve])
+                if trial.knee_as_read and curve in ("knee", "knee_moment"):
+                    as_read.setdefault(side, set()).add(curve)
+                if curve in trial.unscaled:
+                    unscaled.add((side, curve))
+    for side, leg in legs.items():
+        if side in as_read and "knee" in leg and leg["knee"].mean() < 0:
+            leg |= {curve: -leg[curve] for curve in as_read[side] if curve in leg}
+        refuse_absurd(name, leg)
+        for joint in ("hip", "knee", "ankle"):
+            moment, power = f"{joint}_moment", f"{joint}_power"
+            if power not in leg and joint in leg and moment in leg:
+                leg[power] = -leg[moment] * np.gradient(_smooth(leg[joint], tick), tick)
+                if (side, moment) in unscaled:
+                    unscaled.add((side, power))
+    contacts = {side: events for trial in reversed(trials) for side, events in trial.contacts.items()}
+    speed = next((trial.speed for trial in trials if trial.speed is not None), None)
+    return MeasuredWalk(name=name, first=first, tick=tick, legs=legs, unscaled=unscaled, contacts=contacts, speed=speed)
+
+
+def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Series]:
+    """Times (S, 3) of heel strike, toe-off, next heel strike [s] and curve -> (strides with it, 101), scaled.
+
+    `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises `SpringfootError` for too few strides.
+    """
+    chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
+    strides = {name: _strides(walk, name) for name in chosen}
+    found = np.concatenate([*strides.values(), np.empty((0, 3))])
+    if len(found) < FEWEST_STRIDES:
+        raise SpringfootError(
+            f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {len(found)} "
+            "(they are found in grf_vertical, events, or thigh or hip with knee)"
+        )
+    cut: dict[tuple[str, str], NDArray] = {}
+    for name, leg in chosen.items():
+        begin, _, end = strides[name].T
+        for curve, series in leg.items():
+            cut[name, curve] = on_percent(series, begin, end, walk.tick, walk.first)
+        _drop_unmeasured_forces(cut, name)
+    _scale(cut, walk.unscaled, mass)
+    curves = {
+        curve: np.concatenate([values for (_, name), values in cut.items() if name == curve])
+        for curve in COLUMNS
+        if any(name == curve for _, name in cut)
+    }
+    return found, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
+
+
+def _strides(walk: MeasuredWalk, side: str) -> NDArray:
+    """(S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first means that finds enough of them."""
+    leg, found = walk.legs[side], []
+    if "grf_vertical" in leg:
+        threshold = CONTACT_THRESHOLD_BW * _bearing(leg["grf_vertical"])
+        found.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
+    if side in walk.contacts:
+        found.append(walk.contacts[side])
+    thigh = leg.get("thigh", leg.get("hip"))
+    if thigh is not None and "knee" in leg:
+        found.append(_contacts_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first))
+    best = np.empty((0, 3))
+    for contacts in found:
+        strides = contacts.strides(after=walk.first)
+        strides = strides[strides[:, 2] <= walk.last]
+        duration = strides[:, 2] - strides[:, 0]
+        usual = np.median(duration) if len(duration) else 0.0
+        strides = strides[np.abs(duration - usual) <= UNEVEN_STRIDE * usual]
+        if len(strides) > len(best) and len(best) < FEWEST_STRIDES:
+            best = strides
+    return best
+
+
+def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float, first: float) -> Contacts:
+    """Events from joint angles (T,): the heel is farthest ahead of the hip, the toe hindmost.
+
+    After Zeni, Richards, Higginson, Gait & Posture 27 (2008) 710-714, who take markers from the sacrum, with the time
+    by which people's events come later.
+    """
+    from scipy.signal import find_peaks  # as below
+
+    body = Body()
+    thigh, knee, ankle = (_smooth(angle, tick) for angle in (thigh, knee, ankle))
+    turn = segment_turns({"thigh": thigh, "knee": knee, "ankle": ankle, "toe": 0.0})
+    x = joint_positions(body, turn, np.zeros((len(turn), 2)))["ankle"][:, 0]
+    heel = x + turned(turn[:, FOOT_SEGMENT], -body.heel_to_ankle, -body.ankle_height)[0]
+    toe = x + turned(turn[:, FOOT_SEGMENT], body.ankle_to_toe_joint + body.toe_length, -body.ankle_height)[0]
+
+    def peaks(values: NDArray) -> NDArray:
+        # Half of the excursion stands out once a stride, whatever the cadence.
+        at = find_peaks(values, prominence=0.5 * np.ptp(values))[0]
+        before, top, after = values[at - 1], values[at], values[at + 1]
+        return first + tick * (at + 0.5 * (before - after) / (before - 2 * top + after))
+
+    strikes, offs = peaks(heel), peaks(-toe)
+    stride = float(np.median(np.diff(strikes))) if len(strikes) > 1 else 0.0
+    return Contacts(heel_strikes=strikes + HEEL_STRIKE_AFTER * stride, toe_offs=offs + TOE_OFF_AFTER * stride)
+
+
+def _smooth(angle: NDArray, tick: float) -> NDArray:
+    """The angle after a low-pass without delay (fourth order in all)."""
+    from scipy.signal import butter, sosfiltfilt  # half a second to import, and only files need it
+
+    return sosfiltfilt(
+        butter(2, CUTOFF, fs=1 / tick, output="sos"), angle, padlen=min(len(angle) - 1, round(0.5 / tick))
+    )
+
+
+def _bearing(force: NDArray) -> float:
+    """About the body weight: the median of the forces beyond half of the largest."""
+    return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
+
+
+def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> None:
+    """Keep the forces of a leg in those strides in which it stood on a plate."""
+    vertical = cut.get((side, "grf_vertical"))
+    if vertical is not None:
+        low, high = WEIGHT_BEARING
+        measured = vertical[:, low : high + 1].min(axis=1) > 0.3 * _bearing(vertical)
+        for name in FORCES:
+            if (side, name) in cut:
+                cut[side, name] = cut[side, name][measured]
+
+
+def _scale(cut: dict[tuple[str, str], NDArray], unscaled: set[tuple[str, str]], mass: float | None) -> None:
+    """Divide forces by the body weight, moments and powers by the body mass, in place."""
+    weight = None if mass is None else mass * GRAVITY
+    borne = [cut[key][:, :-1].mean(axis=1) for key in unscaled if key[1] == "grf_vertical" and key in cut]
+    if weight is None and sum(map(len, borne)):
+        # Over a stride the two feet bear just the body's weight, and so one bears half of it.
+        weight = 2 * float(np.mean(np.concatenate(borne)))
+    for key in unscaled & cut.keys():
+        if weight is None:
+            del cut[key]
+        else:
+            cut[key] = cut[key] / (weight if key[1] in FORCES else weight / GRAVITY)

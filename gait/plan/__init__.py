@@ -1,0 +1,1 @@
+"""Walks planned by their zero-moment point (ZMP): CoM, feet, posture, forces, moments and effort."""

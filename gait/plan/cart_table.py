@@ -1,0 +1,281 @@
+"""The cart-table model: the whole body as its CoM on a massless table standing on the ZMP (Kajita et al. 2003).
+
+Equation (1) of the thesis, its sign and its missing terms restored: p = x - z x'' / (z'' + g). On a slope a the frame
+leans with the ground, x along it and z at right angles to it, so that gravity has a part along it:
+p = x - z (x'' + g sin a) / (z'' + g cos a).
+"""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+from scipy.interpolate import BPoly, PPoly
+
+from springfoot.arrays import NDArray
+
+from ..body.body import gravity
+
+STEP_SAMPLES = 240
+"""Knots of the tabulated CoM path in a step; with quintics between them its error stays that of the integration."""
+
+
+def zmp(
+    x: ArrayLike, z: ArrayLike, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0
+) -> NDArray:
+    """Equation (1): ZMP [m] of a CoM at `x`, `z` [m] with accelerations [m/s^2]; broadcasts.
+
+    On a `slope` [rad], uphill positive, x is along the ground and z at right angles to it.
+    """
+    back, down = -gravity(slope)
+    return np.asarray(x) - np.asarray(z) * (np.asarray(x_acceleration) + back) / (np.asarray(z_acceleration) + down)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HyperbolicPath:
+    """x(t) of a CoM at constant height over a piecewise polynomial ZMP, in closed form; made by `closed_form`.
+
+    In each piece x is a polynomial plus a cosh and a sinh. These two are kept as exp(-rate (t - start)) and
+    exp(rate (t - end)), which lose no digits in a long piece.
+    """
+
+    polynomial: PPoly
+    """The particular solution [m], which follows the ZMP."""
+    rate: float
+    """sqrt(g cos a / z) [1/s]."""
+    fading: NDArray
+    """(pieces,) coefficients of exp(-rate (t - start)) [m]."""
+    growing: NDArray
+    """(pieces,) coefficients of exp(rate (t - end)) [m]."""
+
+    def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
+        """Position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
+        time, knots = np.asarray(time, float), self.polynomial.x
+        piece = np.clip(np.searchsorted(knots, time, "right") - 1, 0, len(knots) - 2)
+        fading = self.fading[piece] * np.exp(-self.rate * (time - knots[piece]))
+        growing = self.growing[piece] * np.exp(self.rate * (time - knots[piece + 1]))
+        return self.polynomial(time, derivative) + self.rate**derivative * (growing + (-1) ** derivative * fading)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bob:
+    """Rise and fall of the CoM about its mean height, the same in every step."""
+
+    step_time: float
+    """Duration of a step [s]."""
+    amplitude: float
+    """Of its cosine [m]: half of the rise and fall of one that has no second."""
+    lowest_at: float
+    """Time at which the cosine is lowest [s]."""
+    second: tuple[float, float] = (0.0, 0.0)
+    """Of the second harmonic, over `amplitude`: cosine and sine of twice the turn since `lowest_at` [-]."""
+
+    def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
+        """-amplitude (cos u + second[0] cos 2u + second[1] sin 2u), u = 2 pi (t - lowest_at) / T [m], or a time
+        derivative of it."""
+        turn = 2 * pi / self.step_time
+        # Each derivative of a cosine is a quarter turn ahead.
+        angle, ahead = turn * (np.asarray(time) - self.lowest_at), derivative * pi / 2
+        one = -self.amplitude * turn**derivative * np.cos(angle + ahead)
+        if self.second == (0.0, 0.0):
+            return one
+        c, s = self.second
+        scale = -self.amplitude * (2 * turn) ** derivative
+        return one + scale * (c * np.cos(2 * angle + ahead) + s * np.sin(2 * angle + ahead))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ComMotion:
+    """A CoM that repeats itself every step, one step further on; times [s] within a step, made by `periodic_com`."""
+
+    step_time: float
+    """Duration of a step [s]."""
+    height: float
+    """Mean height above the floor [m]."""
+    bob: Bob
+    """Its rise and fall."""
+    slope: float = 0.0
+    """Slope of the ground [rad], uphill positive: x is along it, z at right angles to it."""
+    path: PPoly | HyperbolicPath = field(repr=False)
+    """Forward position x [m] over time [s]; `path(time, n)` is its n-th derivative."""
+    ahead: PPoly | None = field(default=None, repr=False)
+    """Forward from the CoM to the pivot of the ground reaction force [m] over time [s] (`leg_spin`); None: 0."""
+
+    def position(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
+        """(x, z) [m]."""
+        return self.path(time), self.height + self.bob(time)
+
+    def velocity(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
+        """(forward, up) [m/s]."""
+        return self.path(time, 1), self.bob(time, 1)
+
+    def acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
+        """(forward, up) [m/s^2]."""
+        return self.path(time, 2), self.bob(time, 2)
+
+    def pivot(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
+        """The point (x, z) [m] through which the ground reaction force acts."""
+        x, z = self.position(time)
+        return (x if self.ahead is None else x + self.ahead(time)), z
+
+    def zmp(self, time: ArrayLike) -> NDArray:
+        """ZMP [m] by equation (1), of the pivot."""
+        return zmp(*self.pivot(time), *self.acceleration(time), self.slope)
+
+
+def periodic_com(
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    step_length: float,
+    height: float,
+    bob: Bob,
+    slope: float = 0.0,
+    ahead: PPoly | None = None,
+) -> ComMotion:
+    """The one CoM motion over a ZMP that repeats itself every step.
+
+    The ZMP p [m] runs straight between `zmp_points` at `zmp_times` [s] (first 0, last the step time T). The height
+    is z = height - amplitude cos(2 pi (t - lowest_at) / T) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a
+    the `slope` [rad], with x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `amplitude` is 0,
+    else with an error below 1e-9 m. `ahead` [m] over time [s] is that of `ComMotion`: it stands beside x on the right.
+    """
+    if ahead is not None:
+        path = _stepped(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
+    elif bob.amplitude == 0:
+        lines = PPoly(np.stack([np.diff(zmp_points) / np.diff(zmp_times), zmp_points[:-1]]), zmp_times)
+        path = closed_form(lines, step_length, height, slope)
+    else:
+        path = _integrated(zmp_times, zmp_points, step_length, height, bob, slope)
+    return ComMotion(
+        step_time=float(zmp_times[-1]),
+        height=height,
+        bob=bob,
+        slope=slope,
+        path=path,
+        ahead=ahead,
+    )
+
+
+def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.0) -> HyperbolicPath:
+    """The CoM path at constant `height` [m] over a ZMP of any degree and number of pieces, repeating with it.
+
+    `zmp` [m] over the time of one step [s] starts again `step_length` further on; it may jump. The polynomial
+    p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
+    exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
+    """
+    back, down = -gravity(slope)
+    rate = sqrt(down / height)
+    coefficients = np.array(zmp.c, float)
+    for order in range(2, len(coefficients), 2):
+        coefficients[order:] += zmp.derivative(order).c / rate**order
+    coefficients[-1] += height * back / down
+    polynomial = PPoly(coefficients, zmp.x)
+
+    # What the polynomials lack at the end of each piece to go on as the next one does, in x and in x' / rate.
+    lasts, velocity = np.diff(zmp.x), polynomial.derivative().c
+    jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, lasts)
+    jump[-1] += step_length
+    kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, lasts)) / rate
+    # Their sum determines the growing exponentials alone, their difference the fading ones.
+    decay, this = np.exp(-rate * lasts), np.eye(len(lasts))
+    following = np.roll(this, 1, axis=1)
+    return HyperbolicPath(
+        polynomial=polynomial,
+        rate=rate,
+        fading=np.linalg.solve(this * decay - following, (jump - kick) / 2),
+        growing=np.linalg.solve(this - following * decay, (jump + kick) / 2),
+    )
+
+
+def _integrated(
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    step_length: float,
+    height: float,
+    bob: Bob,
+    slope: float,
+) -> PPoly:
+    """The path of `periodic_com` as the sum of one particular and two homogeneous solutions that is periodic."""
+    step_time = zmp_times[-1]
+    back, down = -gravity(slope)
+
+    def pull(t: ArrayLike) -> NDArray:
+        z = height + bob(t)
+        return (down + bob(t, 2)) / z
+
+    driven = np.array([1.0, 0.0, 0.0])  # columns: driven by ZMP and slope, from unit position, from unit velocity
+
+    def motion(t: float, state: NDArray) -> NDArray:
+        x, v = state[:3], state[3:]
+        return np.concatenate([v, pull(t) * (x - driven * np.interp(t, zmp_times, zmp_points)) - driven * back])
+
+    state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    times, states = [], []
+    # The ZMP has corners: integrating piece by piece keeps the order of the method.
+    for start, end in pairwise(zmp_times):
+        grid = np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)
+        piece = solve_ivp(motion, (start, end), state, "DOP853", grid, rtol=1e-12, atol=1e-13)
+        times.append(grid[:-1])
+        states.append(piece.y[:, :-1])
+        state = piece.y[:, -1]
+    t = np.append(np.concatenate(times), step_time)
+    x, v = np.column_stack([*states, state]).reshape(2, 3, -1)
+
+    ends = np.array([x[:, -1], v[:, -1]])
+    start_state = np.linalg.solve(ends[:, 1:] - np.eye(2), np.array([step_length, 0.0]) - ends[:, 0])
+    weights = np.array([1.0, *start_state])
+    position, velocity = weights @ x, weights @ v
+    acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
+    quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
+    return PPoly.from_bernstein_basis(quintics)
+
+
+def _stepped(
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    step_length: float,
+    height: float,
+    bob: Bob,
+    slope: float,
+    ahead: PPoly,
+) -> PPoly:
+    """The path of `periodic_com` with a pivot `ahead` of the CoM, by Runge-Kutta steps of `STEP_SAMPLES` a step.
+
+    The equation is linear, so each step is a matrix on (x, x', 1), and the product of all has the periodic start.
+    """
+    step_time = zmp_times[-1]
+    back, down = -gravity(slope)
+    pieces = [
+        np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)[:-1]
+        for start, end in pairwise(zmp_times)
+    ]
+    t = np.append(np.concatenate(pieces), step_time)
+
+    def equation(time: NDArray) -> NDArray:
+        z = height + bob(time)
+        pull = (down + bob(time, 2)) / z
+        matrix = np.zeros((len(time), 3, 3))
+        matrix[:, 0, 1], matrix[:, 1, 0] = 1.0, pull
+        matrix[:, 1, 2] = pull * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
+        return matrix
+
+    at, lasts, unit = equation(t), np.diff(t)[:, None, None], np.eye(3)
+    middle = equation(0.5 * (t[1:] + t[:-1]))
+    first = at[:-1]
+    second = middle @ (unit + lasts / 2 * first)
+    third = middle @ (unit + lasts / 2 * second)
+    fourth = at[1:] @ (unit + lasts * third)
+    steps = unit + lasts / 6 * (first + 2 * second + 2 * third + fourth)
+    through = [unit]
+    for step in steps:
+        through.append(step @ through[-1])
+    whole = through[-1][:2]
+    start = np.linalg.solve(whole[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole[:, 2])
+    state = np.stack(through) @ np.append(start, 1.0)
+    x, v = state[:, 0], state[:, 1]
+    a, h = (at @ state[..., None])[:, 1, 0], np.diff(t)
+    bernstein = [x[:-1], x[:-1] + h * v[:-1] / 5, x[:-1] + 2 * h * v[:-1] / 5 + h**2 * a[:-1] / 20]
+    bernstein += [x[1:] - 2 * h * v[1:] / 5 + h**2 * a[1:] / 20, x[1:] - h * v[1:] / 5, x[1:]]
+    return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))

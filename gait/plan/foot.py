@@ -1,0 +1,265 @@
+"""Where a foot is over its stride: heel, ankle and toe rockers on the ground, then the swing.
+
+The toe rocker has two parts: the foot turns about the toe joint over a flat toe, and late in a long double support the
+toe rolls over its tip and lifts the joint.
+
+All positions are in the foot's own frame: x [m] forward of where its ankle is while the foot is flat, z [m] up from
+the floor. Pitch [rad] is positive toes up. Stride phase 0 is this foot's heel strike, 1 its next, two steps further on.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline, make_interp_spline
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_within
+
+from ..body.body import Body
+from ..body.rockers import rising, rolling, turned, turning
+from .foot_style import FootStyle, peoples_style
+
+ROCKER_MARGIN = 0.005
+"""The foot comes flat, and stays flat, this far of the ZMP's way before and after it needs to [m at 1.70 m]; chosen."""
+QUICKEST_FOOT_FLAT = 0.02
+"""Earliest stride phase of foot flat; chosen: in very short steps the ZMP starts ahead of the landing heel."""
+HEEL_ROCKER_POWER = 2
+"""Power with which the pitch falls with what is left of the heel rocker; chosen: it ends without a jump of its rate."""
+
+MID_SWING = (0.3, 0.7)
+"""Parts of the swing between which ball and heel must clear the floor: they leave and land on either side of it."""
+FLOOR_TOLERANCE = 0.003
+"""Largest depth of a swing foot in the floor [m]; chosen: a landing heel slides in at a shallow angle."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootPath:
+    """One foot's path over its stride."""
+
+    body: Body
+    step_length: float
+    """Heel strike to heel strike of the other foot [m]."""
+    foot_flat: float
+    """Stride phase at which the heel rocker ends."""
+    heel_off: float
+    """Stride phase at which the toe rocker begins."""
+    tip_off: float
+    """Stride phase at which the toe begins to roll over its tip; `toe_off` where it does not."""
+    toe_off: float
+    """Stride phase at which the toe leaves the ground."""
+    roll: float
+    """How far the toe rolls over its tip late in stance: 0 not at all, 1 as people's; it weighs their pairs of
+    constants (`foot_style`)."""
+    style: FootStyle
+    """Pitches at the events, and the shape of the path between them."""
+    lift: float = 0.0
+    """The via points of the swing lie this much [m] higher than those of the style."""
+
+    def pitch(self, stride_phase: ArrayLike) -> NDArray:
+        """Foot to ground [rad], toes up positive, 0 from foot flat to heel-off."""
+        return self._jet(stride_phase)[2]
+
+    def toe_pitch(self, stride_phase: ArrayLike) -> NDArray:
+        """Toe to ground [rad] from foot flat to toe-off: 0, and negative as it rolls over its tip."""
+        return self._roll(np.clip(np.mod(np.asarray(stride_phase, float), 1.0), self.tip_off, self.toe_off))[0]
+
+    def ankle(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Ankle axis (x, z) [m]."""
+        x, z, _ = self._jet(stride_phase)
+        return x, z
+
+    def toe_joint(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Toe joint (x, z) [m]; exactly at its standing place from foot flat until the toe rolls over its tip."""
+        phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        x, z, pitch = self._jet(phase)
+        forward, up = turned(pitch, self.body.ankle_to_toe_joint, -self._drop)
+        planted = (phase >= self.foot_flat) & (phase <= self.tip_off)
+        return (
+            np.where(planted, self.body.ankle_to_toe_joint, x + forward),
+            np.where(planted, self.body.toe_joint_height, z + up),
+        )
+
+    def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Lowest point of the heel (x, z) [m], its back at the sole unless it is round; on the floor until heel-off."""
+        x, z, pitch = self._jet(stride_phase)
+        back, down = turned(pitch, self.flat_heel, self._heel_radius - self.body.ankle_height)
+        return x + back, z + down - self._heel_radius
+
+    @property
+    def flat_heel(self) -> float:
+        """Where the heel touches the floor under a flat foot, x [m]."""
+        return self._heel_radius - self.body.heel_to_ankle
+
+    @property
+    def _heel_radius(self) -> float:
+        return self.style.heel_radius * self.body.length_scale
+
+    def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
+        """Ball of the foot above the floor [m]: the toe joint above its standing height."""
+        return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
+
+    @property
+    def heel_strike_pitch(self) -> float:
+        """Foot to ground at heel strike [rad] (thesis q_f)."""
+        return self.style.heel_strike_pitch
+
+    @property
+    def toe_off_pitch(self) -> float:
+        """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
+        return self.style.toe_off_pitch
+
+    @property
+    def roll_pitch(self) -> float:
+        """Toe to ground at toe-off, as a positive number [rad]."""
+        return self.style.roll_pitch
+
+    @property
+    def clearance(self) -> float:
+        """Least height [m] of ball and heel above the floor in `MID_SWING`."""
+        return float(self.swing_heights(MID_SWING).min())
+
+    def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Rear and front end (x, x) [m] of what is on the ground in stance: heel, sole, toe joint to tip, then tip."""
+        phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        joint = self.body.ankle_to_toe_joint
+        heel = self.flat_heel - self._heel_radius * self._heel_rocker(np.minimum(phase, self.foot_flat))[0, 2]
+        tip = joint + self.body.toe_length
+        rear = np.select([phase <= self.heel_off, phase <= self.tip_off], [heel, joint], tip)
+        return rear, np.where(phase >= self.foot_flat, tip, heel)
+
+    def swing_heights(self, part: tuple[float, float]) -> NDArray:
+        """(2, 200) ball and heel above the floor [m] over a part of the swing."""
+        phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
+        return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
+
+    @property
+    def _drop(self) -> float:
+        """Toe joint below the ankle in a flat foot [m]."""
+        return self.body.ankle_height - self.body.toe_joint_height
+
+    def _jet(self, stride_phase: ArrayLike) -> NDArray:
+        """(x, z, pitch) of the ankle at any phases."""
+        phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        heel = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]
+        toe = self._toe_rocker(np.clip(phase, self.heel_off, self.toe_off))[0]
+        swing = np.moveaxis(self._swing(np.maximum(phase, self.toe_off)), -1, 0)
+        return np.where(phase < self.foot_flat, heel, np.where(phase <= self.toe_off, toe, swing))
+
+    def _heel_rocker(self, phase: ArrayLike) -> NDArray:
+        left, power = 1 - np.asarray(phase) / self.foot_flat, HEEL_ROCKER_POWER
+        pitch = self.heel_strike_pitch * left**power
+        rate = -self.heel_strike_pitch * power / self.foot_flat * left ** (power - 1)
+        curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * left ** (power - 2)
+        jet = rolling(np.stack([pitch, rate, curvature]), (self.flat_heel, self._heel_radius), self.body)
+        jet[:, 0] -= self._heel_radius * jet[:, 2]
+        return jet
+
+    def _toe_rocker(self, phase: ArrayLike) -> NDArray:
+        body = self.body
+        shape = self.style.heel_rise or self.style.toe_rocker_power
+        pitch = rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)
+        jet = rolling(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
+        about_tip = turning(self._roll(phase), -body.toe_length, body.toe_joint_height)
+        about_tip[0, 0] += body.toe_length
+        about_tip[0, 1] -= body.toe_joint_height
+        jet[:, :2] += about_tip
+        return jet
+
+    def _roll(self, phase: ArrayLike) -> NDArray:
+        """(3, ...): toe to ground over its tip [rad] and two phase derivatives."""
+        if self.roll_pitch == 0:
+            return np.zeros((3, *np.shape(phase)))
+        return rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
+
+    @cached_property
+    def _swing(self) -> BSpline:
+        """(x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously differentiable."""
+        start, end = self._toe_rocker(self.toe_off), self._heel_rocker(0.0)
+        end[0, 0] += 2 * self.step_length
+        way, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
+        forward = start[0, 0] + way * (end[0, 0] - start[0, 0])
+        via = np.stack([forward, up * self.body.length_scale + self.lift, pitch], -1)
+        knots = self.toe_off + np.linspace(0.0, 1.0, len(way) + 2) * (1 - self.toe_off)
+        ends = ([(1, start[1]), (2, start[2])], [(1, end[1]), (2, end[2])])
+        return make_interp_spline(knots, np.stack([start[0], *via, end[0]]), k=5, bc_type=ends)
+
+
+def feet_under_zmp(
+    body: Body,
+    step_length: float,
+    zmp_times: NDArray,
+    zmp_points: NDArray,
+    roll: float = 0.0,
+    clearance: float | None = None,
+    style: FootStyle | None = None,
+) -> FootPath:
+    """Feet whose rockers follow the ZMP, so that it stays on what is on the ground.
+
+    The ZMP runs straight between points [m from the stance ankle] at times [s]: heel strike, the other foot's toe-off,
+    perhaps more, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style`
+    takes the place of people's. Raises `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
+    """
+    margin = ROCKER_MARGIN * body.length_scale
+    heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)
+    ball, toe_tip = body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
+    first, zmp_from, *_, zmp_to = zmp_points
+    for name, value, low, high in (("start", zmp_from, heel, ball), ("end", zmp_to, ball + margin, toe_tip)):
+        beyond = max(low - value, value - high)
+        if not beyond < 0:
+            raise SpringfootError(
+                f"ZMP at the {name} of single support must be in ({low:.3f}, {high:.3f}) m from the ankle, "
+                f"got {value:.3f}: outside by {beyond:.3f} m"
+            )
+    if first >= zmp_from:
+        raise SpringfootError(
+            f"step of {step_length:.3f} m must be longer than the ZMP travel, {zmp_to - zmp_from:.3f} m, "
+            f"is {first - zmp_from:.3f} m too short"
+        )
+    stride_time = 2 * zmp_times[-1]
+    flat, heel_off = np.interp([heel - margin, ball + margin], zmp_points, zmp_times) / stride_time
+    toe_off = float(0.5 + zmp_times[1] / stride_time)
+    if style is not None and style.heel_off is not None:
+        heel_off = max(heel_off, 0.5 - 0.5 * style.heel_off)
+    if style is not None and style.flat is not None:
+        flat = min(flat, style.flat * (toe_off - 0.5))
+    flat = max(float(flat), QUICKEST_FOOT_FLAT)
+    zmp_leaves_tip = float(np.interp(toe_tip + margin - step_length, zmp_points, zmp_times))
+    rolls = roll > 0 if style is None else style.roll_pitch > 0
+    tip_off = min(float(0.5 + zmp_leaves_tip / stride_time), toe_off) if rolls else toe_off
+    if style is None:
+        style = peoples_style(step_length / body.leg_length, roll, flat, toe_off - tip_off)
+    elif tip_off == toe_off:
+        style = replace(style, roll_pitch=0.0)
+    feet = FootPath(
+        body=body,
+        step_length=step_length,
+        foot_flat=flat,
+        heel_off=float(heel_off),
+        tip_off=tip_off,
+        toe_off=toe_off,
+        roll=roll,
+        style=style,
+    )
+    if clearance is not None:
+        clearance = require_within("clearance", clearance, (0.0, body.leg_length), "m")
+        flattest = feet.swing_heights(MID_SWING)
+        # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
+        gain = replace(feet, lift=1.0).swing_heights(MID_SWING) - flattest
+        feet = replace(feet, lift=float(((clearance - flattest) / gain).max()))
+    return feet
+
+
+def refuse_swing_in_ground(feet: FootPath) -> None:
+    """Raises `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`: its ball or heel.
+
+    The tip of the toe is not checked: early in swing the toe bends back to people's posture, which at 1.2 m/s would
+    take its tip 20 mm into the floor; a sprung toe gives way.
+    """
+    lowest = float(feet.swing_heights((0.005, 0.995)).min())
+    if lowest < -FLOOR_TOLERANCE:
+        raise SpringfootError(
+            f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "
+            "a longer step, a longer double support or more clearance helps"
+        )

@@ -1,0 +1,109 @@
+"""How a foot rolls off the ground and swings: its pitches at the events, and the shape of its path between them.
+
+People's are chosen and fitted near their curves; a walk predicted from its body alone has others (`walk_style`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+
+# Pairs of constants: over a flat toe (roll 0), and with people's roll over the tip (roll 1); in between along the
+# straight line. Pitches of the latter are people's; the rest was found by least squares against people's thigh, knee
+# and, weighing less, ankle curves at 0.8 to 1.7 m/s; at roll 1 by `python -m springfoot.gait.plan.fit_feet`.
+HEEL_STRIKE_PITCH = ((0.293, 2), (0.336, 1))
+"""Foot to ground at heel strike: a [rad] and n of a (step length / leg length)^n; the thesis's q_f = 0.13 at its 0.6 m,
+and people's 0.24 at 1.2 m/s."""
+TOE_OFF_PITCH = ((1.32, 1.5), (1.39, 0.5))
+"""Foot to ground at toe-off: a [rad] and n of a (step length / leg length)^n; people's is 68 deg at 1.2 m/s."""
+ROLL_PITCH = ((0.0, 0.5), (0.78, 0.5))
+"""Toe to ground at toe-off: a [rad] and n of a (step length / leg length)^n; people's is 37 deg at 1.2 m/s."""
+TOE_ROCKER_POWER = (2.12, 3.08)
+"""The heel rises with this power of the time since heel-off."""
+ROLL_POWER = 2.22
+"""The toe joint rises with this power of the time since the ZMP left the toe tip."""
+
+# The swing passes two via points, a third and two thirds through it, and leaves and lands at the rockers' position,
+# velocity and acceleration.
+VIA_FORWARD = ((0.237, 0.693), (0.319, 0.633))
+"""Place of the ankle at the via points, as parts of its way from toe-off to heel strike."""
+VIA_UP = ((0.225, 0.104), (0.175, 0.090))
+"""Height of the ankle above the floor at the via points [m at 1.70 m]."""
+VIA_PITCH = ((-1.0, -0.183), (-0.746, -0.039))
+"""Pitch of the foot at the via points [rad]."""
+
+HEEL_ROCKER_RATE = 4.5
+"""Largest heel-strike pitch over duration of the heel rocker [rad/stride]; chosen: a quick foot flat needs a flat
+landing."""
+QUICKEST_ROLL = 12.0
+"""Largest toe to ground at toe-off over duration of the roll [rad/stride]; chosen, above people's 6."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootStyle:
+    """One foot's pitches at the events and the shape of its path."""
+
+    heel_strike_pitch: float
+    """Foot to ground at heel strike [rad] (thesis q_f)."""
+    toe_off_pitch: float
+    """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
+    roll_pitch: float
+    """Toe to ground at toe-off, as a positive number [rad]."""
+    toe_rocker_power: float = 2.0
+    """The heel rises with this power of the time since heel-off."""
+    roll_power: float
+    """The toe joint rises with this power of the time since the ZMP left the toe tip."""
+    via_forward: tuple[float, ...]
+    """Place of the ankle at the via points of the swing, as parts of its way from toe-off to heel strike."""
+    via_up: tuple[float, ...]
+    """Height of the ankle above the floor there [m at 1.70 m]."""
+    via_pitch: tuple[float, ...]
+    """Pitch of the foot there [rad]."""
+    heel_rise: tuple[float, float] | None = None
+    """Share of the toe-off pitch that the foot has half-way from heel-off, and the rate of its pitch at toe-off over
+    the mean rate; None: `toe_rocker_power`."""
+    flat: float | None = None
+    """Part of double support after which the landed foot is flat; None: as the ZMP passes its heel."""
+    heel_radius: float = 0.0
+    """Of the heel on which the foot rolls as it lands [m at 1.70 m]; 0: it turns about the heel's back."""
+    heel_off: float | None = None
+    """Part of the step over which the heel rises before the other foot lands, unless the ZMP passes the toe joint
+    later; None: from when it passes."""
+    toe_swing: float | None = None
+    """Angle of the toe joint in swing [rad]; None: people's curve."""
+
+
+def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: float) -> FootStyle:
+    """The style that comes near people's curves.
+
+    Args:
+        stride: step length over leg length.
+        roll: how far the toe rolls over its tip late in stance: 0 not at all, 1 as people's.
+        heel_rocker, tip_rocker: how long the foot turns about its heel, the toe about its tip [strides].
+    """
+    return FootStyle(
+        heel_strike_pitch=min(pitch_at(HEEL_STRIKE_PITCH, stride, roll), HEEL_ROCKER_RATE * heel_rocker),
+        toe_off_pitch=pitch_at(TOE_OFF_PITCH, stride, roll),
+        roll_pitch=min(pitch_at(ROLL_PITCH, stride, roll), QUICKEST_ROLL * tip_rocker),
+        toe_rocker_power=float(between(TOE_ROCKER_POWER, roll)),
+        roll_power=ROLL_POWER,
+        via_forward=_pair(VIA_FORWARD, roll),
+        via_up=_pair(VIA_UP, roll),
+        via_pitch=_pair(VIA_PITCH, roll),
+    )
+
+
+def between(pair: tuple, roll: float) -> NDArray:
+    """A constant given at a roll of 0 and of 1."""
+    return (1 - roll) * np.array(pair[0]) + roll * np.array(pair[1])
+
+
+def pitch_at(pair: tuple, stride: float, roll: float) -> float:
+    """A pitch at an event [rad], positive, for a step length over leg length."""
+    return float(between(tuple(a * stride**n for a, n in pair), roll))
+
+
+def _pair(pair: tuple, roll: float) -> tuple[float, float]:
+    first, second = between(pair, roll)
+    return float(first), float(second)

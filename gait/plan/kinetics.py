@@ -1,0 +1,225 @@
+"""Forces and joint moments of a walk: equations (2) and (3), the share of each foot, and inverse dynamics of a plan and
+of people. Frame, signs and the mechanics of one leg are those of `leg.py`, which takes any trajectory.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+
+from ..body.body import ANGLES, GRAVITY, Body, gravity
+from ..body.leg import (
+    FOOT_SEGMENT,
+    JOINTS,
+    FootLoad,
+    LegMotion,
+    inverse_dynamics,
+    joint_positions,
+    load_at,
+    mass_acceleration,
+    motion_of,
+    projection_moments,
+    segment_turns,
+)
+from ..body.rockers import turned
+from ..people.fourier import PLAN_HARMONICS, fourier_jet
+from ..people.human import HumanGait, human_cop
+from ..people.scores import correlation
+from .plan import WalkPlan
+from .posture import POSTURE_SAMPLES
+
+ZMP_TOLERANCE = 1e-6
+"""A ZMP up to this far outside the two centres of pressure is due to rounding [m]; chosen."""
+PEOPLE_SAMPLES = 100
+"""Samples of a stride for people's curves; chosen, as these have 12 harmonics."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProjectionError:
+    """GRF projection minus inverse dynamics, of one joint in one part of the stride."""
+
+    joint: str
+    part: Literal["stance", "swing"]
+    rms: float
+    """Root mean square of the difference [N m/kg]."""
+    peak: float
+    """Largest difference [N m/kg], positive."""
+    r: float | None
+    """Pearson's r of the two; None where either does not vary: the projection is 0 in swing."""
+
+
+def ground_reaction(mass: float, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0) -> NDArray:
+    """Equation (2), F = m (a - g): force (..., 2) forward, up [N] on a body of `mass` [kg] from its CoM acceleration.
+
+    On a `slope` [rad], uphill positive, forward is along the ground and up at right angles to it.
+    """
+    acceleration = np.stack(np.broadcast_arrays(x_acceleration, z_acceleration), -1)
+    return mass * (acceleration - gravity(slope))
+
+
+def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Shares the total ground reaction between two feet: forces (..., 2) [N] on the rear and the front one.
+
+    `force` (..., 2) [N] acts through the CoM `com` (..., 2) [m], so that it meets the ground at the ZMP p. Each foot's
+    force points from its centre of pressure, p1 and p2 [m], through the CoM; its upward part is (p2 - p)/(p2 - p1) of
+    the total for the rear foot, the rest for the front one. Both together are then `force` at p exactly. In steps
+    shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` where a foot would have to pull: a ZMP that is
+    not between p1 and p2, a force that does not point up.
+    """
+    if not np.all(force[..., 1] > 0):
+        raise SpringfootError("the ground can only push: the upward force must be > 0 N")
+    zmp = com[..., 0] - com[..., 1] * force[..., 0] / force[..., 1]
+    rear, front = np.asarray(rear_cop), np.asarray(front_cop)
+    outside = float(np.max(np.maximum(np.minimum(rear, front) - zmp, zmp - np.maximum(rear, front)), initial=0.0))
+    if not outside <= ZMP_TOLERANCE:
+        raise SpringfootError(
+            f"ZMP must lie between the centres of pressure of the feet, is outside by {outside:.4f} m"
+        )
+    apart = np.where(front == rear, ZMP_TOLERANCE, front - rear)
+    on_front = np.clip((zmp - rear) / apart, 0.0, 1.0) * force[..., 1]
+
+    def towards_com(up: NDArray, cop: NDArray) -> NDArray:
+        return np.stack([up * (com[..., 0] - cop) / com[..., 1], up], -1)
+
+    return towards_com(force[..., 1] - on_front, rear), towards_com(on_front, front)
+
+
+def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Ground reaction (..., 2) [N] on one foot of a plan, and its centre of pressure (...) [m], in that foot's frame.
+
+    In single support it is all of equation (2), at the ZMP; in double support `share_forces` gives it. There the centre
+    of pressure of the front foot waits at the heel until the foot is flat, and then goes to where the ZMP starts along
+    that foot as the other one leaves. That of the rear foot goes on from where the ZMP left it to the tip of the toe,
+    and waits there while the toe rolls over it. So the force of each foot starts and ends at zero. In swing the force
+    is 0, and the centre of pressure stays at the tip of the toe.
+    In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat: there the rear foot
+    bears it all until then, and both centres of pressure stand still while the load passes over.
+    """
+    phase = np.mod(np.asarray(stride_phase, float), 1.0)
+    second = phase >= 0.5
+    step_phase = 2 * (phase - 0.5 * second)
+    pivot = np.stack(plan.pivot(step_phase), -1)
+    force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
+    zmp, shared = plan.zmp(step_phase), step_phase <= 2 * plan.feet.toe_off - 1
+    rear, front = _double_support_cops(plan, step_phase)
+    # In single support the stance foot bears all of it at the ZMP, as front foot.
+    on_rear, on_front = share_forces(force, pivot, np.where(shared, rear, zmp - 1.0), np.where(shared, front, zmp))
+    own = np.where(second[..., None], np.where(shared[..., None], on_rear, 0.0), on_front)
+    tip = plan.body.ankle_to_toe_joint + plan.body.toe_length
+    on_foot = np.where(shared, front, zmp)
+    return own, np.where(second, np.where(shared, rear + plan.step_length, tip), on_foot)
+
+
+def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
+    """Centres of pressure [m] of the rear and the front foot in double support, in the front foot's frame."""
+    body, flat, end = plan.body, 2 * plan.feet.foot_flat, 2 * plan.feet.toe_off - 1
+    heel, tip = plan.feet.flat_heel, body.ankle_to_toe_joint + body.toe_length - plan.step_length
+    at_start, at_flat, at_end = (float(plan.zmp(each)) for each in (0.0, flat, end))
+    if at_flat > heel or tip >= at_end:
+        return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
+    rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)
+    rear = np.interp(step_phase, [0.0, end - rolls], [at_start, tip])
+    landing = plan.feet.on_ground(0.5 * np.minimum(step_phase, flat))[0]
+    return rear, np.where(step_phase < flat, landing, np.interp(step_phase, [flat, end], [heel, at_end]))
+
+
+def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
+    """One leg of a plan over its stride, in its foot's frame: motion and load, for the functions above.
+
+    The plan is differentiated as a Fourier series of `PLAN_HARMONICS`; forces by `foot_force`.
+    """
+    phase = np.mod(np.asarray(stride_phase, float), 1.0)
+    grid = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
+    progress = np.array([2 * plan.step_length, 0.0])
+    turns = segment_turns(plan.joint_angles(grid), plan.slope)
+    hip = np.stack(plan.hip_position(grid), -1) - grid[:, None] * progress
+    jet = fourier_jet(np.concatenate([turns, hip], -1), PLAN_HARMONICS, phase, plan.stride_time)
+    jet[0][..., 4:] += phase[..., None] * progress
+    force, cop = foot_force(plan, phase)
+    point = np.stack([cop, np.zeros(cop.shape)], -1)
+    return motion_of(*jet), load_at(force, point, plan.toe_joint_position(phase)[0])
+
+
+def planned_moments(plan: WalkPlan, stride_phase: ArrayLike) -> dict[str, NDArray]:
+    """Internal joint moments (...) [N m] of a plan at stride phases of any shape, by joint: inverse dynamics."""
+    return inverse_dynamics(plan.body, *planned_leg(plan, stride_phase), plan.slope).moment
+
+
+def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
+    """One leg of people on level ground, as a `body`: motion and load, for the functions above.
+
+    Angles and forces are the gait's, the centre of pressure is `human_cop` times the foot's length. The foot stands on
+    its heel while its toes point up, on its ball while they point down, x from where its ankle is when flat. The hip
+    follows from the forces: the whole body, trunk upright and legs half a stride apart, has the CoM acceleration of
+    equation (2). In swing, where no force acts, the foot's place means nothing.
+    """
+    phase = np.mod(np.asarray(stride_phase, float), 1.0)
+    grid = np.arange(PEOPLE_SAMPLES) / PEOPLE_SAMPLES
+
+    def forces(at: NDArray) -> NDArray:
+        return np.stack([gait.mean("grf_forward", at), gait.mean("grf_vertical", at)], -1)
+
+    def legs(at: NDArray) -> LegMotion:
+        turns = segment_turns({name: gait.mean(name, grid) for name in ANGLES})
+        jet = fourier_jet(turns, PEOPLE_SAMPLES // 2 - 1, at, gait.stride_time)
+        still = np.zeros((*at.shape, 2))
+        return LegMotion(turn=jet[0], rate=jet[1], acceleration=jet[2], hip=still, hip_acceleration=still)
+
+    leg = legs(phase)
+    both_feet = forces(phase) + forces(phase + 0.5)
+    # People's mean forces do not quite add up to their weight: only what differs from the mean accelerates.
+    com_acceleration = GRAVITY * (both_feet - 2 * forces(grid).mean(0))
+    swinging = (mass_acceleration(body, leg) + mass_acceleration(body, legs(phase + 0.5))) / body.total_mass
+    pitch = leg.turn[..., FOOT_SEGMENT]
+    on_heel = _ankle_over(body, pitch, -body.heel_to_ankle, 0.0)
+    on_ball = _ankle_over(body, pitch, body.ankle_to_toe_joint, body.toe_joint_height)
+    ankle = np.where(pitch[..., None] > 0, on_heel, on_ball)
+    motion = LegMotion(
+        turn=leg.turn,
+        rate=leg.rate,
+        acceleration=leg.acceleration,
+        hip=ankle - joint_positions(body, leg.turn, leg.hip)["ankle"],
+        hip_acceleration=com_acceleration - swinging,
+    )
+    cop = body.foot_length * human_cop(phase / gait.toe_off)
+    force = body.total_mass * GRAVITY * forces(phase)
+    toe_joint = joint_positions(body, motion.turn, motion.hip)["toe"]
+    return motion, load_at(force, np.stack([cop, np.zeros(cop.shape)], -1), toe_joint[..., 0])
+
+
+def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> list[ProjectionError]:
+    """How far the GRF projection (Wells 1981) is from inverse dynamics: per joint, in stance and in swing.
+
+    Stance is where the ground bears on the foot. For people `projection_table(body, *people_leg(gait, body, phase))`,
+    for a plan `planned_leg(plan, phase)` and its slope; samples weigh alike, so take phases evenly. Parts that do not
+    occur are left out.
+    """
+    projection = projection_moments(body, motion, load)
+    dynamics = inverse_dynamics(body, motion, load, slope).moment
+    stance = np.any(load.force != 0.0, axis=(-2, -1))
+    rows = []
+    parts: tuple[tuple[Literal["stance", "swing"], NDArray], ...] = (("stance", stance), ("swing", ~stance))
+    for joint in JOINTS:
+        for part, where in parts:
+            ours, exact = projection[joint][where] / body.mass, dynamics[joint][where] / body.mass
+            if not len(ours):
+                continue
+            rows.append(
+                ProjectionError(
+                    joint=joint,
+                    part=part,
+                    rms=float(np.sqrt(np.mean((ours - exact) ** 2))),
+                    peak=float(np.abs(ours - exact).max()),
+                    r=correlation(ours, exact),
+                )
+            )
+    return rows
+
+
+def _ankle_over(body: Body, pitch: NDArray, x: float, z: float) -> NDArray:
+    """Ankle (..., 2) [m] of a foot at `pitch` that turns about its point (x, z) [m], x from the flat foot's ankle."""
+    return np.array([x, z]) + np.stack(turned(pitch, -x, body.ankle_height - z), -1)

@@ -1,0 +1,271 @@
+"""A walk planned by the zero-moment point (ZMP): CoM, feet, leg inverse kinematics -> joint angles over the stride.
+
+The ZMP runs straight from the rear foot to the front one in double support and along the stance foot in single
+support. The feet follow it: the foot is flat as the ZMP passes its heel, the heel rises as the ZMP passes its toe
+joint, and in a long double support the toe rolls over its tip once the ZMP has passed that, so that the ZMP never
+leaves what is on the ground. The hip is placed so that the CoM of the whole planned body, trunk upright, is the planned
+CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import cos, pi, radians, sqrt
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator, PPoly
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_within
+
+from ..body.body import ANGLES, GRAVITY, Body
+from ..people.human import HumanGait, human_gait
+from .cart_table import Bob, ComMotion, periodic_com
+from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point
+from .foot import FootPath, feet_under_zmp, refuse_swing_in_ground
+from .foot_style import between
+from .leg_spin import spinning_legs
+from .posture import POSTURE_SAMPLES, LegPostures, highest_legs, legs_under_com, refuse_impossible_legs
+from .walk_style import WalkStyle
+
+Cadence = Literal["people", "thesis"]
+
+PLAN_SPEED_RANGE = (0.4, 2.0)
+"""Accepted speeds [m/s]; chosen: people's data reach from 0.85 to 1.96."""
+SLOPE_RANGE = (radians(-5.0), radians(5.0))
+"""Accepted slopes [rad], uphill positive; chosen."""
+STEP_TIME_RANGE = (0.25, 1.2)
+"""Accepted step times [s]; chosen: people take 0.4 to 0.7."""
+THESIS_STEP_TIME = 0.5
+"""Step time of the thesis (T_c) [s], at 1.70 m."""
+DOUBLE_SUPPORT = 0.12
+"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. To its end the toe lies flat; the longer a given
+one, the further the toe rolls over its tip, as people's does in their 0.26 at 1.2 m/s."""
+LEAST_FULL_ROLL = 0.18
+"""The roll is whole, as people's, in a double support of `PEOPLES_SHARE`, but of not less than this over step time [-];
+chosen: people's own at the fastest, 1.96 m/s."""
+ROLLING_STEP = (1.0, 1.5)
+"""Steps up to the first are too short for a roll, from the second on it is whole [foot lengths]; chosen: in short ones
+the tip of the rear foot lies beside the front foot."""
+ZMP_TRAVEL = ((-0.020, 0.140), PEOPLES_ZMP)
+"""ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m], over a flat toe and at a whole
+roll; in between along the straight line. The former is chosen: of the travels tried, it brings the knee nearest to
+people's at 1.2 m/s."""
+RISE = 0.65
+"""Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]; chosen: 39
+mm at 1.2 m/s, where people's is 36 to 39 mm."""
+MOST_UNLOADING = 0.75
+"""Largest part of the weight that the rise and fall may take from the feet [-]; chosen; it limits the rise at high
+speeds."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WalkPlan(ComPlan):
+    """A periodic walk, CoM, feet and legs; made by `plan_walk`.
+
+    Stride phase 0..1 belongs to one leg, from its heel strike to its next, in that foot's frame. On a slope angles
+    stay as they are: the thigh's to the true vertical, knee, ankle and toe between segments.
+    """
+
+    feet: FootPath
+    """The path of either foot over its stride, with the phases of foot flat, heel-off and toe-off."""
+    joint_table: PchipInterpolator = field(repr=False)
+    """thigh, knee, ankle, toe [rad] over stride phase, a little beyond 0..1."""
+    hip_table: PchipInterpolator = field(repr=False)
+    """Hip x, z [m] in the foot's frame over stride phase, a little beyond 0..1."""
+
+    def support(self, step_phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Rear and front end [m] of the hull of what is on the ground of both feet, in the step's frame."""
+        phase = np.mod(np.asarray(step_phase, float), 1.0) / 2
+        rear, front = self.feet.on_ground(phase)
+        rear_of_trailing, front_of_trailing = self.feet.on_ground(phase + 0.5)
+        both = phase + 0.5 <= self.feet.toe_off
+        return (
+            np.where(both, np.minimum(rear, rear_of_trailing - self.step_length), rear),
+            np.where(both, np.maximum(front, front_of_trailing - self.step_length), front),
+        )
+
+    def joint_angles(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
+        """thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
+        return _named(self.joint_table(np.mod(stride_phase, 1.0)))
+
+    def joint_rates(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
+        """Time derivatives of `joint_angles` [rad/s]."""
+        return _named(self.joint_table(np.mod(stride_phase, 1.0), 1) / self.stride_time)
+
+    def hip_position(self, stride_phase: ArrayLike) -> Point:
+        """Hip (x, z) [m] in the frame of the foot whose stride it is."""
+        x, z = np.moveaxis(self.hip_table(np.mod(stride_phase, 1.0)), -1, 0)
+        return x, z
+
+    def ankle_position(self, stride_phase: ArrayLike) -> Point:
+        """Ankle (x, z) [m] in the foot's frame: x from 0 in stance to two step lengths at the next heel strike."""
+        return self.feet.ankle(stride_phase)
+
+    def toe_joint_position(self, stride_phase: ArrayLike) -> Point:
+        """Toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat until the toe rolls over."""
+        return self.feet.toe_joint(stride_phase)
+
+
+def plan_walk(
+    body: Body,
+    speed: float = 1.2,
+    cadence: Cadence = "people",
+    *,
+    step_time: float | None = None,
+    double_support: float | None = None,
+    com_height: float | None = None,
+    com_amplitude: float | None = None,
+    zmp_travel: tuple[float, float] | None = None,
+    slope: float = 0.0,
+    clearance: float | None = None,
+    human: HumanGait | None = None,
+    style: WalkStyle | None = None,
+) -> WalkPlan:
+    """Plans a walk of `body` at `speed` [m/s] along the ground.
+
+    `cadence="people"`: step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
+    1.2 m/s, 1.70 m); where their data end, both change with the square root of speed. `"thesis"`: 0.5 s a step at
+    every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m. `step_time` [s] replaces either, the
+    step length following from the speed. `double_support` [s], mean `com_height`, `com_amplitude` (half of rise and
+    fall; 0 keeps the height constant, solved in closed form) and `zmp_travel` (start, end of single support, from the
+    stance ankle) [m] replace the defaults above; the default height is the greatest that leaves the knees
+    `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
+    (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
+    rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
+    `human` takes the place of people (`human_gait`): its step length and time, and its toe in swing. `style` takes the
+    place of all that people's curves chose here but those (`walk_style`); what else is given counts more.
+    At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
+    is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. In a longer one
+    the toe rolls over its tip, the further the longer, and the default `zmp_travel` lies further forward: 0.12 s leave
+    0.23 g, and angles 5.6, 7.0 and 9.3 deg off.
+    Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
+    swing foot in the ground.
+    """
+    speed = require_within("speed", speed, PLAN_SPEED_RANGE, "m/s")
+    if cadence not in get_args(Cadence):
+        raise SpringfootError(f"cadence must be 'people' or 'thesis', got {cadence!r}")
+    slope = require_within("slope", slope, SLOPE_RANGE, "rad")
+    human = human_gait(speed, body.height) if human is None else human
+    if step_time is None:
+        step_time, step_length = _step(body, speed, cadence, human)
+    else:
+        step_time = require_within("step_time", step_time, STEP_TIME_RANGE, "s")
+        step_length = speed * step_time
+    if double_support is None:
+        double_support = (DOUBLE_SUPPORT if style is None else style.double_support) * step_time
+    double_support = require_within("double_support", double_support, (0.02, 0.4 * step_time), "s")
+    # Beyond, the feet would have to pull the body down at mid-stance.
+    weightless = GRAVITY * cos(slope) * (step_time / (2 * pi)) ** 2
+    if com_amplitude is None:
+        rise = RISE if style is None else style.rise
+        com_amplitude = min(rise * step_length**2 / (16 * body.leg_length), MOST_UNLOADING * weightless)
+    com_amplitude = require_within("com_amplitude", com_amplitude, (0.0, 0.9 * weightless), "m")
+    if com_height is not None:
+        com_height = require_within("com_height", com_height, (0.5 * body.height, 0.7 * body.height), "m")
+
+    roll = _roll(body, human, double_support, step_time, step_length) if style is None else 1.0
+    # Along a foot that is longer than its body's share the ZMP of a style goes as far as along that share.
+    along = between(ZMP_TRAVEL, roll) if style is None else np.array(style.zmp_travel) * body.foot_ratio
+    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, along)
+    way = [] if style is None or style.zmp_way is None else style.zmp_way
+    on_way = double_support + np.arange(1, len(way) + 1) / (len(way) + 1) * (step_time - double_support)
+    zmp_times = np.array([0.0, double_support, *on_way, step_time])
+    passed = zmp_from + np.array(way) * (zmp_to - zmp_from)
+    zmp_points = np.array([zmp_to - step_length, zmp_from, *passed, zmp_to])
+    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance, style and style.foot)
+    lean = 0.0 if style is None else style.lean
+
+    bob = Bob(
+        step_time=step_time,
+        amplitude=com_amplitude,
+        lowest_at=double_support * (0.5 if style is None else style.lowest),
+        second=(0.0, 0.0) if style is None else style.rise_again,
+    )
+    last: list[LegPostures] = []
+
+    def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
+        motion = periodic_com(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
+        legs = legs_under_com(body, motion, feet, human, last[0] if last and ahead is not None else None, lean)
+        last[:] = [legs]
+        return motion, legs
+
+    if style is not None:
+        still = PPoly(np.zeros((1, 1)), np.array([0.0, step_time]))
+        motion, legs = spinning_legs(body, legs_at, still, step_length, style.knee, com_height, lean)
+    else:
+        motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
+    refuse_impossible_legs(body, legs)
+    table = np.stack([legs.thigh, legs.knee, legs.ankle, legs.toe], -1)
+    plan = WalkPlan(
+        body=body,
+        speed=speed,
+        step_time=step_time,
+        step_length=step_length,
+        double_support=double_support,
+        motion=motion,
+        feet=feet,
+        human=human,
+        lean=lean,
+        joint_table=_periodic(table),
+        hip_table=_periodic(legs.hip, shift=np.array([2 * step_length, 0.0])),
+    )
+    refuse_swing_in_ground(feet)
+    _refuse_zmp_outside(plan)
+    return plan
+
+
+def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
+    """Step time [s] and length [m]."""
+    if cadence == "thesis":
+        step_time = THESIS_STEP_TIME * sqrt(body.length_scale)
+        return step_time, speed * step_time
+    # Step length and rate share what is left between people's data and the speed asked for.
+    share = sqrt(speed * human.stride_time / (2 * human.step_length))
+    return human.stride_time / 2 / share, human.step_length * share
+
+
+def _roll(body: Body, human: HumanGait, double_support: float, step_time: float, step_length: float) -> float:
+    """`FootPath.roll` of a double support [s]."""
+    full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
+    roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
+    return roll * float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
+
+
+def _zmp_travel(body: Body, given: tuple[float, float] | None, otherwise: ArrayLike) -> tuple[float, float]:
+    """ZMP [m] from the stance ankle at the start and end of single support; `otherwise` [m at 1.70 m]."""
+    if given is None:
+        zmp_from, zmp_to = np.asarray(otherwise) * body.length_scale
+        return float(zmp_from), float(zmp_to)
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
+        raise SpringfootError(f"zmp_travel must be 2 numbers (start, end of single support) [m], got {given!r}")
+    bounds = (-body.foot_length, body.foot_length)
+    return require_within("zmp_travel start", given[0], bounds, "m"), require_within(
+        "zmp_travel end", given[1], bounds, "m"
+    )
+
+
+def _refuse_zmp_outside(plan: WalkPlan) -> None:
+    feet = plan.feet
+    # What is on the ground changes at the events: both sides of each are looked at.
+    events = 2 * np.array([feet.foot_flat, feet.heel_off, feet.tip_off - 0.5, feet.toe_off - 0.5])
+    phase = np.concatenate([np.arange(2000) / 2000, events - 1e-9, events + 1e-9])
+    rear, front = plan.support(phase)
+    zmp = plan.zmp(phase)
+    beyond = np.maximum(rear - zmp, zmp - front)
+    if beyond.max() > 1e-6:
+        raise SpringfootError(
+            f"ZMP outside the feet by {beyond.max():.4f} m at {phase[beyond.argmax()]:.0%} of the step"
+        )
+
+
+def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolator:
+    """Table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic, which does not overshoot."""
+    edge = 4
+    padded = np.concatenate([values[-edge:] - shift, values, values[: edge + 1] + shift])
+    return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)
+
+
+def _named(columns: NDArray) -> dict[str, NDArray]:
+    return dict(zip(ANGLES, np.moveaxis(columns, -1, 0), strict=True))

@@ -1,0 +1,85 @@
+"""A plan as a gait: its own angles, moments and forces in the place of people's, for whatever follows a gait."""
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+
+from ..body.body import ANGLES, GRAVITY
+from ..body.leg import JOINTS, inverse_dynamics
+from ..people.human import HARMONICS, STANCE_TERMS, FootHabits, HumanGait
+from .kinetics import foot_force, planned_leg
+from .plan import WalkPlan
+
+SERIES_SAMPLES = 400
+"""Samples of the stride of which series are made; chosen."""
+RAMP = 0.06
+"""Stride phase over which the schedule of K goes from one phase of stance to the next; chosen."""
+FLAT_SHARE = 0.5
+"""Where early stance ends, as a part of the way from foot flat to heel-off; chosen."""
+
+
+def gait_of(plan: WalkPlan) -> HumanGait:
+    """The gait of a plan: everything of it from body, plan and inverse dynamics.
+
+    Curves are Fourier series of as many terms as people's are. Moments and powers are for body mass and height as
+    people's are [N m/kg at 1.70 m]. The spread is 0: a plan has none.
+    """
+    body = plan.body
+    phase = np.arange(SERIES_SAMPLES) / SERIES_SAMPLES
+    motion, load = planned_leg(plan, phase)
+    dynamics = inverse_dynamics(body, motion, load, plan.slope)
+    angles = plan.joint_angles(phase)
+    turn, rate = motion.turn, motion.rate
+    rates = {"hip": rate[:, 0], "knee": rate[:, 0] - rate[:, 1], "ankle": rate[:, 2] - rate[:, 1]}
+    rates["toe"] = rate[:, 3] - rate[:, 2]
+    mean = {name: _series(angles[name]) for name in ANGLES} | {"hip": _series(turn[:, 0])}
+    unit = body.total_mass * body.length_scale
+    for joint in JOINTS:
+        mean[f"{joint}_moment"] = _series(dynamics.moment[joint] / unit)
+        mean[f"{joint}_power"] = _series(-dynamics.moment[joint] * rates[joint] / body.total_mass)
+    force, _ = foot_force(plan, phase)
+    force = force / (body.total_mass * GRAVITY)
+    toe_off = plan.feet.toe_off
+    mean["grf_forward"], mean["grf_vertical"] = (_stance(force[:, axis], phase, toe_off) for axis in range(2))
+    return HumanGait(
+        speed=plan.speed,
+        condition="plan",
+        clamped=False,
+        stride_time=plan.stride_time,
+        step_length=plan.step_length,
+        toe_off=toe_off,
+        mean_series=mean,
+        sd_series={name: np.zeros_like(series) for name, series in mean.items()},
+        foot=_foot(plan),
+    )
+
+
+def _foot(plan: WalkPlan) -> FootHabits:
+    """Where the schedule of K has its phases: at the plan's own events, the other foot's toe-off and landing."""
+    feet = plan.feet
+    flat, off, leaves = feet.foot_flat, feet.heel_off, feet.toe_off
+    middle = flat + FLAT_SHARE * (off - flat)
+    begins = max(off, middle + 2 * RAMP)
+    plateaus = (0.0, flat, flat + RAMP, middle, middle + RAMP, begins, begins + RAMP, leaves, leaves + RAMP, 0.95)
+    swing = 0.0 if feet.style.toe_swing is None else float(np.degrees(feet.style.toe_swing))
+    return FootHabits(
+        plateaus=plateaus,
+        ankle_quasi_stiffness=None,
+        toe_flat=(0.0, flat),
+        toe_off=(leaves, leaves + RAMP),
+        toe_swing_deg=swing,
+    )
+
+
+def _series(values: NDArray) -> NDArray:
+    """(HARMONICS + 1,) complex Fourier coefficients of evenly spaced samples of a stride."""
+    series = np.fft.rfft(values)[: HARMONICS + 1] / len(values)
+    series[1:] *= 2
+    return series
+
+
+def _stance(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
+    """(STANCE_TERMS,) least-squares sine series over stance."""
+    inside = phase < toe_off
+    basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
+    return np.linalg.lstsq(basis, values[inside], rcond=None)[0]

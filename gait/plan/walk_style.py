@@ -1,0 +1,119 @@
+"""What a plan may choose of a walk whose steps are given: where and when the ZMP passes, how the CoM bobs, how feet
+roll and swing. People's choice is the default of `plan_walk`; `least_work.json` has the choices of least effort, which
+know no curve of people's (`springfoot study plan-tuning`).
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+from math import isfinite
+from pathlib import Path
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from springfoot.errors import SpringfootError, as_float
+from springfoot.files.json_file import MOST_JSON_BYTES
+from springfoot.files.text_table import read_bytes
+
+from .foot_style import FootStyle
+
+STYLES = Path(str(resources.files("springfoot.gait.plan") / "least_work.json"))
+"""The package's own file of styles."""
+PAIR = tuple[float, float]
+"""The type of what is two numbers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkStyle:
+    """One way to walk at one step length and time."""
+
+    double_support: float
+    """Double support over step time [-]."""
+    zmp_travel: tuple[float, float]
+    """ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m]."""
+    rise: float
+    """Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]."""
+    knee: float
+    """Least knee flexion of the stride [rad], which sets the height of the CoM."""
+    zmp_way: tuple[float, float] | None = None
+    """Parts of its travel that the ZMP has done a third and two thirds through single support; None: these parts."""
+    lowest: float = 0.5
+    """Part of double support after which the CoM is lowest."""
+    rise_again: tuple[float, float] = (0.0, 0.0)
+    """Second harmonic of the CoM's height (`cart_table.Bob`): cosine and sine over half of `rise` [-]."""
+    lean: float = 0.0
+    """Pitch at which the trunk is held [rad], forward positive, 0 with its CoM upright over the hip."""
+    foot: FootStyle
+    """How the feet roll and swing."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values; `style_from` is the inverse."""
+        return json.loads(json.dumps(asdict(self)))
+
+
+def style_from(values: Mapping[str, Any]) -> WalkStyle:
+    """The style of JSON values (lists for tuples); raises `ValueError`, `TypeError` or `KeyError` for others."""
+    own = dict(values)
+    style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
+    for part in (style, style.foot):
+        for name, hint in get_type_hints(type(part)).items():
+            value, kinds = getattr(part, name), get_args(hint) if isinstance(hint, UnionType) else (hint,)
+            if not any(_is_a(kind, value) for kind in kinds):
+                what = (
+                    "a finite number" if float in kinds else "2 finite numbers" if PAIR in kinds else "finite numbers"
+                )
+                raise ValueError(f"{name} must be {what}, got {value!r}")
+    if len({len(each) for each in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:
+        raise ValueError("via_forward, via_up and via_pitch must be equally many")
+    return style
+
+
+def _is_a(kind: Any, value: Any) -> bool:
+    """Whether a value is of a field's type, and its numbers are finite."""
+    if get_origin(kind) is tuple:
+        own = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
+        return own and all(isfinite(as_float(each)) for each in value)
+    return isfinite(as_float(value)) if kind is float else isinstance(value, kind)
+
+
+def least_work(speed: float, file: Path | None = None) -> WalkStyle:
+    """The style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`: linear between the
+    speeds it was searched at, and beyond them that of the nearest. Raises `SpringfootError` for a file of no styles."""
+    table = _committed() if file is None else styles_of(file)
+    speeds = sorted(table)
+    place = float(np.interp(speed, speeds, np.arange(len(speeds))))
+    low, high = table[speeds[int(place)]], table[speeds[min(int(place) + 1, len(speeds) - 1)]]
+    return style_from(_mixed(low.to_json(), high.to_json(), place - int(place)))
+
+
+def _mixed(low: Any, high: Any, weight: float) -> Any:
+    if low is None:
+        return None
+    if isinstance(low, dict):
+        return {name: _mixed(low[name], high[name], weight) for name in low}
+    return (np.array(low) + weight * (np.array(high) - np.array(low))).tolist()
+
+
+def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+
+
+@cache
+def _committed() -> dict[float, WalkStyle]:
+    return styles_of(STYLES)
+
+
+def styles_of(file: Path) -> dict[float, WalkStyle]:
+    """Speed [m/s at 1.70 m] -> the style of a file; raises `SpringfootError` for one that has none."""
+    try:
+        styles = json.loads(read_bytes(file, MOST_JSON_BYTES))["styles"]
+        found = {float(speed): style_from(values) for speed, values in styles.items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise SpringfootError(f"{file} is not a file of styles of walks: {error}") from None
+    if not found:
+        raise SpringfootError(f"{file} has no style of any walk")
+    return found

@@ -1,0 +1,247 @@
+"""System identification without disturbance: K, beta and theta_eq from torque, angle and velocity of a gait.
+
+In each phase of the stride the joint is taken as one spring and damper, torque = K (theta_eq - theta - beta theta'),
+which is linear in K theta_eq, K and K beta: ordinary least squares. Intervals are exact if the torque's errors are
+independent, normal and of one size, and angle and velocity are without error. Neither holds in a gait laboratory:
+smoothed or averaged curves have errors that last for many samples, and then the intervals are too narrow (a warning
+says so); noise on the angle makes K too small (`noise_study`).
+
+What it cannot do: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle.
+What is found is the slope of the loop of torque over angle (quasi-stiffness), the spring's K only if theta_eq stood
+still in the phase. On the simulation's fixed schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at
+30-44 % of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning know
+nothing of that. Where a gait can be pushed, `perturbation` finds K itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_count, require_number, require_within
+
+from .spring_fit import Estimate, fit_spring, intervals
+
+COLLINEAR = 0.95
+"""Correlation of angle and velocity beyond which they hardly tell K from beta (variance inflation above 10)."""
+ILL_CONDITIONED = 30.0
+"""Condition number of (1, angle, velocity), columns of unit length, beyond which it harms (Belsley et al. 1980)."""
+LEAST_SPREAD = np.deg2rad(0.5)
+"""Angle spread [rad] below which there is too little motion: the best of gait laboratories err by as much, and such
+an error would halve K."""
+CORRELATED = 0.5
+"""Lag-1 correlation of the residuals beyond which the intervals are called too narrow."""
+
+PARAMETERS = ("stiffness", "damping_time", "equilibrium")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseSpring:
+    """The spring and damper identified in one phase; None where the data do not say."""
+
+    start: float
+    """Stride phase at which it begins."""
+    end: float
+    """Stride phase at which it ends."""
+    samples: int
+    """Samples in it."""
+    stiffness: Estimate | None
+    """K [N m/rad]; its interval by Student's t."""
+    damping_time: Estimate | None
+    """beta [s], a ratio of two estimates: its interval is Fieller's."""
+    equilibrium: Estimate | None
+    """theta_eq [rad], likewise."""
+    r2: float | None
+    """Share of the torque's variance explained [0..1]."""
+    correlation: float | None
+    """Of angle and velocity [-1..1]."""
+    condition: float
+    """Condition number of (1, angle, velocity), columns of unit length."""
+    angle_spread: float
+    """Standard deviation of that part of the angle which velocity does not tell [rad]: what K is found by."""
+    residual_correlation: float | None
+    """Lag-1 correlation of the residuals in the order given [-1..1]; None if they are mere rounding."""
+    warning: str
+    """One line on why not to trust the numbers; "" if nothing speaks against them."""
+
+    def attenuation(self, angle_sd: float) -> float:
+        """Factor by which white noise of `angle_sd` [rad] on the angle shrinks K: s^2 / (s^2 + sd^2), s its spread."""
+        return self.angle_spread**2 / (self.angle_spread**2 + angle_sd**2)
+
+
+def identify(
+    torque: ArrayLike,
+    angle: ArrayLike,
+    velocity: ArrayLike,
+    phase: ArrayLike,
+    bounds: Sequence[float],
+    margin: float = 0,
+) -> tuple[PhaseSpring, ...]:
+    """K, beta and theta_eq of each phase of the stride, by least squares, with their intervals.
+
+    They are those of a spring only if its theta_eq stood still in the phase: else use `perturbation.identify_pushed`.
+
+    Args:
+        torque: [N m], or per kg, positive as the angle (a plantarflexion moment with its sign turned).
+        angle: [rad]. velocity: [rad/s]. All arrays of one shape, of one stride or many.
+        phase: stride phase of each sample [0, 1).
+        bounds: (P + 1,) ascending stride phases [0, 1] between which springs are constant: P phases.
+        margin: part of the stride left out at both ends of each phase, where data change from spring to spring.
+
+    Returns:
+        P results, in the order of `bounds`. Raises `SpringfootError` for bad arrays or bounds.
+    """
+    return tuple(_spring(edges, *curves) for edges, curves in _windows(torque, angle, velocity, phase, bounds, margin))
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseOutcome:
+    """What noise does to one phase's estimates; keys of the mappings are `PARAMETERS`."""
+
+    start: float
+    """Stride phase at which it begins."""
+    end: float
+    """Stride phase at which it ends."""
+    coverage: dict[str, float]
+    """Percent of the repeats whose 95 % interval holds the true value."""
+    bias: dict[str, float]
+    """Median estimate minus the true value: K [N m/rad], beta [s], theta_eq [rad]."""
+    stiffness_bias_percent: float
+    """The bias of K in percent of K."""
+    expected_percent: float
+    """The same as theory has it for many samples: errors in variables."""
+
+
+def noise_study(
+    torque: ArrayLike,
+    angle: ArrayLike,
+    velocity: ArrayLike,
+    phase: ArrayLike,
+    bounds: Sequence[float],
+    margin: float = 0,
+    *,
+    torque_sd: float = 0.0,
+    angle_sd: float = 0.0,
+    velocity_sd: float = 0.0,
+    repeats: int = 1000,
+    seed: int = 0,
+) -> tuple[NoiseOutcome, ...]:
+    """Identify each phase `repeats` times under white noise: how often intervals hold the truth, how far off one is.
+
+    The truth is the spring identified from the data as given, whose own torque gets the noise `torque_sd` [N m].
+    `angle_sd` [rad] and `velocity_sd` [rad/s] are noise on the measured angle and velocity alone. A velocity taken by
+    central differences of that angle, every h [s], has velocity_sd = angle_sd / (sqrt(2) h), independent of the
+    angle's noise at the same sample. Raises `SpringfootError` if the data do not say what the truth is.
+    """
+    noises = [
+        require_number(name, sd, 0.0)
+        for name, sd in (("torque_sd", torque_sd), ("angle_sd", angle_sd), ("velocity_sd", velocity_sd))
+    ]
+    require_count("repeats", repeats)
+    random = np.random.default_rng(seed)
+    outcomes = []
+    for edges, curves in _windows(torque, angle, velocity, phase, bounds, margin):
+        count = len(curves[0])
+        fit = fit_spring(*curves) if count > 3 else None
+        if fit is None or not fit.solvable:
+            raise SpringfootError(
+                f"no spring to be identified from {edges[0]:g} to {edges[1]:g}: see identify's warning"
+            )
+        offset, K, c = fit.coefficients
+        clean = (offset - K * curves[1] - c * curves[2], *curves[1:])
+        noisy = [curve + sd * random.standard_normal((repeats, count)) for curve, sd in zip(clean, noises, strict=True)]
+        truth = np.array([ratio[0] for ratio in intervals(fit)])
+        value, low, high = np.moveaxis(np.array(intervals(fit_spring(*noisy))), 1, 0)
+        held = np.mean((truth >= low.T) & (truth <= high.T), axis=0) * 100
+        bias = np.median(value.T - truth, axis=0)
+        spread = np.cov(np.stack(clean[1:]), bias=True)
+        expected = np.linalg.solve(spread + np.diag(np.square(noises[1:])), spread @ fit.coefficients[1:])
+        outcomes.append(
+            NoiseOutcome(
+                start=edges[0],
+                end=edges[1],
+                coverage=dict(zip(PARAMETERS, held.tolist(), strict=True)),
+                bias=dict(zip(PARAMETERS, bias.tolist(), strict=True)),
+                stiffness_bias_percent=float(100 * bias[0] / truth[0]),
+                expected_percent=float(100 * (expected[0] / truth[0] - 1)),
+            )
+        )
+    return tuple(outcomes)
+
+
+def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
+    """The result of one phase and its warning."""
+    count = len(torque)
+    estimates: Sequence[Estimate | None] = [None] * 3
+    r2 = correlation = lagged = None
+    spread, condition = 0.0, np.inf
+    reasons = []
+    if count <= 3:
+        reasons.append(f"{count} samples are too few for three unknowns")
+    else:
+        fit = fit_spring(torque, angle, velocity)
+        columns = np.stack([np.ones(count), angle, velocity], -1)
+        size = np.sqrt((columns**2).sum(0))
+        condition = float(np.linalg.cond(columns / np.where(size > 0, size, 1.0)))
+        moved, rate = angle - angle.mean(), velocity - velocity.mean()
+        scale = np.sqrt((moved @ moved) * (rate @ rate))
+        correlation = float(np.clip(moved @ rate / scale, -1, 1)) if scale > 0 else None
+        spread = float(np.sqrt(moved @ moved / count * (1 - (correlation or 0.0) ** 2)))
+        if correlation is not None and abs(correlation) > COLLINEAR:
+            reasons.append(f"angle and velocity are nearly collinear (r = {correlation:.3f})")
+        elif condition > ILL_CONDITIONED:
+            reasons.append(f"angle and velocity hardly differ from constants (condition {condition:.0f})")
+        if spread < LEAST_SPREAD:
+            reasons.append(f"too little motion (angle spread {np.rad2deg(spread):.2f} deg)")
+        if not fit.solvable:
+            reasons.append("K, beta and theta_eq cannot be told apart")
+        else:
+            estimates = found = [Estimate(*map(float, numbers)) for numbers in intervals(fit)]
+            lost, total = fit.residual @ fit.residual, np.sum((torque - torque.mean()) ** 2)
+            r2 = float(1 - lost / total) if total > 0 else None
+            if lost > 1e-20 * (torque @ torque):
+                lagged = float(fit.residual[1:] @ fit.residual[:-1] / lost)
+            if found[0].low <= 0:
+                reasons.append(
+                    "the torque grows with the angle: no spring"
+                    if found[0].high < 0
+                    else "stiffness is not significantly above 0: beta and theta_eq have no bounds"
+                )
+            if lagged is not None and lagged > CORRELATED:
+                reasons.append(f"residuals are correlated ({lagged:.2f} from sample to sample): intervals too narrow")
+    return PhaseSpring(
+        start=edges[0],
+        end=edges[1],
+        samples=count,
+        **dict(zip(PARAMETERS, estimates, strict=True)),
+        r2=r2,
+        correlation=correlation,
+        condition=condition,
+        angle_spread=spread,
+        residual_correlation=lagged,
+        warning="; ".join(reasons),
+    )
+
+
+def _windows(
+    torque: ArrayLike, angle: ArrayLike, velocity: ArrayLike, phase: ArrayLike, bounds: Sequence[float], margin: float
+) -> list[tuple[tuple[float, float], tuple[NDArray, NDArray, NDArray]]]:
+    """For each phase its bounds, and torque, angle and velocity (n,) of its samples."""
+    arrays = [np.asarray(values, float) for values in (torque, angle, velocity, phase)]
+    shapes = [values.shape for values in arrays]
+    if len(set(shapes)) > 1 or not all(np.isfinite(values).all() for values in arrays):
+        raise SpringfootError(
+            f"torque, angle, velocity and phase must be finite numbers of one shape, got shapes {shapes}"
+        )
+    edges = [require_within("a bound", bound, (0.0, 1.0)) for bound in bounds]
+    if len(edges) < 2 or edges != sorted(set(edges)):
+        raise SpringfootError(f"bounds must be two or more ascending stride phases, got {edges}")
+    require_number("margin", margin, 0.0, 0.5, "of a stride")
+    insides = [(arrays[3] >= low + margin) & (arrays[3] < high - margin) for low, high in pairwise(edges)]
+    return [
+        (span, (arrays[0][inside], arrays[1][inside], arrays[2][inside]))
+        for span, inside in zip(pairwise(edges), insides, strict=True)
+    ]

@@ -1,0 +1,247 @@
+"""Identification by perturbation: K and beta from how torque leaves its mean course when the body is pushed.
+
+Pushes at random throw each stride off the mean of all strides. At equal phase of the controller a spring's rest angle
+is the same in all of them and cancels; with d the deviation from the mean at that phase,
+
+    d torque = -K(phase) (d angle + beta d velocity).
+
+People's ankles were identified so in walking: Rouse et al. 2014, IEEE Trans. Neural Syst. Rehabil. Eng. 22:870-878. An
+undisturbed gait cannot say it (`identification`): its theta_eq moves with the angle, and any K fits some theta_eq.
+
+Phases are equal within bins of `BIN`, and the mean course is a straight line in each, since theta_eq moves on in it. K
+is linear between knots: a ramp taken for a constant leaks its own deviations into K. Intervals leave out one trial
+at a time (`jackknife`), so that errors may last a whole trial. And whatever else the torque might follow is asked: a
+joint that reacts to it is no spring, whatever K is fitted.
+
+What no such experiment can tell: a reflex of the joint's own angle at the same instant is a spring to it, a reaction to
+a state that was not recorded is noise, and noise of the angle makes K too small (`PushedSpring.attenuation`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_number, require_within
+
+from .jackknife import fit_by_trial
+from .spring_fit import Estimate
+
+BIN = 0.0025
+"""Width of the bins of equal phase [stride]."""
+LEAST_IN_BIN = 8
+"""Samples below which a bin is left out: two of them its straight line takes."""
+LEAST_TRIALS = 10
+"""Trials below which nothing is said, and below twice the number of further states: intervals rest on their number."""
+LEAST_EXPLAINED = 0.5
+"""Share of the torque's deviations that K and beta must explain for a spring: below, most of it is something else."""
+LEAST_PRECISION = 0.5
+"""Half of K's interval over K beyond which K is not known."""
+REACTION_LEVEL = 0.01
+"""Significance at which further states must matter for the verdict `REACTS` (of true springs, 3 % meet it alone)."""
+REACTION_SHARE = 0.02
+"""Share of all that is explained which they must explain beyond K and beta: a torque a seventh of the spring's."""
+
+SPRING, REACTS, UNKNOWN = "spring", "reacts: not a spring", "not identified"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushedSpring:
+    """What pushes tell of one joint in one phase; None where the data do not say."""
+
+    start: float
+    """Stride phase at which it begins."""
+    end: float
+    """Stride phase at which it ends."""
+    samples: int
+    """Samples in bins that are full enough."""
+    trials: int
+    """Trials they come from."""
+    stiffness: Estimate | None
+    """K [N m/rad], its mean over the samples."""
+    damping_time: Estimate | None
+    """beta [s], the ratio of the means of K beta and K; None where K may be 0."""
+    explained: float
+    """Share of the variance of the torque's deviations that K and beta explain [0..1]."""
+    reaction: float
+    """Share that further states explain beyond them [0..1]."""
+    reaction_p: float
+    """Probability of so much by chance if they do not matter; 1 where it cannot be computed."""
+    angle_spread: float
+    """Standard deviation of that part of the angle's deviations which velocity does not tell [rad]."""
+    verdict: str
+    """`SPRING`, `REACTS` or `UNKNOWN`."""
+    reason: str
+    """One line on why it is no spring; "" for one."""
+
+    def attenuation(self, angle_sd: float) -> float:
+        """Factor by which white noise of `angle_sd` [rad] on the angle shrinks K: s^2 / (s^2 + sd^2), s its spread."""
+        return self.angle_spread**2 / (self.angle_spread**2 + angle_sd**2)
+
+
+def identify_pushed(
+    torque: ArrayLike,
+    angle: ArrayLike,
+    velocity: ArrayLike,
+    phase: ArrayLike,
+    trial: ArrayLike,
+    bounds: Sequence[float],
+    *,
+    states: ArrayLike | None = None,
+    margin: float = 0.0,
+    spacing: float | None = 0.02,
+) -> tuple[PushedSpring, ...]:
+    """K, beta and a verdict for each phase of the stride, from many strides under random pushes.
+
+    Args:
+        torque: (n,) [N m], positive as the angle, of the same instants as
+        angle: (n,) [rad] and velocity: (n,) [rad/s].
+        phase: (n,) phase [0, 1) by which the rest angle moves; of a device, its controller's.
+        trial: (n,) which trial a sample is of; trials are independent of each other, samples of one need not be.
+        bounds: (P + 1,) ascending stride phases [0, 1]: P phases.
+        states: (n, q) what else the torque might follow, measured at the same instants, in any unit.
+        margin: part of the stride left out at both ends of each phase.
+        spacing: K is linear between knots at most this part of the stride apart; None: constant in each phase.
+
+    Returns:
+        P results, in the order of `bounds`. Raises `SpringfootError` for bad arrays or bounds.
+    """
+    data = _checked(torque, angle, velocity, phase, trial, states)
+    edges = [require_within("a bound", bound, (0.0, 1.0)) for bound in bounds]
+    if len(edges) < 2 or edges != sorted(set(edges)):
+        raise SpringfootError(f"bounds must be two or more ascending stride phases, got {edges}")
+    require_number("margin", margin, 0.0, 0.5, "of a stride")
+    if spacing is not None:
+        require_number("spacing", spacing, 0.0, 1.0, "of a stride", above=True)
+    return tuple(_phase_spring(data, low, high, margin, spacing) for low, high in pairwise(edges))
+
+
+class _Data(NamedTuple):
+    """Columns of n samples."""
+
+    torque: NDArray
+    angle: NDArray
+    velocity: NDArray
+    phase: NDArray
+    trial: NDArray
+    states: NDArray
+    """(n, q)."""
+
+
+def _checked(
+    torque: ArrayLike,
+    angle: ArrayLike,
+    velocity: ArrayLike,
+    phase: ArrayLike,
+    trial: ArrayLike,
+    states: ArrayLike | None,
+) -> _Data:
+    arrays = tuple(np.asarray(values, float) for values in (torque, angle, velocity, phase, trial))
+    shapes = [values.shape for values in arrays]
+    if len(set(shapes)) > 1 or len(shapes[0]) != 1 or not all(np.isfinite(values).all() for values in arrays):
+        raise SpringfootError(
+            f"torque, angle, velocity, phase and trial must be finite numbers, one a sample, got shapes {shapes}"
+        )
+    more = np.empty((len(arrays[0]), 0)) if states is None else np.asarray(states, float)
+    if more.ndim != 2 or len(more) != len(arrays[0]) or not np.isfinite(more).all():
+        raise SpringfootError(f"states must be finite numbers ({len(arrays[0])}, q), got shape {more.shape}")
+    torque, angle, velocity, phase, trial = arrays
+    return _Data(torque, angle, velocity, phase, np.unique(trial, return_inverse=True)[1], more)
+
+
+def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
+    """The result of one phase."""
+    low_in, high_in = low + margin, high - margin
+    inside = np.flatnonzero((data.phase >= low_in) & (data.phase < high_in))
+    cell = np.unique(((data.phase[inside] - low_in) / BIN).astype(int), return_inverse=True)[1]
+    full = np.bincount(cell)[cell] >= LEAST_IN_BIN if len(cell) else np.empty(0, bool)
+    inside, cell = inside[full], np.unique(cell[full], return_inverse=True)[1]
+    phase, trial = data.phase[inside], np.unique(data.trial[inside], return_inverse=True)[1]
+    trials = int(trial.max()) + 1 if len(trial) else 0
+    known = {"start": low, "end": high, "samples": len(inside), "trials": trials}
+    needed = max(LEAST_TRIALS, 2 * (data.states.shape[1] + 2))
+    if trials < needed:
+        return _unknown(known, f"{trials} trials are too few, {needed} are needed")
+    torque, angle, velocity, *states = (
+        _deviation(column, phase, cell)
+        for column in (data.torque[inside], data.angle[inside], data.velocity[inside], *data.states[inside].T)
+    )
+    bends = [_deviation(bend, phase, cell) for bend in (angle**2, angle * np.abs(angle))]
+    hats = _hats(phase, low_in, high_in, spacing)
+    spread = float(np.sqrt(np.mean((angle - velocity * (angle @ velocity) / max(velocity @ velocity, 1e-300)) ** 2)))
+    springs = np.concatenate([hats * -angle[:, None], hats * -velocity[:, None]], 1)
+    spent = 2 * (int(cell.max()) + 1)
+    fit = fit_by_trial(springs, torque, trial, spent)
+    wide = fit_by_trial(np.column_stack([springs, *states, *bends]), torque, trial, spent)
+    if fit is None or wide is None:
+        return _unknown(known, "angle and velocity move too little, or as one, to tell K from beta")
+    weights = hats.mean(0)
+    columns = len(weights)
+    stiffness, once = fit.coefficients[:columns] @ weights, fit.without[:, :columns] @ weights
+    damping, damping_once = fit.coefficients[columns:] @ weights, fit.without[:, columns:] @ weights
+    K = fit.interval(stiffness, once)
+    bounded = K.low > 0 or K.high < 0
+    reaction, chance = max(wide.explained - fit.explained, 0.0), wide.chance(2 * columns)
+    verdict, reason = _verdict(K, fit.explained, reaction, chance)
+    return PushedSpring(
+        **known,
+        stiffness=K,
+        damping_time=fit.interval(damping / stiffness, damping_once / once) if bounded else None,
+        explained=fit.explained,
+        reaction=reaction,
+        reaction_p=chance,
+        angle_spread=spread,
+        verdict=verdict,
+        reason=reason,
+    )
+
+
+def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> tuple[str, str]:
+    if chance < REACTION_LEVEL and reaction >= REACTION_SHARE * (explained + reaction):
+        return REACTS, f"further states explain {100 * reaction:.0f} % of the torque's deviations beyond K and beta"
+    if K.value + 2 * (K.high - K.value) < 0 and explained >= REACTION_SHARE:
+        return REACTS, "the torque grows with the angle"
+    if K.low <= (1 - LEAST_PRECISION) * K.value:
+        return UNKNOWN, f"K is known to ±{(K.high - K.low) / 2:.0f} N m/rad only"
+    if explained < LEAST_EXPLAINED:
+        return UNKNOWN, f"K and beta explain {100 * explained:.0f} % of the torque's deviations"
+    return SPRING, ""
+
+
+def _unknown(known: dict[str, float], reason: str) -> PushedSpring:
+    return PushedSpring(
+        **known,  # type: ignore[arg-type]
+        stiffness=None,
+        damping_time=None,
+        explained=0.0,
+        reaction=0.0,
+        reaction_p=1.0,
+        angle_spread=0.0,
+        verdict=UNKNOWN,
+        reason=reason,
+    )
+
+
+def _deviation(values: NDArray, phase: NDArray, cell: NDArray) -> NDArray:
+    """(n,) minus the straight line over `phase` through the values of each `cell`."""
+
+    def centred(column: NDArray) -> NDArray:
+        return column - (np.bincount(cell, column) / np.bincount(cell))[cell]
+
+    moved, values = centred(phase), centred(values)
+    spread = np.bincount(cell, moved**2)
+    slope = np.bincount(cell, moved * values) / np.where(spread > 1e-18, spread, np.inf)
+    return values - slope[cell] * moved
+
+
+def _hats(phase: NDArray, low: float, high: float, spacing: float | None) -> NDArray:
+    """(n, knots) weights of a piecewise linear function's values at its evenly spaced knots."""
+    if spacing is None:
+        return np.ones((len(phase), 1))
+    pieces = max(1, int(np.ceil((high - low) / spacing - 1e-9)))
+    place = np.clip((phase - low) / (high - low) * pieces, 0, pieces)
+    return np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(pieces + 1)))

@@ -1,0 +1,255 @@
+"""Joint stiffness: equation (4) of the thesis, K = d tau / d theta, and schedules of it over the stride.
+
+Angle and torque of ankle and toe over one stride -> gait events -> a straight line between each two -> springs.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_within
+
+from ..body.body import Body
+from ..body.tissue import TOE_STIFFNESS
+from ..people.human import human_gait
+
+SPRINGS = ("ankle", "toe")
+"""The joints of a schedule, in the order of the last axis of its arrays."""
+LOWEST_STIFFNESS = (20.0, 5.0)
+"""Stiffness of ankle and toe in swing [N m/rad] for 1.70 m and 63 kg; chosen, the least that an action sets by default;
+the thesis says 0."""
+STIFFNESS_RANGE = (0.0, 1e5)
+"""Accepted stiffnesses of a schedule [N m/rad]; chosen."""
+ANGLE_RANGE = (-np.pi, np.pi)
+"""Accepted equilibrium angles of a schedule [rad]."""
+HEEL_OFF_RISE = 0.05
+"""Part of the toe's rise, from its lowest angle in stance to its largest, at which the heel is off [-]; chosen."""
+
+
+class Segment(NamedTuple):
+    """A spring that holds from one stride phase to that of the next segment."""
+
+    start: float
+    """Stride phase [0, 1) of this leg at which it begins."""
+    stiffness: float
+    """K [N m/rad]."""
+    equilibrium: float
+    """theta_eq [rad]; dorsiflexion, toe up positive."""
+
+
+@dataclass(frozen=True)
+class StiffnessSchedule:
+    """Piecewise constant springs over the stride: tau = K (theta_eq - theta), positive as the angle.
+
+    Each joint's segments ascend in phase; before the first one, the last one of the previous stride still holds. Raises
+    `SpringfootError` for segments out of order, of bad numbers, or missing.
+    """
+
+    ankle: tuple[Segment, ...]
+    toe: tuple[Segment, ...]
+
+    def __post_init__(self) -> None:
+        for joint in SPRINGS:
+            segments = tuple(_segment(joint, entry) for entry in getattr(self, joint))
+            starts = [segment.start for segment in segments]
+            if not segments or starts != sorted(set(starts)):
+                raise SpringfootError(f"{joint} segments must ascend in phase, at least one, got starts {starts}")
+            object.__setattr__(self, joint, segments)
+
+    def at(self, phase: ArrayLike) -> tuple[NDArray, NDArray]:
+        """K [N m/rad] and theta_eq [rad] at stride phases of any shape, each (..., 2) for ankle and toe."""
+        phase = np.mod(np.asarray(phase, float), 1.0)
+        stiffness, equilibrium = np.empty((2, *phase.shape, len(SPRINGS)))
+        for column, joint in enumerate(SPRINGS):
+            starts, springs, rests = np.array(getattr(self, joint)).T
+            # Before the first start the index is -1: the last segment of the previous stride.
+            index = np.searchsorted(starts, phase, side="right") - 1
+            stiffness[..., column], equilibrium[..., column] = springs[index], rests[index]
+        return stiffness, equilibrium
+
+    def to_json(self) -> dict[str, list[list[float]]]:
+        """Plain lists: {"ankle": [[start phase, K, theta_eq], ...], "toe": [...]}."""
+        return {joint: [list(segment) for segment in getattr(self, joint)] for joint in SPRINGS}
+
+    @classmethod
+    def from_json(cls, data: object) -> "StiffnessSchedule":
+        """The inverse of `to_json`; `SpringfootError` if `data` is not of that form."""
+        if not isinstance(data, dict) or set(data) != set(SPRINGS):
+            raise SpringfootError(f"a stiffness schedule must be an object with keys ankle and toe, got {data!r:.80}")
+        for joint, segments in data.items():
+            if not isinstance(segments, (list, tuple)):
+                raise SpringfootError(f"{joint} must be a list of [phase, N m/rad, rad], got {segments!r:.80}")
+        return cls(*(tuple(data[joint]) for joint in SPRINGS))
+
+
+def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: float = 0.0) -> tuple[float, float]:
+    """Equation (4): the spring (K [N m/rad], theta_eq [rad]) of a straight line in the angle-torque plane.
+
+    `start`, `end`: (angle [rad], torque [N m]), torque positive as the angle, so that K = -d tau / d theta and the
+    line is tau = K (theta_eq - theta). A line that no spring can follow, falling less than `lowest` or not falling at
+    all (torque growing with the angle, or changing at a standing angle), gets K = `lowest` through its mid-point.
+    """
+    (first_angle, first_torque), (last_angle, last_torque) = start, end
+    turned, lost = last_angle - first_angle, first_torque - last_torque
+    stiffness = lost / turned if abs(turned) > 1e-6 else 0.0
+    stiffness = max(stiffness, lowest)
+    if stiffness == 0.0:
+        return 0.0, (first_angle + last_angle) / 2
+    return stiffness, (first_angle + last_angle) / 2 + (first_torque + last_torque) / 2 / stiffness
+
+
+def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
+    """Stride phases of heel strike, foot flat, maximum dorsiflexion and toe-off, in this order, from the ankle angle.
+
+    `phase` (n,) ascends from 0, heel strike, at least to `toe_off`; `angle` (n,) [rad], dorsiflexion positive. Foot
+    flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has its foot flat
+    at heel strike, one that only plantarflexes its maximum too. Raises `SpringfootError` for curves that do not fit.
+    """
+    phase, angle = _stance(phase, angle, toe_off)
+    top = int(angle.argmax())
+    dip = int(angle[: top + 1].argmin())
+    return {
+        "heel_strike": float(phase[0]),
+        "foot_flat": float(phase[dip]),
+        "maximum_dorsiflexion": float(phase[top]),
+        "toe_off": float(phase[-1]),
+    }
+
+
+def toe_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
+    """Stride phases of heel strike, heel-off, maximum dorsiflexion and toe-off, in this order, from the toe angle.
+
+    As `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of stance (a toe
+    lands raised, too); heel-off the last time before it at which the toe has made no more than `HEEL_OFF_RISE` of its
+    rise from the lowest angle since a quarter of stance, when the foot is flat.
+    """
+    phase, angle = _stance(phase, angle, toe_off)
+    quarter, half = np.searchsorted(phase, [toe_off / 4, toe_off / 2])
+    top = int(half + angle[half:].argmax())
+    flat = angle[quarter : top + 1]
+    heel_off = int(quarter + np.flatnonzero(flat <= flat.min() + HEEL_OFF_RISE * (angle[top] - flat.min()))[-1])
+    return {
+        "heel_strike": float(phase[0]),
+        "heel_off": float(phase[heel_off]),
+        "maximum_dorsiflexion": float(phase[top]),
+        "toe_off": float(phase[-1]),
+    }
+
+
+def schedule_from_curves(
+    phase: ArrayLike,
+    toe_off: float,
+    ankle: tuple[ArrayLike, ArrayLike],
+    toe: tuple[ArrayLike, ArrayLike] | None = None,
+    *,
+    lowest: tuple[float, float] = (0.0, 0.0),
+    toe_stiffness: float = TOE_STIFFNESS,
+) -> StiffnessSchedule:
+    """Equation (4) on any curves, measured, planned or simulated: a straight line, one spring, between two events.
+
+    Args:
+        phase: (n,) stride phases, ascending from 0, heel strike, at least to `toe_off`.
+        toe_off: stride phase at which swing begins; springs then rest at 0 with the lowest stiffness.
+        ankle: angle (n,) [rad], dorsiflexion positive, and torque (n,) [N m], positive as the angle (a plantarflexion
+            moment with its sign turned).
+        toe: the same of the toe, up positive; None where no moment is known: `toe_stiffness` resting at 0 in stance.
+        lowest: stiffness of ankle and toe [N m/rad] in swing, below which no line falls; the thesis says 0. A line
+            no spring can follow takes it through its mid-point (`line_spring`).
+        toe_stiffness: [N m/rad], where `toe` is None.
+
+    Raises `SpringfootError` for curves that do not fit, or a rest angle beyond `ANGLE_RANGE` (a heavy load on a
+    line of low stiffness: give a higher `lowest`).
+    """
+    low_ankle, low_toe = (require_within("lowest", k, STIFFNESS_RANGE, "N m/rad") for k in lowest)
+    ankle_lines = _lines(ankle_events(phase, ankle[0], toe_off), phase, *ankle, low_ankle)
+    if toe is None:
+        toe_lines = [Segment(0.0, toe_stiffness, 0.0)]
+    else:
+        toe_lines = _lines(toe_events(phase, toe[0], toe_off), phase, *toe, low_toe)
+    return StiffnessSchedule(
+        (*ankle_lines, Segment(toe_off, low_ankle, 0.0)), (*toe_lines, Segment(toe_off, low_toe, 0.0))
+    )
+
+
+THESIS_SWING = ((45.0, 0.0), (25.0, 10.0))
+"""Swing springs of ankle and toe, (K [N m/rad] for 1.70 m and 63 kg, rest angle [deg]), that complete its lines.
+
+The toe joint rests 10 deg up, as people hold it; with an ankle of 45 or a toe of 25 N m/rad it then clears the floor,
+with the lowest of both it does so in about half of the walks. Resting at 0 it catches the floor, as a drop foot does,
+with springs of 200 and 50 N m/rad as well: K alone does not help (tests/agents/policies/test_baselines.py).
+"""
+PRINTED_SWING = tuple((k, 0.0) for k in LOWEST_STIFFNESS)
+"""As printed: the thesis gives swing no stiffness; the lowest that an ankle and a toe can have, resting at 0."""
+
+
+def thesis_schedule(
+    body: Body, speed: float = 1.2, swing: tuple[tuple[float, float], ...] = THESIS_SWING
+) -> StiffnessSchedule:
+    """The thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
+
+    Torques scale with mass x height from people's at `speed` [m/s]. Of the toe people's moment is not known: it has
+    `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. No line of the ankle falls below its `LOWEST_STIFFNESS`.
+    `swing` is (K [N m/rad, for 1.70 m and 63 kg], rest angle [deg]) of ankle and toe after toe-off.
+    """
+    human = human_gait(speed, body.height)
+    scale = body.stiffness_scale
+    phase = np.linspace(0.0, human.toe_off, 1001)
+    # The data count plantarflexion positive, the joint dorsiflexion.
+    torque = -human.mean("ankle_moment", phase) * body.total_mass * body.length_scale
+    stance = schedule_from_curves(
+        phase,
+        human.toe_off,
+        (human.mean("ankle", phase), torque),
+        lowest=(LOWEST_STIFFNESS[0] * scale, LOWEST_STIFFNESS[1] * scale),
+        toe_stiffness=TOE_STIFFNESS * scale,
+    )
+    ankle, toe = (Segment(human.toe_off, k * scale, radians(rest_deg)) for k, rest_deg in swing)
+    return StiffnessSchedule((*stance.ankle[:-1], ankle), (*stance.toe[:-1], toe))
+
+
+def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
+    """Phases and angles from heel strike to `toe_off`, its own sample the last."""
+    require_within("toe_off", toe_off, (0.0, 1.0))
+    phase, angle = _curves(phase, angle)
+    if not (len(phase) > 1 and phase[0] == 0.0 and np.all(np.diff(phase) > 0) and 0 < toe_off <= phase[-1]):
+        raise SpringfootError(f"phase must ascend from 0 to toe_off ({toe_off:g}) or beyond, got {phase!s:.60}")
+    inside = phase < toe_off
+    return np.append(phase[inside], toe_off), np.append(angle[inside], np.interp(toe_off, phase, angle))
+
+
+def _curves(*curves: ArrayLike) -> list[NDArray]:
+    """The curves as float arrays (n,), all finite and of the same length."""
+    arrays = [np.asarray(curve, float) for curve in curves]
+    shapes = [array.shape for array in arrays]
+    if len(shapes[0]) != 1 or len(set(shapes)) > 1 or not all(np.isfinite(array).all() for array in arrays):
+        raise SpringfootError(f"curves must be finite numbers, one a phase, got shapes {shapes}")
+    return arrays
+
+
+def _lines(
+    events: dict[str, float], phase: ArrayLike, angle: ArrayLike, torque: ArrayLike, lowest: float
+) -> list[Segment]:
+    """One segment from each event to the next; events that coincide leave no line between them."""
+    phases, angles, torques = _curves(phase, angle, torque)
+    times = list(events.values())
+    points = [(float(np.interp(time, phases, angles)), float(np.interp(time, phases, torques))) for time in times]
+    return [
+        Segment(time, *line_spring(start, end, lowest))
+        for (time, until), (start, end) in zip(pairwise(times), pairwise(points), strict=True)
+        if until > time
+    ]
+
+
+def _segment(joint: str, entry: object) -> Segment:
+    if not isinstance(entry, (list, tuple)) or len(entry) != 3:
+        raise SpringfootError(f"{joint} segment must be [phase, N m/rad, rad], got {entry!r:.80}")
+    start = require_within(f"{joint} segment start", entry[0], (0.0, 1.0))
+    if start == 1.0:
+        raise SpringfootError(f"{joint} segment start must be below 1, got 1")
+    stiffness = require_within(f"{joint} stiffness", entry[1], STIFFNESS_RANGE, "N m/rad")
+    return Segment(start, stiffness, require_within(f"{joint} equilibrium", entry[2], ANGLE_RANGE, "rad"))

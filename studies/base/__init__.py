@@ -1,0 +1,1 @@
+"""The parts of every study: flags, progress, files, intervals."""

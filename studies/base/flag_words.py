@@ -1,0 +1,96 @@
+"""What stands behind a flag on the command line -> the value of a setting of that type, or what is wrong with it."""
+
+from collections.abc import Callable
+from types import NoneType, UnionType
+from typing import Any, Final, Literal, Union, get_args, get_origin
+
+import tyro
+
+from springfoot.errors import quoted
+
+
+class _NotGiven:
+    def __repr__(self) -> str:
+        return "NOT_GIVEN"
+
+
+NOT_GIVEN: Final = _NotGiven()
+"""Default of a flag that may be left out."""
+_NONE = "None"
+_PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
+    int: (int, "a whole number"),
+    float: (float, "a number"),
+    str: (str, "a word"),
+}
+
+
+def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
+    """How tyro reads a flag of this type; the word `None` is a value of those that can be None, and of no others."""
+    inner = next((part for part in _parts(kind) if get_origin(part) is tuple), kind)
+    items = get_args(inner) if get_origin(inner) is tuple else ()
+    count: Any = "*" if items[1:] == (...,) else len(items) or 1
+    if inner is not kind and count != 1:
+        count = (1, count)  # None alone
+    return spec(lambda words: _read(kind, words), metavar_of(kind), count)
+
+
+def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro.constructors.PrimitiveConstructorSpec:
+    """A flag of `count` words that `read` makes a value of; its default is `NOT_GIVEN`."""
+    return tyro.constructors.PrimitiveConstructorSpec(
+        nargs=count,
+        metavar=metavar,
+        instance_from_str=read,
+        is_instance=lambda value: True,
+        str_from_instance=lambda value: [str(value)],
+    )
+
+
+def metavar_of(kind: Any) -> str:
+    """How a value of this type is written on the command line."""
+    parts = get_args(kind)
+    if get_origin(kind) is Literal:
+        return "|".join(map(str, parts))
+    if get_origin(kind) is tuple:
+        return f"{metavar_of(parts[0])} ..." if parts[1:] == (...,) else " ".join(map(metavar_of, parts))
+    parts = [part for part in parts if part is not NoneType]
+    return "|".join(map(metavar_of, parts)) if parts else kind.__name__.upper()
+
+
+def _parts(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+
+
+def _read(kind: Any, words: list[str]) -> Any:
+    """The value, or `ValueError` that says what it must be."""
+    parts = _parts(kind)
+    if NoneType in parts and words == [_NONE]:
+        return None
+    for part in parts:
+        try:
+            return _one(part, words)
+        except ValueError:
+            continue
+    raise ValueError(f"must be {' or '.join(filter(None, map(_meaning, parts)))}, got {quoted(' '.join(words))}")
+
+
+def _one(kind: Any, words: list[str]) -> Any:
+    if get_origin(kind) is tuple:
+        items = get_args(kind)
+        kinds = [items[0]] * len(words) if items[1:] == (...,) else items
+        return tuple(_one(each, [word]) for each, word in zip(kinds, words, strict=True))
+    (word,) = words
+    if get_origin(kind) is Literal:
+        return get_args(kind)[[str(value) for value in get_args(kind)].index(word)]
+    if kind not in _PLAIN:
+        raise ValueError
+    return _PLAIN[kind][0](word)
+
+
+def _meaning(kind: Any) -> str:
+    if get_origin(kind) is Literal:
+        return f"one of {', '.join(map(str, get_args(kind)))}"
+    if get_origin(kind) is tuple:
+        items = get_args(kind)
+        count = "" if items[1:] == (...,) else f"{len(items)} "
+        return f"{count}{_PLAIN[items[0]][1].removeprefix('a ')}s"
+    return _PLAIN[kind][1] if kind in _PLAIN else ""

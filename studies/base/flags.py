@@ -1,0 +1,182 @@
+"""Command-line flags made from dataclasses of settings: their names, types and help stand once, in the dataclass."""
+
+import ast
+import dataclasses
+import inspect
+import json
+import textwrap
+from collections.abc import Mapping
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType, NoneType
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import tyro
+
+from springfoot.envs.settings.feet import FOOT_SETTINGS
+from springfoot.envs.settings.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
+from springfoot.errors import quoted
+from springfoot.files.json_file import json_fault, keys_once, read_object
+from springfoot.gait.people.own_data import read_gait
+from springfoot.gait.springs.foot_file import read_foot
+
+from .flag_words import NOT_GIVEN, flag_of, spec
+
+
+def _field_help(settings: type) -> dict[str, str]:
+    """The docstring below each field of a dataclass, on one line."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
+    return {
+        item.target.id: " ".join(str(doc.value.value).split())
+        for item, doc in pairwise(body)
+        if isinstance(item, ast.AnnAssign)
+        and isinstance(item.target, ast.Name)
+        and isinstance(doc, ast.Expr)
+        and isinstance(doc.value, ast.Constant)
+    }
+
+
+def _read_json(words: list[str]) -> dict[str, Any]:
+    """A dictionary from JSON text, or from the JSON file of that name."""
+    text = words[0]
+    if not text.lstrip().startswith("{"):
+        if not Path(text).is_file():
+            raise ValueError(f"must be JSON text in braces or the name of a JSON file, got {quoted(text)}")
+        return read_object(Path(text), "setting in JSON")
+    try:
+        value = json.loads(text, object_pairs_hook=keys_once)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"must be JSON, but {json_fault(error)}: {quoted(text)}") from None
+    return value
+
+
+def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
+    """The setting `human` from what `--human` is given; `trust_units` as in `read_gait`.
+
+    A file of `read_gait`; FILE:CONDITION for one of several in a CSV; several files of one walk with commas between.
+    Raises `SpringfootError` for a file that cannot be read.
+    """
+    if Path(words).is_file():
+        return read_gait(words, trust_units=trust_units).to_json()
+    if "," in words:
+        return read_gait(*words.split(","), trust_units=trust_units).to_json()
+    file, _, condition = words.rpartition(":")
+    if Path(file).is_file():
+        return read_gait(file, condition=condition, trust_units=trust_units).to_json()
+    return read_gait(words, trust_units=trust_units).to_json()
+
+
+def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | None:
+    return None if may_be_none and words == ["None"] else _read_json(words)
+
+
+def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
+    """A word as it is, a name of a file too; a dictionary from JSON text."""
+    return _read_json(words) if words[0].lstrip().startswith("{") else words[0]
+
+
+def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
+    """The foot that a flag is given: as it is, or that of the file of that name; no kind's name has a suffix."""
+    if isinstance(given, str) and (Path(given).is_file() or Path(given).suffix):
+        return read_foot(given)
+    return given
+
+
+FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]
+"""The type of a flag for a foot; `foot_given` makes a setting of what is given."""
+FILE_FLAGS = {"human": read_own_gait}
+"""Settings whose flag is the name of a file, and what makes the setting of it."""
+
+
+TRUST = "trust_units"
+"""Flag beside those of files: take them as they are."""
+_TRUST_FLAG = Annotated[
+    tyro.conf.FlagCreatePairsOff[bool],
+    tyro.conf.arg(help="Take the file of --human as it is, even if its units or signs look wrong."),
+]
+
+
+def optional_flags(
+    name: str,
+    settings: type,
+    defaults: Any,
+    leave_out: tuple[str, ...] = (),
+    themes: Mapping[str, str] = THEMES,
+    refused: Mapping[str, str] = MappingProxyType({}),
+) -> type:
+    """A dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
+
+    The help of each flag is the docstring of the field, with its value in `defaults` (an instance). Fields that name a
+    theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
+    `themes` has for it. Of the fields that the command refuses, by name, the help says `refused`: what is there for it.
+    """
+    help_of, flags, themed = _field_help(settings), [], {theme: [] for theme in themes}
+    hints, metadata = get_type_hints(settings), {item.name: item.metadata for item in dataclasses.fields(settings)}
+    for item_name, kind in hints.items():
+        if item_name not in leave_out:
+            shown = help_of[item_name], f"(default: {_words(getattr(defaults, item_name))})"
+            if item_name in refused:
+                shown = f"Refused: {refused[item_name]}.", ""
+            annotation = _optional_flag(item_name, kind, *shown)
+            its_group = themed.get(metadata[item_name].get("theme", ""), flags)
+            its_group.append((item_name, annotation, NOT_GIVEN))
+            if item_name in FILE_FLAGS:
+                its_group.append((TRUST, _TRUST_FLAG, False))
+    for theme, inside in themed.items():
+        if inside:
+            group = _flags_class(f"{name}{theme.title()}", inside, themes[theme])
+            flags.append((theme, tyro.conf.OmitArgPrefixes[group], dataclasses.field(default_factory=group)))
+    return _flags_class(name, flags, settings.__doc__)
+
+
+def _flags_class(name: str, flags: list[tuple[str, Any, Any]], doc: str | None) -> type:
+    namespace = {"__doc__": doc, "__module__": __name__}
+    return dataclasses.make_dataclass(name, flags, frozen=True, kw_only=True, namespace=namespace)
+
+
+def _words(default: Any) -> Any:
+    return " ".join(map(str, default)) if isinstance(default, tuple) else default
+
+
+def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
+    """The annotation of a flag for a setting of this type, with its help and the hint behind it."""
+    parts = get_args(kind)
+    if name in FILE_FLAGS:
+        how = spec(lambda words: words[0], "FILE")
+    elif dict not in (get_origin(kind), *map(get_origin, parts)):
+        how = flag_of(kind)
+    elif str in parts and get_origin(kind) is not dict:
+        how = spec(_read_word_or_json, "WORD|JSON|FILE")
+    else:
+        how = spec(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
+    return Annotated[Any, how, tyro.conf.arg(help=text, help_behavior_hint=hint)]
+
+
+def given(flags: Any) -> dict[str, Any]:
+    """The flags that were given, by name, themes aside and files read; raises `SpringfootError` for a bad file."""
+    values: dict[str, Any] = {}
+    for item in dataclasses.fields(flags):
+        value = getattr(flags, item.name)
+        if dataclasses.is_dataclass(value):
+            values |= given(value)
+        elif item.name in FILE_FLAGS and value is not NOT_GIVEN:
+            values[item.name] = FILE_FLAGS[item.name](value, getattr(flags, TRUST))
+        elif item.name != TRUST and value is not NOT_GIVEN:
+            values[item.name] = foot_given(value) if item.name in FOOT_SETTINGS else value
+    return values
+
+
+def _evaluated(theme: str) -> str:
+    """The help of a theme in an evaluation: which of its settings a trained policy brings with it."""
+    names = [name for name, its in THEME_OF.items() if its == theme and name != "episode_seconds"]  # given as --seconds
+    own = [f"--{name.replace('_', '-')}" for name in names if name not in CONDITION_SETTINGS]
+    if len(own) == len(names):
+        return f"{THEMES[theme]} A trained policy brings its own."
+    return f"{THEMES[theme]} Of these a trained policy brings {' and '.join(own) or 'nothing'} with it."
+
+
+EVALUATED = {theme: _evaluated(theme) for theme in THEMES}
+"""The help of each theme in an evaluation."""
+SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings(), themes=EVALUATED)
+"""Every environment setting as an optional flag, of an evaluation, in groups by theme (dataclass for `tyro`)."""

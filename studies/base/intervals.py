@@ -1,0 +1,54 @@
+"""How sure a number is: intervals of means and shares, and tests of two rows that walked the same episodes."""
+
+import numpy as np
+from scipy.stats import binomtest, bootstrap, t
+
+from springfoot.arrays import NDArray
+
+RESAMPLES = 10_000
+"""Resamples of the bootstrap."""
+LEVEL = 0.95
+"""Of every interval."""
+
+
+def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
+    """Percentile bootstrap interval of the mean of a sample (n,), from `RESAMPLES` resamples of a fixed seed.
+
+    Falls make returns two-humped and skewed, so no normal distribution is assumed. Of one value, that value. Of the
+    differences between two rows on the same episodes it is a paired interval.
+    """
+    if len(values) < 2:
+        return float(values[0]), float(values[0])
+    found = bootstrap(
+        (values,),
+        np.mean,
+        n_resamples=RESAMPLES,
+        confidence_level=level,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
+    """Student's interval of the mean of a few values (n,), as of training seeds; of one value, everything."""
+    if len(values) < 2:
+        return -np.inf, np.inf
+    mean, half = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    half *= float(t.ppf(0.5 + 0.5 * level, len(values) - 1))
+    return mean - half, mean + half
+
+
+def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
+    """Wilson's score interval of a share of which `count` of `total` were seen [0..1]."""
+    found = binomtest(count, total).proportion_ci(confidence_level=level, method="wilson")
+    return float(found.low), float(found.high)
+
+
+def paired_p(fell: NDArray, other: NDArray) -> float:
+    """McNemar's exact test: how likely two rows that fall equally often fall as unequally as these (n,) did.
+
+    Only episodes in which one row fell and the other did not tell; 1 without any.
+    """
+    alone, other_alone = int((fell & ~other).sum()), int((other & ~fell).sum())
+    return float(binomtest(alone, alone + other_alone).pvalue) if alone + other_alone else 1.0

@@ -1,0 +1,66 @@
+"""How the rows of ablations are measured: undisturbed and pushed, each result kept in a file until asked otherwise."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.files.writing import write_atomically
+
+from .study import OnProgress
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol:
+    """How every row is measured."""
+
+    episodes: int = 20
+    """Episodes of each row, and of each seed, undisturbed, and as many pushed."""
+    seconds: float = 20.0
+    """Length of each."""
+    push_newton: float = 150.0
+    """Size of the pushes [N]."""
+    seed: int = 0
+    """Episode i is seeded with seed + i."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+    progress: OnProgress = lambda seconds: None
+
+    def of(self, policy: str, given: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
+        """The policy's metrics `undisturbed` and `pushed`, with the default reward."""
+        metrics = {}
+        for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
+            wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})
+            acting, settings = prepare(policy, wanted, self.seed)
+            names = ("episodes", "seed", "threads", "progress")
+            how: dict[str, Any] = {name: getattr(self, name) for name in names} | {"legs": legs}
+            metrics[condition] = measure(record(acting, settings, name=policy, **how)).metrics
+        return metrics
+
+    @property
+    def sentence(self) -> str:
+        """What the columns are of."""
+        return (
+            f"Falls of {self.episodes} episodes × {self.seconds:g} s, undisturbed and pushed by "
+            f"±{self.push_newton:g} N, the same seeds in every row; all else undisturbed: return of the default "
+            "reward, speed, RMSE of thigh, knee and ankle to people's mean, vertical force peaks, r of both forces "
+            "with people's, largest ankle moment and where in the stride, RMSE of the CoM to the plan forward and of "
+            "the CoP to the planned ZMP in single support. What falls is measured before its falls."
+        )
+
+
+def measured(path: Path, how: Protocol, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """What `make` found, kept in the file `path` as long as neither `how` nor `key` changes."""
+    asked = json.loads(json.dumps({"how": {**vars(how), "threads": None, "progress": None}, "of": key}))
+    if path.is_file():
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["asked"] == asked:
+            return kept["metrics"]
+    metrics = make()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, (json.dumps({"asked": asked, "metrics": metrics}, indent=1) + "\n").encode())
+    return metrics

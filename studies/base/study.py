@@ -1,0 +1,160 @@
+"""One way to make a study: its flags, its progress, what it prints, and the files and the page it leaves behind.
+
+A study is a frozen dataclass of flags and a question: a subclass of `Study` (of `WalkingStudy` where policies walk
+episodes) gives the flags, their defaults and their `QUICK` values, and answers in `ask`. A line in
+`springfoot.cli.main.STUDIES` gives it its name on the command line. Nothing else is needed.
+"""
+
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import tyro
+from tqdm import tqdm
+
+from springfoot.envs.physics.simulation import MOST_THREADS
+from springfoot.envs.settings.checks import LONGEST_EPISODE
+from springfoot.errors import MOST_COUNT, SpringfootError, require_count, require_number
+from springfoot.files.markdown import write_section
+from springfoot.files.writing import whole_folder
+
+OnProgress = Callable[[float], object]
+"""Called with how much more is done: simulated seconds, or what `Study.UNIT` names."""
+QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What a study found."""
+
+    text: str
+    """Markdown that the command prints."""
+    files: Mapping[str, str | Callable[[Path], object]] = field(default_factory=dict)
+    """Name of a file in the study's folder -> its text, or a function that writes it at a path."""
+    sections: Mapping[str, str] = field(default_factory=dict)
+    """Name of a section of a page -> its markdown."""
+    failed: bool = False
+    """Whether a part of the study failed; the exit code is then 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A question, with the flags that every study has."""
+
+    quick: tyro.conf.FlagCreatePairsOff[bool] = False
+    """See that it runs, in a minute at most: tiny counts in place of what is flagged; its figures then mean nothing."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/STUDY-N)")] = None
+    """New folder for its CSV files and pictures."""
+    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """Also write its tables into this page, between the markers of its sections, and its pictures beside it."""
+    command: tyro.conf.Suppress[tyro.conf.Fixed[str]] = ""
+    """The command line that runs it; pages and files name it beside what it found."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {}
+    """Name of a flag -> its value with `--quick`."""
+    PAGED: ClassVar[bool] = True
+    """Whether it has a section for a page."""
+    UNIT: ClassVar[str] = "s"
+    """What its progress counts."""
+
+    def check(self) -> None:
+        """Raise `SpringfootError` for a bad flag; called before anything else."""
+
+    @property
+    def total(self) -> float | None:
+        """Progress at the end; None where it is not known."""
+        return None
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Do the study and return its answer; call `progress` on the way."""
+        raise NotImplementedError
+
+    def write_page(self, page: Path, answer: Answer) -> None:
+        """Write the answer's sections, each with the command that made it."""
+        for name, text in answer.sections.items():
+            write_section(page, name, f"{text}\n\nMade by `{without_places(self.command)}`.")
+
+    def run(self, name: str) -> int:
+        """Do the study, print its answer, write its files and its page; `name` is that of its command.
+
+        Returns the exit code: 0, or 1 where a part of the study failed. Raises `SpringfootError`, with nothing written,
+        for a bad flag, an `out` that exists, and a page in a folder that does not.
+        """
+        study = replace(self, **self.QUICK) if self.quick else self
+        study.check()
+        if study.out is not None and study.out.exists():
+            raise SpringfootError(f"{study.out} exists already: out must be a new folder")
+        if study.page is not None and not study.PAGED:
+            raise SpringfootError(f"page: {name} has no section to write")
+        if study.page is not None and not study.page.parent.is_dir():
+            raise SpringfootError(f"there is no folder {study.page.parent} for the page {study.page.name}")
+        with whole_folder(study.out, Path("runs", name)) as (folder, out):
+            with tqdm(
+                total=study.total, desc=name, unit=study.UNIT, unit_scale=True, leave=False, disable=None, delay=0.5
+            ) as bar:
+                answer = study.ask(bar.update)
+            if study.quick and study.QUICK:
+                sections = {section: f"{QUICK_NOTE}\n\n{text}" for section, text in answer.sections.items()}
+                answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}", sections=sections)
+            print(answer.text)
+            for file, content in answer.files.items():
+                _write(folder / file, content)
+        if study.page is not None:
+            study.write_page(study.page, answer)
+            for file, content in answer.files.items():
+                if file.endswith((".html", ".png")):
+                    _write(study.page.parent / file, content)
+        print(f"\nResults: {out} ({', '.join(answer.files)})")
+        return 1 if answer.failed else 0
+
+
+def without_places(command: str) -> str:
+    """A command without the folder, the page and the files it writes to, which are somebody's own."""
+    words = shlex.split(command)
+    for flag in ("--out", "--page", "--keep", "--feet"):
+        if flag in words:
+            place = words.index(flag)
+            del words[place : place + 2]
+    return shlex.join(words)
+
+
+def _write(path: Path, content: str | Callable[[Path], object]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if callable(content):
+        content(path)
+    else:
+        path.write_text(content, encoding="utf-8", newline="")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkingStudy(Study):
+    """A study whose rows are episodes of policies, the same seeds in every row."""
+
+    episodes: int = 20
+    """Episodes of each row."""
+    seconds: float = 20.0
+    """Length of each."""
+    seed: int = 0
+    """Episode i is seeded with seed + i, in every row."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
+
+    def check(self) -> None:
+        """Refuse counts and lengths out of range."""
+        for name, least, most in (("episodes", 1, MOST_COUNT), ("seed", 0, MOST_COUNT), ("threads", 1, MOST_THREADS)):
+            require_count(name, getattr(self, name), least, most)
+        require_number("seconds", self.seconds, 0, LONGEST_EPISODE, above=True, unit="s")
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """Arguments of `springfoot.evaluation.recording.recording.record`."""
+        return {"episodes": self.episodes, "seed": self.seed, "threads": self.threads}
+
+    @property
+    def what_ran(self) -> str:
+        """The episodes of each row, in words."""
+        return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"

@@ -1,0 +1,47 @@
+"""Studies that train: what they train is kept in a folder of its own, and gone on with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import tyro
+
+from springfoot.agents.training.config import TrainingConfig
+from springfoot.agents.training.multi_seed import train_missing
+from springfoot.errors import require_count
+
+from .study import WalkingStudy
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingStudy(WalkingStudy):
+    """A study of trainings. A seed that is finished is not trained again: it may be stopped and begun anew."""
+
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/trainings")
+    """Folder of all trainings; what is finished in it is kept."""
+    seeds: int = 3
+    """Seeds of each training, 0 and the next ones."""
+    timesteps: int | None = None
+    """Steps of 20 ms of each training, the preset's unless given."""
+    train: bool = True
+    """Train what is missing; without, use what there is."""
+
+    QUICK: ClassVar[dict[str, Any]] = {**WalkingStudy.QUICK, "seeds": 1, "timesteps": 8192}
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        super().check()
+        require_count("seeds", self.seeds)
+        if self.timesteps is not None:
+            require_count("timesteps", self.timesteps)
+
+    def train_missing(self, jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> bool:
+        """Train each configuration in its folder that is not finished there; returns whether a training failed.
+
+        Raises `KeyboardInterrupt` where the user stopped them.
+        """
+        status = train_missing(jobs) if self.train else "finished"
+        if status == "interrupted":
+            raise KeyboardInterrupt
+        return status == "failed"

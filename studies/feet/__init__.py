@@ -1,0 +1,1 @@
+"""Studies of feet: people adapted to a foot, prostheses, orthoses."""

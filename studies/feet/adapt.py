@@ -1,0 +1,202 @@
+"""How does a person walk who has adapted to a foot? Searches hips, knees and timing of both sides, for a given foot.
+
+    springfoot study adapt --foot rigid
+    springfoot study adapt --foot passive --design 1
+    springfoot study adapt --foot '{"kind": "weak", "strength": 0.3}' --name "weak 30 %" --searches 1
+
+The foot is the right one. With --design 1 the numbers of its kind (stiffness, rest angles) are searched for together
+with the person; the stiffness of an adaptive foot begins as that of the passive one. CMA-ES on simulated walks, as in
+`leg_tuning`; what a candidate pays stands in `person_cost`.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import radians
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import cma
+import numpy as np
+import tyro
+from tqdm import tqdm
+
+from springfoot.envs.control.leg_constants import TUNED_SPEED, leg_constants
+from springfoot.envs.control.person import person_constants
+from springfoot.envs.physics.model import LEFT, RIGHT
+from springfoot.envs.settings.adapted import without_person
+from springfoot.envs.settings.checks import LONGEST_EPISODE
+from springfoot.envs.settings.feet import SPRING_NUMBERS, foot_of, foot_setting, kind_of
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.files.markdown import table, text_of
+from springfoot.files.writing import csv_text, write_atomically
+
+from ..base.flags import FootFlag, foot_given
+from ..base.study import Answer, OnProgress, Study, without_places
+from ..searches.constants_file import ADAPTED_FEET, read_feet
+from . import person_cost
+from .foot_walks import ABOUT_STOPS, PUSH_NEWTON, SCHEDULE, TOLD, walked
+from .person_search import Person, PersonSearch
+
+
+def kept_name(name: str, search: int) -> str:
+    """What the foot of a search is called in the file: the first by its name alone."""
+    return name if search == 1 else f"{name}, search {search}"
+
+
+def beginning(foot: str | dict[str, Any], speed: float) -> Person:
+    """The person who has not adapted; the springs of an adaptive foot have the stiffness of a usual passive one."""
+    tuned = leg_constants("planned", "people", speed)
+    other = tuned
+    if kind_of(foot) == "adaptive" and foot_of(foot).schedule is None:
+        ankle, toe = (float(SPRING_NUMBERS[f"{joint}_stiffness"].usual or 0.0) for joint in ("ankle", "toe"))
+        other = replace(tuned, ankle_schedule=(ankle,) * 5, toe_schedule=toe)
+    return Person(sound=tuned, other=other, foot=foot)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adapt(Study):
+    """Search how a person adapts to a foot, and keep it in a file of adapted feet every ten generations."""
+
+    foot: FootFlag = "rigid"
+    """The right foot: a kind, JSON or a file, as `--right-foot`."""
+    name: str = ""
+    """What to call it; empty: its kind, and the speed where it is not 1.2 m/s."""
+    design: float = 0.0
+    """Search the foot's numbers as well, in steps this many times those of the legs (a stiffness by 15 %, the ankle's
+    rest angle by 1 degree, the toe's by 3); at 0 they stay."""
+    speed: float = TUNED_SPEED
+    """Walking speed [m/s]."""
+    start: str = ""
+    """Name of a foot of the file to start from, as its person walks at this speed, its numbers too where `foot` is but
+    its kind; empty: the committed walk of sound feet."""
+    searches: tuple[int, ...] = (1, 2)
+    """Which independent searches; search k has the seed `seed` + 1,000,000 (k - 1)."""
+    generations: int = 80
+    """Generations of each."""
+    population: int = 20
+    """Candidates in each."""
+    sigma: float = 0.5
+    """First spread, in units of the search."""
+    push_newton: float = 150.0
+    """Size of the pushes of the pushed walks [N]."""
+    bend_deg: float | None = None
+    """Range of the right toe beyond which a candidate pays for it [deg]; none unless given."""
+    bend_weight: float = 1.0
+    """How many times it pays for that."""
+    seed: int = 0
+    """Seed of the first search and its walks."""
+    threads: int = 1
+    """Threads of the physics."""
+    episodes: int = 20
+    """Episodes of the walks that are told of, undisturbed and pushed, not adapted and adapted."""
+    seconds: float = 20.0
+    """Length of each."""
+    feet: Annotated[Path, tyro.conf.arg(metavar="FILE")] = ADAPTED_FEET
+    """File of adapted feet to read and to write."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {
+        **{"generations": 2, "population": 4, "searches": (1,), "episodes": 1, "seconds": 6.0}
+    }
+    PAGED: ClassVar[bool] = False
+    UNIT: ClassVar[str] = " generations"
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        for count, least in (("generations", 1), ("population", 2), ("threads", 1), ("seed", 0), ("episodes", 1)):
+            require_count(count, getattr(self, count), least)
+        for search in self.searches:
+            require_count("searches", search, 1)
+        require_number("design", self.design, 0)
+        require_number("sigma", self.sigma, 0, above=True)
+        require_number("seconds", self.seconds, 0, LONGEST_EPISODE, above=True, unit="s")
+        require_number("push_newton", self.push_newton, 0, unit="N")
+        if self.bend_deg is not None:
+            require_number("bend_deg", self.bend_deg, 0, unit="deg")
+        require_number("bend_weight", self.bend_weight, 0)
+
+    @property
+    def total(self) -> float:
+        """Generations of all searches."""
+        return self.generations * len(self.searches)
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Search."""
+        foot = foot_setting("foot", foot_given(self.foot))
+        if isinstance(foot, dict):
+            foot = without_person(foot)
+        name = self.name or (kind_of(foot) if self.speed == TUNED_SPEED else f"{kind_of(foot)}, {self.speed:g} m/s")
+        begin = self._begin(foot)
+        lines, told, files = [], [], {}
+        walks = []
+        for search in self.searches:
+            label = kept_name(name, search)
+            person, own = self._search(begin, search, label, progress)
+            lines += [[search, *line] for line in own]
+            told.append(f"`{label}`: best {own[0][1]:.2f} to {own[-1][1]:.2f}, median {own[-1][2]:.2f}")
+            walks.append([f"{label}, not adapted", *self._walked("pretrained", person.foot)])
+            walks.append([label, *self._walked(SCHEDULE[0], person.setting(self.speed))])
+            files[f"foot-{search}.json"] = json.dumps(person.setting(self.speed), indent=1) + "\n"
+        head = ["", *(each.label for each in TOLD)]
+        text = (
+            f"{table(head, walks)}\n\n{self.episodes} episodes × {self.seconds:g} s; falls as shares, the last by "
+            f"±{PUSH_NEWTON:g} N; not adapted by `pretrained` on the same foot, adapted by the schedule found. "
+            f"{ABOUT_STOPS}\n\nPrices of candidates (studies/feet/person_cost.py): {'; '.join(told)}.\n\n"
+            "Walk with what was found:\n\n"
+        )
+        text += "\n".join(f"  --right-foot {self.out or 'FOLDER'}/{file}" for file in files)
+        files["generations.csv"] = csv_text(["search", "generation", "best", "median"], lines)
+        return Answer(text=text, files=files)
+
+    def _walked(self, policy: str, foot: str | dict[str, Any]) -> list[str]:
+        """What a walk on the right `foot` comes to, in a table's words."""
+        given = {"right_foot": foot, "speed": self.speed, "episode_seconds": self.seconds}
+        given |= SCHEDULE[1] if policy == SCHEDULE[0] else {}
+        found = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
+        return [text_of(found[each.key], each.pattern) for each in TOLD]
+
+    def _begin(self, foot: str | dict[str, Any]) -> Person:
+        if not self.start:
+            return beginning(foot, self.speed)
+        known = read_feet(self.feet)["feet"]
+        if self.start not in known:
+            raise SpringfootError(f"no foot {self.start!r} to start from in {self.feet}; there are {', '.join(known)}")
+        if foot == kind_of(known[self.start]):  # a word: the numbers found there
+            foot = without_person(known[self.start])
+        walked = BipedSettings(speed=self.speed, right_foot=known[self.start])
+        sound, other = (person_constants(walked, self.speed, side) for side in (LEFT, RIGHT))
+        return Person(sound=sound, other=other, foot=foot)
+
+    def _search(
+        self, begin: Person, search: int, label: str, progress: OnProgress
+    ) -> tuple[Person, list[tuple[int, float, float]]]:
+        settings = BipedSettings(speed=self.speed)
+        space, seed = PersonSearch(begin, self.speed, self.design), self.seed + 1_000_000 * (search - 1)
+        options = {"popsize": self.population, "seed": seed + 1, "CMA_diagonal": True, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(np.zeros(space.size), self.sigma, options)
+        bend = None if self.bend_deg is None else radians(self.bend_deg)
+        lines = []
+        for generation in range(self.generations):
+            vectors = strategy.ask()
+            people = [space.person(vector) for vector in vectors]
+            own = seed + 1000 * generation
+            paid = person_cost.cost(settings, people, own, self.threads, self.push_newton, bend, self.bend_weight)
+            strategy.tell(vectors, list(paid))
+            lines.append((generation + 1, float(paid.min()), float(np.median(paid))))
+            progress(1)
+            last = generation == self.generations - 1
+            if generation % 10 == 9 or last:
+                self._keep(label, space.person(strategy.mean), last)
+                tqdm.write(f"{label}: generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}")
+        return space.person(strategy.mean), lines
+
+    def _keep(self, label: str, found: Person, last: bool) -> None:
+        """Write what was found so far and, at the `last`, the command that finds it; with --quick nothing."""
+        if self.quick:
+            return
+        known = read_feet(self.feet)  # anew: another search may have written its own
+        known["feet"][label] = found.setting(self.speed)
+        known["found_by"].pop(label, None)
+        known["found_by"] |= {label: without_places(self.command)} if last else {}
+        write_atomically(self.feet, (json.dumps(known, indent=1) + "\n").encode())

@@ -1,0 +1,155 @@
+"""Walks on feet that differ, and what a designer of feet asks of them."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.envs.physics.model import JOINT_RANGE_DEG
+from springfoot.envs.settings.feet import SPRING_NUMBERS
+from springfoot.evaluation.numbers.metrics import Gait, measure
+from springfoot.evaluation.numbers.per_leg import asymmetry, leg_numbers
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record
+from springfoot.files.writing import write_atomically
+from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
+
+PUSH_NEWTON = 150.0
+"""Of the pushed walks [N]."""
+UNSEARCHED = 500
+"""Seed from which episodes are such as no search of `adapt` has walked: its own end in 0, 1 and 2 of a thousand."""
+SCHEDULE = "untrained", {"action_mode": "residual"}
+"""The person's own fixed schedule, as a policy and settings."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """A number of a walk in a table: its name in the CSV files, the head of its column, its format."""
+
+    key: str
+    label: str
+    pattern: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Told):
+    """A number that a designer asks for."""
+
+    better: int
+    """1 where more is better, -1 where less is."""
+
+
+ASKED = (
+    Asked(key="push_off_J_kg", label="push-off work J/kg", pattern=".2f", better=1),
+    Asked(key="sound_peak_bw", label="sound-side peak BW", pattern=".2f", better=-1),
+    Asked(key="step_asymmetry", label="step-length asymmetry", pattern=".3f", better=-1),
+    Asked(key="hip_work_J_kg_m", label="hip work J/kg/m", pattern=".2f", better=-1),
+    Asked(key="cost_of_transport", label="cost of transport", pattern=".3f", better=-1),
+    Asked(key="falls_pushed", label="falls, pushed", pattern=".2f", better=-1),
+)
+"""What the study of prostheses compares, all of the right foot but the sound side's force."""
+
+
+TOLD = (
+    Told(key="falls", label="falls", pattern=".2f"),
+    Told(key="speed_m_s", label="speed m/s", pattern=".2f"),
+    *ASKED,
+    Told(key="ankle_range_deg", label="ankle °", pattern=".1f"),
+    Told(key="toe_range_deg", label="toe °", pattern=".1f"),
+    Told(key="beyond_stop", label="at a stop", pattern=".1%"),
+)
+"""What tables show of a walk."""
+NAMES = [each.key for each in TOLD]
+"""Of those, part of what is kept under: where another number is told, walks are measured anew."""
+ABOUT_STOPS = (
+    "At a stop: share of time in which a joint of either leg is beyond its stop, which then carries load, in episodes "
+    "without a fall."
+)
+
+
+def numbers_of(gait: Gait) -> dict[str, float | None]:
+    """The numbers of an undisturbed walk, by their names in the CSV files; None where nothing walks."""
+    metrics, tally = gait.metrics, gait.tally
+    sound, other = leg_numbers(tally).values()
+    apart, steps = asymmetry({"left": sound, "right": other})["step_length"], metrics["step_length_m"]
+    found: dict[str, float | None] = {
+        "falls": metrics["falls"] / metrics["episodes"],
+        "speed_m_s": metrics["speed_m_s"]["mean"],
+        "push_off_J_kg": _sum(other["joint_work_J_kg"][joint]["positive"] for joint in ("ankle", "toe")),
+        "sound_peak_bw": sound["vertical_max_mean_bw"],
+        "step_asymmetry": None if apart is None else abs(apart),
+        "hip_work_J_kg_m": None,
+        "cost_of_transport": metrics["cost_of_transport"],
+        "ankle_range_deg": other["joint_range_deg"]["ankle"],
+        "toe_range_deg": other["joint_range_deg"]["toe"],
+        "clearance_m": other["toe_clearance_m"],
+    }
+    hips = _sum(leg["joint_work_J_kg"]["hip"]["positive"] for leg in (sound, other))
+    if hips is not None and steps:
+        found["hip_work_J_kg_m"] = hips / (2 * steps)
+    return found
+
+
+def _sum(values: Any) -> float | None:
+    values = list(values)
+    return None if None in values else float(sum(values))
+
+
+def walked(
+    policy: str, given: Mapping[str, Any], push_newton: float = PUSH_NEWTON, **how: Any
+) -> dict[str, float | None]:
+    """`numbers_of` a policy's walk, `beyond_stop`, and `falls_pushed` [0..1] of the same episodes pushed; `how` as for
+    `record`.
+
+    Episodes in which it falls count until they fall.
+    """
+    found: dict[str, float | None] = {}
+    for push in (0.0, push_newton):
+        acting, settings = prepare(policy, {**given, "push_newton": push})
+        recording = record(acting, settings, name=policy, **how)
+        if push:
+            found["falls_pushed"] = float(np.mean(recording.fall_reason != ""))
+        else:
+            found |= {**numbers_of(measure(recording)), "beyond_stop": beyond_stop(recording)}
+    return found
+
+
+def beyond_stop(recording: Recording) -> float | None:
+    """Share of time after `WARM_UP` in which a joint of either leg is beyond its stop, of the episodes without a fall;
+    None of no time."""
+    low, high = np.deg2rad(JOINT_RANGE_DEG).T
+    angle = recording.series["angle"][recording.fall_reason == "", round(WARM_UP / TICK) :]
+    return float(((angle < low) | (angle > high)).any((-2, -1)).mean()) if angle.size else None
+
+
+def for_body(foot: Mapping[str, Any], height: float, mass: float) -> dict[str, Any]:
+    """The foot for another body: its own springs as much stiffer as the body's mass x height is larger."""
+    ratio = height * mass / (REFERENCE_HEIGHT * REFERENCE_MASS)
+    stiff = {
+        key: round(float(np.clip(value * ratio, SPRING_NUMBERS[key].low, SPRING_NUMBERS[key].high)), 3)
+        for key, value in foot.items()
+        if key in SPRING_NUMBERS and key.endswith("_stiffness")
+    }
+    return {**foot, **stiff}
+
+
+class Kept:
+    """Numbers by what was asked, kept in a file: a study that is stopped goes on."""
+
+    def __init__(self, path: Path | None):
+        self._path, self._known = path, {}
+        if path is not None and path.is_file():
+            self._known = json.loads(path.read_text(encoding="utf-8"))
+
+    def get(self, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """What `make` found for `key`, a JSON value."""
+        text = json.dumps(key, sort_keys=True)
+        if text not in self._known:
+            self._known[text] = make()
+            if self._path is not None:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                write_atomically(self._path, (json.dumps(self._known, indent=1) + "\n").encode())
+        return self._known[text]

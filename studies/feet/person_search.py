@@ -1,0 +1,98 @@
+"""The person who adapts to a foot, and the foot's own numbers, as a vector that a search moves."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.leg_constants import LegConstants, constants_from
+from springfoot.envs.control.person import HELD_BY_SOUND
+from springfoot.envs.physics.foot import INTACT, Feet
+from springfoot.envs.settings.adapted import ADAPTED, LEGS
+from springfoot.envs.settings.feet import KINDS, SPRING_NUMBERS, foot_of, kind_of
+
+from ..searches.leg_search import GAIN_STEP, Search
+
+OF_MUSCLES = ("ankle_knots_deg", "toe_flat_deg", "ankle_schedule", "toe_schedule")
+"""Constants that a leg whose ankle and toe are devices does not read."""
+NEVER = ("neutral_deg",)
+"""Those that no leg reads with planned springs."""
+ANGLE_STEP = {"ankle_deg": 1.0, "toe_deg": 3.0}
+"""One unit of the search for a foot's rest angle [deg]; for a stiffness it is `GAIN_STEP`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Person:
+    """A candidate: leg constants of both sides, and the foot to which they belong."""
+
+    sound: LegConstants
+    other: LegConstants
+    foot: str | dict[str, Any]
+    """A setting, without `adapted`."""
+
+    @property
+    def feet(self) -> Feet:
+        """A sound left foot, and this one on the right."""
+        return INTACT, foot_of(self.foot)
+
+    def setting(self, speed: float) -> dict[str, Any]:
+        """The foot as a setting, with `adapted` for `speed` [m/s]."""
+        foot = {"kind": self.foot} if isinstance(self.foot, str) else dict(self.foot)
+        legs = dict(zip(LEGS, (asdict(self.sound), asdict(self.other)), strict=True))
+        return foot | {ADAPTED: {f"{speed:g}": {leg: _listed(values) for leg, values in legs.items()}}}
+
+
+class PersonSearch:
+    """A person as a vector of unit steps from where the search began.
+
+    Args:
+        start: where it begins.
+        speed: for which the constants are [m/s].
+        design: how many units of the legs one of the numbers that the kind of foot has is worth; at 0 they stay.
+    """
+
+    def __init__(self, start: Person, speed: float, design: float):
+        self._start, self._design = start, design
+        self._legs = [Search(start.sound, speed), Search(start.other, speed)]
+        kind = kind_of(start.foot)
+        device = foot_of(start.foot).ankle.device is not None
+        skipped = [NEVER, NEVER + HELD_BY_SOUND + (OF_MUSCLES if device else ())]
+        self._free = [
+            np.array([name not in left_out for name in legs.names])
+            for legs, left_out in zip(self._legs, skipped, strict=True)
+        ]
+        self._numbers = tuple(KINDS[kind]) if design else ()
+        self._numbers = tuple(name for name in self._numbers if name in SPRING_NUMBERS and name != "damping_time")
+        self.size = sum(int(free.sum()) for free in self._free) + len(self._numbers)
+
+    def person(self, vector: NDArray) -> Person:
+        """The candidate at a vector (size,)."""
+        place, legs = 0, []
+        for search, free in zip(self._legs, self._free, strict=True):
+            own = np.zeros(search.size)
+            own[free] = vector[place : place + int(free.sum())]
+            place += int(free.sum())
+            legs.append(search.constants(own))
+        sound, other = legs
+        shared = {name: getattr(sound, name) for name in HELD_BY_SOUND}
+        other = constants_from(asdict(other) | shared)
+        return Person(sound=sound, other=other, foot=self._foot(vector[place:]))
+
+    def _foot(self, steps: NDArray) -> str | dict[str, Any]:
+        if not self._numbers:
+            return self._start.foot
+        foot: dict[str, Any] = (
+            {"kind": self._start.foot} if isinstance(self._start.foot, str) else dict(self._start.foot)
+        )
+        for name, step in zip(self._numbers, self._design * steps, strict=True):
+            known = SPRING_NUMBERS[name]
+            usual = float(foot.get(name, known.usual))
+            value = usual + ANGLE_STEP[name] * step if name in ANGLE_STEP else usual * np.exp(GAIN_STEP * step)
+            foot[name] = round(float(np.clip(value, known.low, known.high)), 3)
+        return foot
+
+
+def _listed(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}

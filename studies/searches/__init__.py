@@ -1,0 +1,1 @@
+"""Searches: leg constants, plans, a walk from the plan alone."""

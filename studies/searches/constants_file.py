@@ -1,0 +1,39 @@
+"""The files of constants that searches begin with and write to: `envs/control/legs.json`, and that of adapted feet."""
+
+import json
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from springfoot.errors import SpringfootError
+from springfoot.files.writing import write_atomically
+
+CONSTANTS = Path(str(resources.files("springfoot.envs.control") / "legs.json"))
+"""The package's own: in a clone, what is committed."""
+ADAPTED_FEET = CONSTANTS.with_name("adapted.json")
+"""Likewise, of people who have adapted to a foot."""
+
+
+def read_constants(path: Path) -> dict[str, Any]:
+    """A file of constants."""
+    return _read(path, "constants", "leg constants")
+
+
+def read_feet(path: Path) -> dict[str, Any]:
+    """A file of adapted feet; an empty one where there is none."""
+    return _read(path, "feet", "adapted feet") if path.exists() else {"found_by": {}, "feet": {}}
+
+
+def _read(path: Path, key: str, what: str) -> dict[str, Any]:
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        table = None
+    if not isinstance(table, dict) or not isinstance(table.get(key), dict):
+        raise SpringfootError(f"{path} is not a file of {what}")
+    return table
+
+
+def write_constants(path: Path, table: dict[str, Any]) -> None:
+    """Write a file of constants, whole or not at all."""
+    write_atomically(path, (json.dumps(table, indent=1) + "\n").encode())

@@ -1,0 +1,32 @@
+"""Leg constants that nobody tuned: where a search begins that is to know nothing."""
+
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.legs import KNOTS
+
+GENERIC = "generic"
+"""Name by which a search starts from them."""
+
+
+def generic_constants() -> LegConstants:
+    """No correction of any curve, all moments fed forward, the same stiff springs at every phase, an upright trunk."""
+    level, stiff = (0.0,) * len(KNOTS), (200.0, 200.0)
+    return LegConstants(
+        hip_knots_deg=level,
+        knee_knots_deg=level,
+        ankle_knots_deg=level,
+        hip_stiffness=stiff,
+        knee_stiffness=stiff,
+        feedforward=(1.0, 1.0, 1.0),
+        period_factor=1.0,
+        period_speed_gain=0.0,
+        trunk_pitch_deg=0.0,
+        trunk_stiffness=200.0,
+        trunk_damping=20.0,
+        speed_torque=0.0,
+        trunk_rise=0.05,
+        swing_speed_gain=0.0,
+        neutral_deg=(0.0, 0.0),
+        toe_flat_deg=0.0,
+        ankle_schedule=(200.0, 200.0, 200.0, 200.0, 200.0),
+        toe_schedule=30.0,
+    )

@@ -1,0 +1,249 @@
+"""What leg constants pay in the search of `leg_tuning`: how far their simulated walks are from people's and the plan's.
+
+`misses` is the one ruler: a vector of what a walk with the fixed schedule misses, each in units of its tolerance.
+`cost`, which generations are ranked by, is its length, and a price for falls: every candidate walks from random starts
+with and without pushes, and with springs that nobody tuned for it: constant stiffness, people's, the thesis's lines.
+`all_misses`, which the refinement squares, is the vector itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import astuple, replace
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+
+from springfoot.agents.policies.baselines import own_settings
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.reference_walk import FED
+from springfoot.envs.control.standing import SLOW_SPEED
+from springfoot.envs.physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES, TOE
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.gait.body.body import GRAVITY
+from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+from springfoot.gait.people.human import HumanGait
+from springfoot.gait.people.scores import force_features, stride_work, travel
+
+from .leg_walks import FOREIGN, SETTLED, foreign_springs, series, speed_of, walk
+from .walk_effort import effort_price
+
+Pays = Literal["likeness", "effort"]
+"""What an undisturbed walk pays for."""
+
+SCHEDULED, PUSHED, SET_OFF = 2, 3, 4
+"""Walks of each candidate with the schedule: undisturbed, pushed, starting to walk."""
+REFINED = ((0.25, 7), (0.75, 8), (0.25, 9))
+"""Walks of `all_misses`: stride phase at the start, seed."""
+UNEVENNESS = 0.002
+"""Of the ground [m]; on level ground a walk locks to its decisions every 20 ms, and misses jump with the constants."""
+REFINED_SECONDS, REFINED_SETTLED = 10.0, 4.0
+"""Their length, and when the strides that are measured begin [s]."""
+CURVES = ("thigh", "knee", "ankle", "toe", "grf_vertical", "grf_forward", "hip_moment", "knee_moment", "ankle_moment")
+"""People's curves that a walk is held against."""
+PLANNED = ("com_x", "com_z", "com_speed")
+"""What of the CoM is held against the plan."""
+TOLERANCE = {
+    "thigh": np.deg2rad(1.0),
+    "knee": np.deg2rad(1.9),
+    "ankle": np.deg2rad(1.2),
+    "toe": np.deg2rad(8.0),
+    "grf_vertical": 0.07,  # body weights
+    "grf_forward": 0.02,
+    "hip_moment": 0.11,  # N m/kg
+    "knee_moment": 0.09,
+    "ankle_moment": 0.09,
+    "com_x": 0.03,  # m, against the plan
+    "com_z": 0.01,
+    "com_speed": 0.06,  # m/s, forward, against the plan over the step
+    "cop": 0.025,  # m, against the plan's ZMP
+    "beyond_sd": 0.06,  # N m/kg, of the hip moment beyond 1.9 SD from people's
+    "late_hip_moment": 0.06,  # N m/kg, from LATE_SWING on, beyond people's largest then by more than 0.1
+    "speed": 0.02,  # m/s
+    "period": 0.02,  # share of the plan's stride time
+    "double_support": 0.02,  # s, against people's
+    "vertical": 0.03,  # body weights, each of the two peaks and the valley farther from people's than 0.05
+    "fore_aft": 0.01,  # body weights, braking and forward peak farther from people's than 0.03
+    "peak_moment": 0.05,  # N m/kg, of the ankle farther from people's than 0.07
+    "work": 0.02,  # J/kg a stride, of hip, knee, ankle, positive and negative: farther from people's than 0.03
+    "effort": 0.04,  # J/kg a stride: positive work of the leg beyond 1.2 of people's
+    "force_peak": 0.08,  # body weights, the largest 10 ms of a stride beyond people's peak by more than 0.07
+    "travel": 0.01,  # m a stance, of the sole on the floor
+    "unsteady": 0.05,  # SD of the vertical force over strides [body weights]
+    "ankle_r": 0.01,  # of the ankle's mean curve with people's, below 0.985
+    "foreign_speed": 0.15,  # m/s, of the walks with springs that nobody tuned
+}
+"""What counts as one, root mean square over the stride for a curve."""
+LATE_SWING = 0.8
+"""Stride phase from which the hip holds the leg back before it lands."""
+FOREIGN_SHARE = 0.3
+"""Weight of what is paid with springs that nobody tuned, but for the thesis's lines, whose weight is one; chosen: with
+all of it legs stand nearly any spring, and the knee of the walk with the schedule goes 5 degrees off people's."""
+FALL_COST = 30.0
+"""Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
+further costs proportionally less, down to a third."""
+
+
+def cost(
+    settings: BipedSettings,
+    candidates: Sequence[LegConstants],
+    seed: int,
+    threads: int,
+    push: float,
+    ease: float = 0.0,
+    foreign: float = 1.0,
+    pays: Pays = "likeness",
+    impact: float = 1.0,
+) -> NDArray:
+    """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks with
+    springs that nobody tuned; an undisturbed walk `pays` for what it misses, or for its effort, and for its `impact` at
+    this price (`walk_effort`)."""
+    springs, pushed_springs = foreign_springs(settings)
+    walks = SCHEDULED + len(springs)
+    settings = replace(settings, unevenness_m=UNEVENNESS)
+    total = np.zeros(len(candidates))
+    seeds = [seed + index % walks for index in range(walks * len(candidates))]
+    missing, biped, ticks = walk(settings, candidates, seeds, threads, ease, springs)
+    records = series(biped, ticks)
+    scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
+    speed = speed_of(records)
+    for index in range(walks * len(candidates)):
+        candidate = index // walks
+        if not scheduled[index]:
+            total[candidate] += foreign * FOREIGN_SHARE * _paid_with_foreign(missing[index], speed[index], settings)
+        elif missing[index] > 0:
+            total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
+        else:
+            paid = _paid(records, index, biped, pays, impact)
+            total[candidate] += (FALL_COST if paid is None else paid) / SCHEDULED
+    if settings.equilibrium == "planned" and settings.guide == "people":
+        lines = replace(settings, **own_settings("thesis", settings))
+        missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
+        speed = speed_of(series(biped, ticks))
+        total += [foreign * _paid_with_foreign(*each, settings) for each in zip(missing, speed, strict=True)]
+    if settings.speed <= SLOW_SPEED:  # the slowest set alone carries a body off that starts standing
+        seeds = [seed + index % SET_OFF for index in range(SET_OFF * len(candidates))]
+        standing = replace(settings, start="standing")
+        missing = walk(standing, candidates, seeds, threads, foreign=(), watched=False)[0]
+        total += FALL_COST * missing.reshape(len(candidates), SET_OFF).mean(1)
+    if push == 0:
+        return total
+    pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(pushed_springs)
+    seeds = [seed + index % walks for index in range(walks * len(candidates))]
+    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs, watched=False)[0]
+    missing = missing.reshape(len(candidates), walks)
+    fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
+    return total + FALL_COST * fallen
+
+
+def _paid(records: dict[str, NDArray], index: int, biped: Biped, pays: Pays, impact: float) -> float | None:
+    """What walk `index` pays; None if it takes too few strides."""
+    missed = misses(records, index, biped, SETTLED)
+    if missed is None:
+        return None
+    if pays == "likeness":
+        return float(np.linalg.norm(missed))
+    return effort_price(records, index, biped, SETTLED, missed, impact)
+
+
+def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:
+    """What a walk with springs that nobody tuned pays for a fall, or for its mean speed [m/s]."""
+    fall = missing * FALL_COST / len(FOREIGN)
+    return fall or abs(speed - settings.speed) / TOLERANCE["foreign_speed"]
+
+
+def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
+    """The misses of each candidate on the walks of `REFINED`; None if it falls in one of them."""
+    found: list[list[NDArray] | None] = [[] for _ in candidates]
+    for start, seed in REFINED:
+        own = replace(settings, start=start, unevenness_m=UNEVENNESS)
+        seeds = [seed] * len(candidates)
+        missing, biped, ticks = walk(own, candidates, seeds, threads, foreign=(), seconds=REFINED_SECONDS)
+        records = series(biped, ticks)
+        for index, own_misses in enumerate(found):
+            missed = None if missing[index] > 0 else misses(records, index, biped, REFINED_SETTLED)
+            if missed is None or own_misses is None:
+                found[index] = None
+            else:
+                own_misses.append(missed / np.sqrt(len(REFINED)))
+    return [None if each is None else np.concatenate(each) for each in found]
+
+
+def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float) -> NDArray | None:
+    """What walk `index` misses in strides that begin after `settled` [s], in tolerances; None if it takes too few."""
+    human, weight, tick = biped.human, biped.body.mass * GRAVITY, Biped.tick_dt
+    phase = PERCENT / 100
+    curves, periods, supports, travels = [], [], [], []
+    off_plan = record["com"][:, index] - record["planned_com"][:, index]
+    for side in range(len(SIDES)):
+        angle, moment, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
+        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
+        if len(strides) < 2:
+            return None
+        thigh = angle[:, HIP] - record["pitch"][:, index]
+        series = np.column_stack(
+            [
+                *(thigh, angle[:, KNEE], angle[:, ANKLE], angle[:, TOE]),
+                *(force[:, 1] / weight, force[:, 0] / weight),
+                *(-moment[:, joint] / biped.body.mass for joint in (HIP, KNEE, ANKLE)),
+                off_plan,
+                np.gradient(record["com"][:, index, 0], tick),
+                record["cop"][:, index] - record["ankle"][:, index, side],
+                record["work"][:, index, side].reshape(len(angle), -1) / tick / biped.body.mass,
+            ]
+        )
+        curves.append(on_percent(series, strides[:, 0], strides[:, 2], tick))
+        periods.append(strides[:, 2] - strides[:, 0])
+        supports.append(strides[:, 1] - strides[:, 0] - 0.5 * periods[-1])
+        for start, leave, _ in np.floor(strides / tick).astype(int):
+            sole = slice(start, leave + 1), index, side
+            travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
+    stride = np.concatenate(curves)
+    mean, period = stride.mean(0), np.mean(np.concatenate(periods))
+    theirs, their_work, band = _people(human)
+    off: dict[str, Any] = dict(zip(CURVES, (mean[:, : len(CURVES)] - theirs).T, strict=True))
+    speed = mean[:, len(CURVES) + 2].copy()
+    planned = np.array([0.0, 0.0, 1.0]) * biped.plan.com_velocity((2 * phase) % 1.0)[0][:, None]
+    off_com = (mean[:, len(CURVES) : len(CURVES) + len(PLANNED)] - planned).T
+    off |= dict(zip(PLANNED, off_com, strict=True))
+    step = phase < 0.5
+    off["cop"] = mean[step, len(CURVES) + len(PLANNED)] - biped.plan.zmp(2 * phase[step])
+    off["beyond_sd"] = _beyond(off["hip_moment"], band)
+    off = {name: values / np.sqrt(len(values)) for name, values in off.items()}
+    late = phase > LATE_SWING, CURVES.index("hip_moment")
+    off["late_hip_moment"] = np.maximum(mean[late] - theirs[late].max() - 0.1, 0.0)
+    off["speed"] = speed.mean() - biped.settings.speed
+    off["period"] = period / (2 * biped.plan.step_time) - 1
+    off["double_support"] = np.mean(np.concatenate(supports)) - (human.toe_off - 0.5) * human.stride_time
+    own, people = (astuple(force_features(*each[:, 4:6].T)) for each in (mean, theirs))
+    peaks, fore_aft = slice(0, 3), slice(3, 5)
+    off["vertical"], off["fore_aft"] = (
+        _beyond(np.subtract(own[part], people[part]), band) for part, band in ((peaks, 0.05), (fore_aft, 0.03))
+    )
+    ankle = CURVES.index("ankle_moment")
+    off["peak_moment"] = _beyond(mean[:, ankle].max() - theirs[:, ankle].max(), 0.07)
+    work = np.abs(mean[:-1, len(CURVES) + len(PLANNED) + 1 :].mean(0).reshape(len(JOINTS), 2)) * period
+    off["work"] = _beyond(work[: len(their_work)] - their_work, 0.03)
+    ankle_r = np.corrcoef(mean[:, CURVES.index("ankle")], theirs[:, CURVES.index("ankle")])[0, 1]
+    off["ankle_r"] = max(0.985 - ankle_r, 0.0)
+    off["effort"] = max(work[:, 0].sum() - 1.2 * their_work[:, 0].sum(), 0.0)
+    off["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - theirs[:, 4].max() - 0.07, 0.0))
+    off["travel"] = np.mean(travels)
+    off["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
+    return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
+
+
+def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
+    """What of a difference lies beyond a band about 0."""
+    return np.sign(difference) * np.maximum(np.abs(difference) - band, 0.0)
+
+
+@lru_cache(maxsize=16)
+def _people(human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
+    """(101, len(CURVES)) people's mean curves over the stride, (3, 2) positive and negative work of their hip, knee and
+    ankle in it [J/kg], from their mean power, and (101,) 1.9 SD of their hip moment."""
+    curves = np.stack([human.mean(name, PERCENT / 100) for name in CURVES], -1)
+    power = [human.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
+    work = [np.concatenate(stride_work(each, np.array([human.stride_time]))) for each in power]
+    return curves, np.stack(work), 1.9 * human.sd("hip_moment", PERCENT / 100)

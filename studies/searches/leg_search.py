@@ -1,0 +1,73 @@
+"""Leg constants as a vector of unit steps: what the searches of `leg_tuning` and `person_search` move."""
+
+from dataclasses import asdict
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from
+from springfoot.envs.control.legs import KNOTS
+from springfoot.gait.people.human import HumanGait, human_gait
+from springfoot.gait.springs.stiffness import LOWEST_STIFFNESS
+
+KNOT_STEP, GAIN_STEP = 2.0, 0.15
+"""One unit of the search: degrees of a knot, relative change of a gain."""
+ADDITIVE_STEP = {
+    "toe_flat_deg": 3.0,
+    "trunk_pitch_deg": 1.0,
+    "swing_speed_gain": 0.05,
+    "swing_place_gain": 0.2,
+    "speed_torque": 15.0,
+    "period_speed_gain": 0.03,
+}
+"""One unit of the search for constants that may change sign or vanish, in their own units."""
+LEAD_STEP = 0.005
+"""One unit of the search for what a whole target of hip, knee or ankle comes earlier [stride]. Along knots one by one a
+search does not find it: half a percent at hip and knee takes a degree off the knee of the planned walk at 1.2 m/s."""
+LED = {"hip_knots_deg": "thigh", "knee_knots_deg": "knee", "ankle_knots_deg": "ankle"}
+"""People's curves that come earlier, by their knots."""
+LEAST = {"ankle_schedule": LOWEST_STIFFNESS[0], "toe_schedule": LOWEST_STIFFNESS[1]}
+"""Least value of a constant [N m/rad]."""
+
+
+class Search:
+    """Constants as a vector of unit steps from where the search began; the last three are leads of whole targets.
+
+    `names` (size,) tells which constant a place moves; with `placing` one of them is the `swing_place_gain`, which a
+    body that follows people has not.
+    """
+
+    def __init__(
+        self,
+        start: LegConstants,
+        speed: float = TUNED_SPEED,
+        human: HumanGait | None = None,
+        *,
+        placing: bool = False,
+    ):
+        sought = {name: value for name, value in asdict(start).items() if placing or name != "swing_place_gain"}
+        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in sought.items()}
+        human = human or human_gait(speed)
+        self._led = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
+        self.names = tuple(name for name, value in self._start.items() for _ in value) + tuple(LED)
+        self.size = len(self.names)
+
+    def constants(self, vector: NDArray) -> LegConstants:
+        """The constants at a vector (size,)."""
+        values, place = {}, 0
+        leads = dict(zip(LED, vector[-len(LED) :], strict=True))
+        for name, start in self._start.items():
+            step = vector[place : place + start.size]
+            place += start.size
+            if name in LED:
+                value = start + KNOT_STEP * step + leads[name] * self._led[name]
+            elif name == "neutral_deg":
+                value = start + KNOT_STEP * step
+            elif name in ADDITIVE_STEP:
+                value = start + ADDITIVE_STEP[name] * step
+            else:
+                value = start * np.exp(GAIN_STEP * step)
+            if name in LEAST:
+                value = np.maximum(value, LEAST[name])  # an action sets no less
+            values[name] = [float(round(x, 5)) for x in value] if start.size > 1 else float(round(value[0], 5))
+        return constants_from(values)

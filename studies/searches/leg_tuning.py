@@ -1,0 +1,243 @@
+"""Finds the leg constants of `envs/control/legs.json`: CMA-ES on simulated walks, all candidates in one batch.
+
+    springfoot study leg-tuning --equilibrium planned --cadence people
+    springfoot study leg-tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
+
+Least squares on the same ruler may come first: they find the walk, the generations make it stand pushes. What a
+candidate pays stands in `leg_cost`. The result is a fit to people's curves, not a prediction; unless it follows the
+plan (`--guide plan`), or walks for least effort then (`--pays effort`).
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import cma
+import numpy as np
+import tyro
+from tqdm import tqdm
+
+from springfoot.arrays import NDArray
+from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name
+from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.settings.settings import BipedSettings, Feedforward, Guide
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.files.writing import csv_text
+from springfoot.gait.plan.plan import Cadence
+from springfoot.gait.plan.walk_style import least_work
+
+from ..base.study import Answer, OnProgress, Study
+from .constants_file import CONSTANTS, read_constants, write_constants
+from .generic_constants import GENERIC, generic_constants
+from .kept_search import asked_of, generations
+from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
+from .leg_search import Search
+
+DIFFERENCE = 0.08
+"""Step of the refinement's differences [units of the search]; chosen: less drowns in what a walk changes by itself."""
+STEEPEST = 5.0
+"""Largest derivative it believes [tolerances per unit]; beyond, the walk tipped over."""
+DAMPINGS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
+"""Dampings that a step of the refinement tries, over the last that served [-]; chosen."""
+LONGEST_STEP = 1.5
+"""Largest change of a constant in one of its steps [units of the search]; chosen."""
+KEPT = 0.17
+"""What a constant pays in the refinement for each unit that it leaves its start [tolerances]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegTuning(Study):
+    """Find leg constants by CMA-ES and write them into a file of constants, every ten generations and at the end."""
+
+    equilibrium: Literal["planned", "neutral"] = "planned"
+    """Which equilibrium the constants are for; angle and phase walk on those of planned."""
+    cadence: Cadence = "people"
+    """Which cadence they are for."""
+    speed: float = TUNED_SPEED
+    """Which speed they are for [m/s]."""
+    guide: Guide = "people"
+    """What they follow: people, or the plan alone, which is also what they then pay for."""
+    feedforward: Feedforward = "people"
+    """Whose moments are fed forward with them."""
+    start: str = ""
+    """Name of the constants to start from; empty: those to be replaced."""
+    generations: int = 150
+    """Generations of the search."""
+    population: int = 20
+    """Candidates in each."""
+    refinements: int = 0
+    """Steps of least squares before the generations."""
+    sigma: float = 0.5
+    """First spread, in units of the search."""
+    ease: int = 0
+    """Generations over which the foot's equilibrium goes from the planned one to its own: 0, at once."""
+    push_newton: float = 150.0
+    """Size of the pushes of the pushed walks [N]."""
+    pushed_from: int = 0
+    """Generation from which on there are pushed walks."""
+    foreign: float = 1.0
+    """Price of the walks with springs that nobody tuned; at 0 they count for nothing."""
+    pays: Pays = "likeness"
+    """What an undisturbed walk pays for: its distance from people, or the plan, or its own effort and impact."""
+    impact: float = 1.0
+    """Price of impact over that of effort, where walks pay for them."""
+    seed: int = 0
+    """Seed of the search and of the walks."""
+    threads: int = 2
+    """Threads of the physics."""
+    keep: Literal["constants", "second", "front"] = "constants"
+    """Where what is found is kept: as the constants that walk; as those of a second search, or of one at another price,
+    beside them."""
+    constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
+    """File of constants to read and to write."""
+    plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """With guide plan: file of the plan's style, in place of the package's."""
+    people_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File of people's data, in place of the package's."""
+    log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
+
+    QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2, "refinements": 0}
+    PAGED: ClassVar[bool] = False
+    UNIT: ClassVar[str] = " steps"
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        for count, least in (
+            *(("generations", 1), ("population", 2), ("refinements", 0)),
+            *(("threads", 1), ("seed", 0), ("ease", 0), ("pushed_from", 0)),
+        ):
+            require_count(count, getattr(self, count), least)
+        require_number("sigma", self.sigma, 0, above=True)
+        require_number("foreign", self.foreign, 0)
+        require_number("impact", self.impact, 0)
+        if self.pays == "effort" and self.refinements:
+            raise SpringfootError(f"refinements must be 0 where a walk pays for effort, got {self.refinements}")
+
+    @property
+    def total(self) -> float:
+        """Generations and steps of refinement."""
+        return self.generations + self.refinements
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Search.
+
+        Raises `SpringfootError`, with nothing written, for a file of another kind, and for constants to start from that
+        are not in it.
+        """
+        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward, self.guide)
+        known = read_constants(self.constants)["constants"]
+        if self.start == GENERIC:
+            known = known | {GENERIC: asdict(generic_constants())}
+        if (start := self.start or name) not in known:
+            raise SpringfootError(
+                f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
+            )
+        begin = constants_from(known[start])
+        settings = BipedSettings(
+            equilibrium=self.equilibrium,
+            cadence=self.cadence,
+            speed=self.speed,
+            feedforward=self.feedforward,
+            guide=self.guide,
+            plan_file=self.plan_file and str(self.plan_file),
+            people_file=self.people_file and str(self.people_file),
+            episode_seconds=REFINED_SECONDS + 1,
+        )
+        human = reference_walk_at(settings, self.speed, [begin]).human
+        told = ""
+        if self.refinements:
+            begin, misses = self._refined(begin, settings, lambda better: self._keep(name, better), progress)
+            told = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
+        search = Search(begin, self.speed, human, placing=self.guide == "plan")
+        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
+        lines = []
+
+        def price(generation: int, vectors: list[NDArray]) -> NDArray:
+            ease = max(0.0, 1.0 - generation / self.ease) if self.ease else 0.0
+            candidates = [search.constants(v) for v in vectors]
+            push = self.push_newton if generation >= self.pushed_from else 0.0
+            seed = self.seed + 1000 * generation
+            return cost(settings, candidates, seed, self.threads, push, ease, self.foreign, self.pays, self.impact)
+
+        asked = asked_of(self) | {"from": asdict(begin), "style": self._style()}
+        for generation, _, paid in generations(strategy, self.generations, price, self.log, asked):
+            lines.append([generation + 1, paid.min(), np.median(paid)])
+            progress(1)
+            if generation % 10 == 9 or generation == self.generations - 1:
+                self._keep(name, search.constants(strategy.mean))
+                tqdm.write(_told(*lines[-1]))
+        found = search.constants(strategy.mean)
+        text = f"{json.dumps({name: asdict(found)})}\n\n{told}{_told(*lines[-1])}"
+        return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
+
+    def _style(self) -> dict[str, Any] | None:
+        """The style of the plan that is followed; None where people are."""
+        return least_work(self.speed, self.plan_file).to_json() if self.guide == "plan" else None
+
+    def _refined(
+        self,
+        start: LegConstants,
+        settings: BipedSettings,
+        keep: Callable[[LegConstants], None],
+        progress: OnProgress,
+    ) -> tuple[LegConstants, list[float]]:
+        """The constants with the least squares of `leg_cost.all_misses` near `start`, and the length after each step.
+
+        Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
+        the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
+        """
+        human = reference_walk_at(settings, settings.speed, [start]).human
+        search = Search(start, settings.speed, human, placing=self.guide == "plan")
+
+        def missed(vectors: NDArray) -> list[NDArray | None]:
+            found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)
+            return [None if each is None else np.append(each, KEPT * v) for each, v in zip(found, vectors, strict=True)]
+
+        place, identity = np.zeros(search.size), np.eye(search.size)
+        (here,) = missed(place[None])
+        if here is None:
+            raise SpringfootError(
+                "the constants to start from fall, so that they cannot be refined: refinements must be 0"
+            )
+        lengths, damping = [float(np.linalg.norm(here))], 1.0
+        for _ in range(self.refinements):
+            there = missed(place + DIFFERENCE * identity)
+            columns = [np.zeros(len(here)) if each is None else (each - here) / DIFFERENCE for each in there]
+            slopes = np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST)
+            normal, downhill = slopes.T @ slopes, -slopes.T @ here
+            tried = []
+            for each in damping * DAMPINGS:
+                step = np.linalg.solve(normal + each * (identity + np.diag(np.diag(normal))), downhill)
+                step *= min(1.0, LONGEST_STEP / np.abs(step).max())
+                tried += [(each, place + part * step) for part in (1.0, 0.4)]
+            found = missed(np.array([vector for _, vector in tried]))
+            paid = [np.inf if each is None else float(np.linalg.norm(each)) for each in found]
+            best = int(np.argmin(paid))
+            better = found[best]
+            if better is not None and paid[best] < lengths[-1]:
+                (damping, place), here = tried[best], better
+                keep(search.constants(place))
+            else:
+                damping *= 10.0
+            lengths.append(float(np.linalg.norm(here)))
+            progress(1)
+        return search.constants(place), lengths
+
+    def _keep(self, name: str, found: LegConstants) -> None:
+        """Write what was found so far, and the command that does, into the file of constants; with --quick nothing."""
+        if self.quick:
+            return
+        known = read_constants(self.constants)  # anew: another search may have written its own
+        name = f"{name}, --foreign {self.foreign:g}" if self.keep == "front" else name
+        known.setdefault(self.keep, {})[name] = asdict(found)
+        label = f"{name}, second search" if self.keep == "second" else name
+        known.setdefault("found_by", {})[label] = self.command
+        write_constants(self.constants, known)
+
+
+def _told(generation: int, best: float, median: float) -> str:
+    return f"generation {generation}: best {best:.2f}, median {median:.2f}"

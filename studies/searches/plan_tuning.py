@@ -1,0 +1,215 @@
+"""Finds the styles of `gait/plan/least_work.json`: CMA-ES on plans, without a simulation or a curve of people's.
+
+    springfoot study plan-tuning --speed 1.2
+
+A plan has people's step length and time at a speed, as a planner may know them. All else is chosen by least effort of
+its own inverse dynamics (`springfoot.gait.plan.effort`), with the swing foot clear of the floor and joints within their
+range. The search begins at round numbers.
+"""
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import cma
+import numpy as np
+import tyro
+from tqdm import tqdm
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.files.writing import csv_text, write_atomically
+from springfoot.gait.body.body import HEEL_RADIUS, Body
+from springfoot.gait.people.human import human_gait
+from springfoot.gait.plan.effort import AS_IS, PER_DEGREE, PRICES, Effort, Muscle, effort_of
+from springfoot.gait.plan.plan import WalkPlan, plan_walk
+from springfoot.gait.plan.plan_gait import gait_of
+from springfoot.gait.plan.walk_style import STYLES, WalkStyle, least_work, style_from
+
+from ..base.study import Answer, OnProgress, Study
+from .kept_search import asked_of, generations
+from .prediction_table import numbers_of, prediction_table
+
+CHOICES: dict[str, tuple[float, float, float, float]] = {
+    "double_support": (0.2, 0.05, 0.06, 0.4),  # of the step time
+    "lowest": (0.5, 0.2, -0.5, 1.5),  # of double support
+    "zmp_from": (-0.02, 0.03, -0.08, 0.1),  # m from the ankle
+    "zmp_to": (0.14, 0.02, 0.0, 0.16),  # the front of the toe's contact
+    "zmp_way_1": (0.4, 0.1, 0.02, 0.97),  # of its travel
+    "zmp_way_2": (0.7, 0.1, 0.03, 0.98),
+    "rise": (0.5, 0.2, 0.0, 2.0),  # of the compass gait
+    "rise_again_1": (0.0, 0.15, -1.0, 1.0),  # of half of the rise
+    "rise_again_2": (0.0, 0.15, -1.0, 1.0),
+    "lean": (0.0, 0.02, -0.2, 0.2),  # rad
+    "knee": (0.1, 0.05, 0.02, 1.0),  # rad
+    "heel_strike_pitch": (0.3, 0.1, 0.01, 1.0),  # rad
+    "flat": (0.5, 0.15, 0.1, 1.0),  # of double support
+    "heel_off": (0.2, 0.1, 0.0, 0.6),  # of the step
+    "toe_off_pitch": (0.8, 0.2, 0.1, 2.0),  # rad
+    "roll_pitch": (0.3, 0.15, 0.0, 2.0),
+    "heel_rise_1": (0.3, 0.08, 0.05, 0.6),
+    "heel_rise_2": (1.5, 0.4, 0.0, 4.0),
+    "roll_power": (2.5, 0.5, 2.0, 9.0),  # below, the pitch's rate would jump
+    "via_forward_1": (0.25, 0.05, 0.0, 1.0),  # of the way of the ankle
+    "via_forward_2": (0.5, 0.05, 0.0, 1.0),
+    "via_forward_3": (0.75, 0.05, 0.0, 1.0),
+    "via_up_1": (0.15, 0.03, 0.0, 1.0),  # m
+    "via_up_2": (0.12, 0.02, 0.0, 1.0),
+    "via_up_3": (0.1, 0.02, 0.0, 1.0),
+    "via_pitch_1": (-0.5, 0.25, -2.0, 1.0),  # rad
+    "via_pitch_2": (-0.25, 0.15, -2.0, 1.0),
+    "via_pitch_3": (0.0, 0.15, -2.0, 1.0),
+    "toe_swing": (0.0, 0.1, -0.3, 1.0),  # rad
+}
+"""What is chosen: where the search begins, one unit of it, the least and the largest value."""
+GROUPS = {"via_forward": 3, "via_up": 3, "via_pitch": 3, "heel_rise": 2, "zmp_way": 2, "rise_again": 2}
+"""Of a style, the numbers that are chosen one by one."""
+LEAST_ADVANCE = 0.005
+"""Least part of its travel that the ZMP does in the second third of single support [-]; chosen."""
+LEAST_CLEARANCE = 0.015
+"""Least height of ball and heel in mid-swing [m at 1.70 m]; chosen, to clear uneven ground."""
+PER_METRE_LOW, PER_UNIT = 200.0, 10.0
+"""What a swing foot too low costs, and a choice outside its bounds squared; chosen."""
+IMPOSSIBLE = 30.0
+"""What a plan that cannot be costs, besides how far its choices are from the start; chosen."""
+
+
+def style_at(vector: NDArray) -> WalkStyle:
+    """The style at a vector of the search."""
+    values = {}
+    for (name, (start, unit, least, most)), step in zip(CHOICES.items(), vector, strict=True):
+        values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
+    groups = {name: [values.pop(f"{name}_{k + 1}") for k in range(count)] for name, count in GROUPS.items()}
+    travel, way = [values.pop("zmp_from"), values.pop("zmp_to")], groups["zmp_way"]
+    way[1] = max(way[1], way[0] + LEAST_ADVANCE)
+    both = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
+    walk = {field.name: both.pop(field.name) for field in fields(WalkStyle) if field.name in both}
+    return style_from(walk | {"foot": both})
+
+
+def vector_of(style: WalkStyle) -> NDArray:
+    """The vector of the search at a style of its own; the inverse of `style_at`."""
+    values: dict[str, Any] = style.to_json()
+    values |= values.pop("foot")
+    values["zmp_from"], values["zmp_to"] = values.pop("zmp_travel")
+    for name, count in GROUPS.items():
+        given = values.pop(name) or ()
+        if len(given) != count:
+            raise SpringfootError(f"a search cannot begin at a style with {len(given)} of {name}, it needs {count}")
+        values |= {f"{name}_{k + 1}": each for k, each in enumerate(given)}
+    return np.array([(values[name] - start) / unit for name, (start, unit, *_) in CHOICES.items()])
+
+
+def price(
+    body: Body, speed: float, vector: NDArray, weights: tuple[float, ...] = PRICES, muscle: Muscle = AS_IS
+) -> tuple[float, WalkPlan | None, Effort | None]:
+    """What the plan at a vector costs, the plan and its effort; none for a plan that cannot be.
+
+    `weights` are those of work, activation, its rate, and acceleration.
+    """
+    outside = sum(
+        max(0.0, least - start - unit * x, start + unit * x - most) ** 2
+        for (start, unit, least, most), x in zip(CHOICES.values(), vector, strict=True)
+    )
+    try:
+        plan = plan_walk(body, speed, style=style_at(vector))
+        effort = effort_of(plan, muscle)
+    except SpringfootError:
+        return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
+    lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())
+    low = max(0.0, -0.001 - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
+    paid = (
+        float(np.dot(weights, effort.terms))
+        + PER_METRE_LOW * low
+        + PER_DEGREE * effort.beyond_range
+        + PER_UNIT * outside
+    )
+    return paid, plan, effort
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanTuning(Study):
+    """Find the way to walk of least effort by CMA-ES on plans, and write it into a file of styles."""
+
+    speed: float = 1.2
+    """Speed [m/s] at 1.70 m."""
+    generations: int = 200
+    """Generations of the search."""
+    population: int = 20
+    """Candidates in each."""
+    sigma: float = 0.5
+    """First spread, in units of the search."""
+    seed: int = 0
+    """Seed of the search."""
+    weights: tuple[float, float, float, float] = PRICES
+    """Weights of work, of activation, of its rate, and of acceleration."""
+    tissue: float = 1.0
+    """Factor on passive moments of tissue."""
+    tendon: float = 1.0
+    """Factor on the give of the Achilles tendon."""
+    start: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File of styles to begin at, in place of round numbers."""
+    styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
+    """File of styles to write to."""
+    log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
+
+    QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4}
+    PAGED: ClassVar[bool] = False
+    UNIT: ClassVar[str] = " generations"
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        for count, least in (("generations", 1), ("population", 4), ("seed", 0)):
+            require_count(count, getattr(self, count), least)
+        require_number("sigma", self.sigma, 0, above=True)
+        for name in ("tissue", "tendon"):
+            require_number(name, getattr(self, name), 0)
+        for weight in self.weights:
+            require_number("weights", weight, 0)
+
+    @property
+    def total(self) -> float:
+        """Generations."""
+        return self.generations
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Search."""
+        body = Body()
+        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
+        begin = np.zeros(len(CHOICES)) if self.start is None else vector_of(least_work(self.speed, self.start))
+        strategy = cma.CMAEvolutionStrategy(begin, self.sigma, options)
+        lines, best = [], (np.inf, begin)
+
+        def priced(_: int, vectors: list[NDArray]) -> NDArray:
+            return np.array([self._price(body, vector)[0] for vector in vectors])
+
+        for generation, vectors, paid in generations(strategy, self.generations, priced, self.log, asked_of(self)):
+            best = min(best, (float(paid.min()), vectors[int(np.argmin(paid))]), key=lambda each: each[0])
+            lines.append([generation + 1, float(paid.min()), float(np.median(paid))])
+            progress(1)
+            if generation % 10 == 9:
+                tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
+        cost, plan, effort = self._price(body, best[1])
+        style = style_at(best[1])
+        self._keep(style)
+        text = f"{json.dumps(style.to_json())}\n\npaid {cost:.4f}: {effort}"
+        if plan is not None:
+            human = human_gait(self.speed)
+            columns = {"people": numbers_of(human, human), "the plan": numbers_of(gait_of(plan), human)}
+            text += f"\n\n{prediction_table(columns, ('the plan',))}"
+        return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
+
+    def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
+        muscle = Muscle(tissue=self.tissue, tendon=self.tendon)
+        return price(body, self.speed, vector, self.weights, muscle)
+
+    def _keep(self, style: WalkStyle) -> None:
+        """Write what was found, and the command that did, into the file of styles; with --quick nothing."""
+        if self.quick:
+            return
+        table = json.loads(self.styles.read_text(encoding="utf-8")) if self.styles.is_file() else {}
+        table.setdefault("styles", {})[f"{self.speed:g}"] = style.to_json()
+        table.setdefault("found_by", {})[f"{self.speed:g}"] = self.command
+        write_atomically(self.styles, (json.dumps(table, indent=1) + "\n").encode())

@@ -1,0 +1,223 @@
+"""A walk from body, plan and physics by one command: plan, legs that follow it, legs of least effort at three speeds,
+policy, and how it walks.
+
+    springfoot study predict
+
+Nothing that was found before takes part: the plan's search begins at round numbers, that of leg constants at `generic`
+ones, the policy untrained. Of people it knows what docs/prediction.md lists. What each stage finds is kept in the
+folder `runs`; after a stop the same command goes on, with the bits of one that nothing interrupted.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any, ClassVar
+
+import tyro
+
+from springfoot.agents.policies.policy import RUN
+from springfoot.agents.training.config import PRESETS, config_from_json
+from springfoot.agents.training.multi_seed import is_finished
+from springfoot.agents.training.run_record import read_record
+from springfoot.envs.control.leg_constants import constants_name
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.errors import SpringfootError, require_count
+from springfoot.files.locks import owned
+from springfoot.files.markdown import table
+from springfoot.files.writing import make_folder
+
+from ..base.protocol import Protocol, measured
+from ..base.study import Answer, OnProgress, WalkingStudy, without_places
+from .constants_file import read_constants, write_constants
+from .generic_constants import GENERIC
+from .leg_tuning import LegTuning
+from .plan_tuning import PlanTuning
+from .prediction_table import people_numbers, plan_numbers, prediction_table, walk_numbers
+
+FOUND = "found.json"
+"""In the folder, the plan's style and the leg constants: a `plan_file` of the settings."""
+SECTION = "PREDICTION"
+"""Of a page."""
+STAGE_PUSH = 100.0
+"""Size of the pushes of the third and fourth stage, of the training and of the second half of the evaluation [N];
+chosen."""
+FIRST_SPREAD, EFFORT_SPREAD = 0.5, 0.6
+"""First spread of the second and third stage [units of the search]; chosen: the third leaves the walk that was planned,
+and from a narrower spread it stays in a dearer one."""
+OTHER_SPEEDS, OTHER_SPREAD, OTHER_UNPUSHED = (0.9, 1.5), 0.3, 60
+"""Of the fourth stage: its speeds [m/s], first spread, and generations without pushes; chosen: constants of 1.2 m/s
+alone fall at 1.4."""
+STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push", "other"))
+"""Generations of the searches, in their order; the last for each of `OTHER_SPEEDS`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predict(WalkingStudy):
+    """Predict a walk from nothing: a plan of least effort, legs that follow it, and then walk by least effort
+    themselves, a policy; then evaluate."""
+
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
+    """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
+    plan_generations: int = 300
+    """Generations of the first stage, the plan of least effort."""
+    walk_generations: int = 100
+    """Generations of the second stage, leg constants of walks near the plan, without pushes."""
+    effort_generations: int = 300
+    """Generations of the third stage, leg constants of walks of least effort and impact."""
+    push_generations: int = 300
+    """Generations by which the third stage goes on with pushes."""
+    other_generations: int = 100
+    """Generations of the fourth stage, leg constants of a slower and of a faster walk of least effort, from those of
+    1.2 m/s; of each."""
+    population: int = 20
+    """Candidates in each generation."""
+    timesteps: int = PRESETS["predict"].timesteps
+    """Steps of the fifth stage, the training of a policy (preset `predict`)."""
+    search_seed: int = 0
+    """Seed of the searches and of the training."""
+
+    QUICK: ClassVar[dict[str, Any]] = {
+        **WalkingStudy.QUICK,
+        "plan_generations": 1,
+        "walk_generations": 1,
+        "effort_generations": 1,
+        "push_generations": 1,
+        "other_generations": 1,
+        "population": 4,
+        "timesteps": 8192,
+    }
+    UNIT: ClassVar[str] = " generations"
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        super().check()
+        for name in (*STAGES, "timesteps"):
+            require_count(name, getattr(self, name))
+        require_count("population", self.population, 4)
+        require_count("search_seed", self.search_seed, 0, 2**31 - 2)
+
+    @property
+    def total(self) -> float:
+        """Generations of all searches."""
+        return sum(getattr(self, name) for name in STAGES) + (len(OTHER_SPEEDS) - 1) * self.other_generations
+
+    @property
+    def folder(self) -> Path:
+        """Where the stages keep what they find; with --quick, a folder of its own."""
+        return self.runs.with_name(f"{self.runs.name}-quick") if self.quick else self.runs
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Go through the stages, or through what is left of them."""
+        make_folder(self.folder)
+        with owned(self.folder):
+            return self._staged(progress)
+
+    def _staged(self, progress: OnProgress) -> Answer:
+        found, took = self.folder / FOUND, {}
+
+        def stage(name: str, make: Callable[[], Any]) -> Any:
+            began = perf_counter()
+            result = make()
+            took[name] = perf_counter() - began
+            return result
+
+        if not found.is_file():
+            write_constants(found, {"styles": {}, "constants": {}, "found_by": {}})
+        plan = PlanTuning(
+            generations=self.plan_generations,
+            population=self.population,
+            seed=self.search_seed,
+            styles=found,
+            command=without_places(self.command),
+            log=self.folder / "plan.json",
+        )
+        walk = LegTuning(
+            guide="plan",
+            start=GENERIC,
+            push_newton=0.0,
+            generations=self.walk_generations,
+            population=self.population,
+            sigma=FIRST_SPREAD,
+            seed=self.search_seed,
+            threads=self.threads,
+            constants=found,
+            plan_file=found,
+            command=without_places(self.command),
+            log=self.folder / "walk.json",
+        )
+        effort = replace(
+            walk,
+            start="",
+            pays="effort",
+            push_newton=STAGE_PUSH,
+            pushed_from=self.effort_generations,
+            generations=self.effort_generations + self.push_generations,
+            sigma=EFFORT_SPREAD,
+            seed=self.search_seed + 1,
+            log=self.folder / "effort.json",
+        )
+        searches = {"plan": plan, "walk": walk, "effort": effort}
+        for speed in OTHER_SPEEDS:
+            searches[f"effort-{speed:g}"] = replace(
+                effort,
+                speed=speed,
+                start=constants_name("planned", "people", guide="plan"),
+                pushed_from=OTHER_UNPUSHED,
+                generations=self.other_generations,
+                sigma=OTHER_SPREAD,
+                log=self.folder / f"effort-{speed:g}.json",
+            )
+        for name, search in searches.items():
+            text = stage(name, lambda search=search: search.ask(progress)).text
+            (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
+        # More generations of a search make other constants, and those another policy.
+        sets = read_constants(found)
+        digest = hashlib.sha256(json.dumps([sets["styles"], sets["constants"]]).encode()).hexdigest()
+        policy = self.folder / f"policy-{digest[:8]}"
+        settings = replace(PRESETS["predict"].environment, plan_file=str(found))
+        stage("policy", lambda: self._train(settings, policy))
+        text = stage("evaluation", lambda: self._evaluated(found, digest, policy, settings))
+        spent = table(["stage", *took], [["seconds, this time", *(f"{each:.0f}" for each in took.values())]])
+        return Answer(text=f"{text}\n\n{spent}", files={"prediction.md": f"{text}\n"}, sections={SECTION: text})
+
+    def _train(self, settings: BipedSettings, out: Path) -> None:
+        """Train what is left of the training in `out`."""
+        from springfoot.agents.training import training  # torch takes seconds, which --help need not wait for
+
+        preset = PRESETS["predict"]
+        config = replace(
+            preset, timesteps=self.timesteps, seed=self.search_seed, environment=settings, threads=self.threads
+        )
+        if (out / RUN).is_file():
+            before = config_from_json(read_record(out)["config"])
+            if replace(before, threads=config.threads) != config:
+                raise SpringfootError(f"{out} was trained with other settings; choose another folder")
+        if is_finished(out):
+            return
+        begun = (out / RUN).is_file()
+        record = training.resume(out, threads=self.threads) if begun else training.train(config, out)
+        if record["status"] == "interrupted":
+            raise KeyboardInterrupt
+
+    def _evaluated(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
+        how = Protocol(
+            episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads
+        )
+        given = {"guide": "plan", "plan_file": str(found)}
+        columns = {"people": people_numbers(settings), "the plan": plan_numbers(settings)}
+        pushed = []
+        for name, label in (("schedule", "schedule"), (str(policy), "policy")):
+            key = [name, digest, self.timesteps]
+            metrics = measured(self.folder / f"{label}.json", how, key, lambda name=name: how.of(name, given))
+            columns[label] = walk_numbers(metrics["undisturbed"])
+            pushed.append(f"{label} {metrics['pushed']['falls']} of {metrics['pushed']['episodes']}")
+        return "\n\n".join(
+            [
+                prediction_table(columns, ("schedule", "policy")),
+                f"{self.what_ran}. Schedule: the search's own springs, no policy. **Bold**: not as wanted. "
+                f"Falls under pushes of {STAGE_PUSH:g} N: {', '.join(pushed)}.",
+            ]
+        )

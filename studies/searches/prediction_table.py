@@ -1,0 +1,139 @@
+"""What a predicted walk is held to, and the table of it: people, the plan alone, and walks that follow it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.settings.settings import BipedSettings, reference_gait
+from springfoot.evaluation.numbers.criteria import NO_FALLS, Criterion, numbers
+from springfoot.files.markdown import MISSING, table
+from springfoot.gait.body.body import GRAVITY
+from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.people.human import HumanGait
+from springfoot.gait.people.scores import correlation, force_features, rmse, stride_work
+
+from ..base.quantities import COMPARED_JOINTS
+
+JOINT_LIMITS = {"thigh": (3.5, 0.95), "knee": (5.0, 0.95), "ankle": (5.5, 0.93)}
+"""Largest RMSE [deg] and least r with people's mean."""
+
+
+def _force(label: str, name: str, low: float, high: float = np.inf) -> Criterion:
+    return Criterion(name=label, path=("grf", name), low=low, high=high)
+
+
+PREDICTION = (
+    NO_FALLS,
+    Criterion(name="speed off by [m/s]", path=("off", "speed_m_s"), high=0.03, pattern=".3f"),
+    *(
+        Criterion(name=f"{joint}: RMSE [°]", path=("joints", joint, "rmse_deg"), high=most, pattern=".1f")
+        for joint, (most, _) in JOINT_LIMITS.items()
+    ),
+    *(
+        Criterion(name=f"{joint}: r", path=("joints", joint, "r"), low=least)
+        for joint, (_, least) in JOINT_LIMITS.items()
+    ),
+    _force("vertical force: r", "vertical_r", 0.95),
+    _force("its first peak [BW]", "vertical_peak1_bw", 0.85, 1.25),
+    _force("its second peak [BW]", "vertical_peak2_bw", 1.02, 1.24),
+    _force("fore-aft force: r", "forward_r", 0.88),
+    _force("braking [BW]", "braking_peak_bw", -0.22, -0.08),
+    _force("forward [BW]", "forward_peak_bw", 0.12, 0.27),
+    Criterion(name="ankle moment: r", path=("moments", "ankle", "r"), low=0.95),
+    Criterion(name="its peak [N·m/kg]", path=("moments", "ankle", "peak_Nm_kg"), low=1.1, high=1.5),
+    Criterion(name="hip moment: r", path=("moments", "hip", "r"), low=0.8),
+    Criterion(name="its peak [N·m/kg]", path=("moments", "hip", "peak_Nm_kg"), high=0.8),
+    Criterion(name="double support off by [s]", path=("off", "double_support_s"), high=0.03, pattern=".3f"),
+    Criterion(name="cost of transport", path=("cost_of_transport",), high=0.14, pattern=".3f"),
+)
+"""What a prediction is held to: near people by the likeness of published ones, at people's forces and effort."""
+
+
+def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of `PREDICTION` of a walk that was measured."""
+    found = numbers(dict(metrics))
+    settings = BipedSettings(speed=metrics["environment"]["speed"], height=metrics["environment"]["height"])
+    support, human = found["double_support_s"], reference_gait(settings)
+    away = None if support is None else abs(support - _double_support(human))
+    return found | {"off": found["off"] | {"double_support_s": away}}
+
+
+def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
+    """The numbers of `PREDICTION` of the plan that `settings` follow, from its own inverse dynamics."""
+    return numbers_of(reference_walk_at(settings, settings.speed).human, reference_gait(settings))
+
+
+def people_numbers(settings: BipedSettings) -> dict[str, Any]:
+    """The numbers of `PREDICTION` of people's mean curves."""
+    human = reference_gait(settings)
+    return numbers_of(human, human)
+
+
+def prediction_table(columns: Mapping[str, Mapping[str, Any]], held: Sequence[str]) -> str:
+    """Markdown: each of `PREDICTION` and its number in each column; in bold what a column of `held` misses."""
+    lines = []
+    for criterion in PREDICTION:
+        cells = []
+        for name, values in columns.items():
+            value = _value(criterion, values)
+            text = MISSING if value is None else format(value, criterion.pattern)
+            cells.append(f"**{text}**" if name in held and not _holds(criterion, values) else text)
+        lines.append([criterion.name, criterion.text, *cells])
+    missed = [
+        str(sum(not _holds(each, columns[name]) for each in PREDICTION)) if name in held else "" for name in columns
+    ]
+    lines.append(["missed", f"of {len(PREDICTION)}", *missed])
+    return table(["", "wanted", *columns], lines)
+
+
+def _value(criterion: Criterion, values: Mapping[str, Any]) -> float | None:
+    try:
+        return criterion.value(dict(values))
+    except KeyError:
+        return None
+
+
+def _holds(criterion: Criterion, values: Mapping[str, Any]) -> bool:
+    value = _value(criterion, values)
+    return value is not None and criterion.low <= value <= criterion.high
+
+
+def _double_support(gait: HumanGait) -> float:
+    return (gait.toe_off - 0.5) * gait.stride_time
+
+
+def _positive_work(gait: HumanGait) -> float:
+    """Of hip, knee and ankle of both legs in a stride over body weight [m]."""
+    power = np.stack([gait.mean(f"{joint}_power", PERCENT / 100) for joint in ("hip", "knee", "ankle")])
+    return 2 * float(stride_work(power, np.full(3, gait.stride_time))[0].sum()) / GRAVITY
+
+
+def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
+    """The numbers of `PREDICTION` of mean curves against people's; falls and speed are not known of them."""
+    phase = PERCENT / 100
+
+    def pair(name: str) -> tuple[Any, Any]:
+        return gait.mean(name, phase), human.mean(name, phase)
+
+    vertical, forward = pair("grf_vertical"), pair("grf_forward")
+    features = force_features(vertical[0], forward[0])
+    return {
+        "off": {"double_support_s": abs(_double_support(gait) - _double_support(human))},
+        "joints": {
+            joint: {"rmse_deg": np.degrees(rmse(*pair(joint)) or 0.0), "r": correlation(*pair(joint))}
+            for joint in COMPARED_JOINTS
+        },
+        "grf": {
+            "vertical_r": correlation(*vertical),
+            "forward_r": correlation(*forward),
+            **{f"{name}_bw": getattr(features, name) for name in ("vertical_peak1", "vertical_peak2")},
+            **{f"{name}_bw": getattr(features, name) for name in ("braking_peak", "forward_peak")},
+        },
+        "moments": {
+            joint: {"r": correlation(*pair(f"{joint}_moment")), "peak_Nm_kg": float(pair(f"{joint}_moment")[0].max())}
+            for joint in ("hip", "ankle")
+        },
+        "cost_of_transport": _positive_work(gait) / (2 * gait.step_length),
+    }

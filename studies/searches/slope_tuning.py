@@ -1,0 +1,198 @@
+"""Finds what a slope adds to the legs' targets (`slope` in `envs/control/legs.json`): CMA-ES on walks up and down.
+
+    springfoot study slope-tuning --generations 20
+
+Every candidate walks with the fixed schedule at each of `SLOPES_DEG`. It pays for falls, for speeds other than the
+commanded one, for reward that the same walk earns on level ground, and for heels that strike hard. What was found is
+then held against what it began with, on longer walks from other starts, and written only if it pays less there.
+"""
+
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import cma
+import numpy as np
+import tyro
+from tqdm import tqdm
+
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.step_result import Tick
+from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.leg_constants import SlopeConstants, slope_constants_from
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.files.writing import csv_text
+from springfoot.gait.body.body import GRAVITY
+
+from ..base.study import Answer, OnProgress, Study
+from .constants_file import CONSTANTS, read_constants, write_constants
+
+SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
+"""Walked on by every candidate."""
+SETTLED = 2.0
+"""Speed and force are measured from here on [s]."""
+HEEL_STRIKE, HARD = 0.2, 1.5
+"""Phase of a leg before which force is its heel's, and body weights from which it is paid for."""
+FALL_COST = 60.0
+"""Cost of falling at once; one that comes later costs proportionally less, down to a third: more than a poor walk."""
+TOLERANCE = {"speed": 0.06, "reward": 0.1, "heel": 0.3}
+"""Error e [m/s, share of the level walk's reward, body weights] at which sqrt(1 + (e / tolerance)^2) - 1 costs 0.41."""
+JUDGED_WALKS, JUDGED_SECONDS = 16, 10.0
+"""Walks at each slope that judge what was found, and their length [s]."""
+
+
+def constants_of(vector: NDArray) -> SlopeConstants:
+    """The constants of a vector (10,): hip, knee, ankle, trunk."""
+    hip, knee, ankle = np.round(vector[:9], 3).reshape(3, 3).tolist()
+    return slope_constants_from({"hip": hip, "knee": knee, "ankle": ankle, "trunk": round(float(vector[9]), 3)})
+
+
+def vector_of(constants: SlopeConstants) -> NDArray:
+    """The vector (10,) of constants."""
+    return np.hstack([getattr(constants, field.name) for field in fields(SlopeConstants)])
+
+
+def walk(
+    constants: SlopeConstants | None, slopes_deg: tuple[float, ...], walks: int, seconds: float, seed: int, threads: int
+) -> dict[str, NDArray]:
+    """Walk `walks` times at each slope with the fixed schedule: (slopes, walks) of each number.
+
+    `missing` of the walk after a fall, 0 without one; `speed` too fast [m/s] and `heel` force peak [body weights], once
+    settled; mean `reward` of a step. `constants` None: the committed ones.
+    """
+    settings, num = BipedSettings(episode_seconds=seconds + 1), len(slopes_deg) * walks
+    biped = Biped(settings, num, threads, slope=constants)
+    biped.subjects.slope[:] = np.repeat(np.radians(slopes_deg), walks)
+    biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
+    active, lived, reward, heel, way = np.ones(num, bool), np.zeros(num), np.zeros(num), np.zeros(num), np.zeros(num)
+    ticks: list[Tick] = []
+    biped.on_tick = ticks.append
+    for step in range(round(seconds / biped.dt)):
+        action = action_of(biped.scheduled_stiffness(), settings, biped.body)
+        ticks.clear()
+        result = biped.step(action.reshape(num, -1), active)
+        lived += active * biped.dt
+        reward += result.reward
+        if step * biped.dt >= SETTLED:
+            way += active * biped.measurement.com_velocity[:, 0] * biped.dt
+            for tick in ticks:
+                load = tick.measurement.force[..., 1].sum(-1) / (biped.body.total_mass * GRAVITY)
+                heel = np.maximum(heel, active * np.where(tick.phase < HEEL_STRIKE, load, 0.0).max(1))
+        active &= ~result.terminated
+        if not active.any():
+            break
+    numbers = {
+        "missing": np.where(active, 0.0, 1.0 - 2.0 / 3.0 * lived / seconds),
+        "speed": way / np.maximum(lived - SETTLED, biped.dt) - settings.speed,
+        "heel": heel,
+        "reward": reward * biped.dt / np.maximum(lived, biped.dt),
+    }
+    return {name: values.reshape(len(slopes_deg), walks) for name, values in numbers.items()}
+
+
+def cost(walked: dict[str, NDArray], level_reward: float) -> float:
+    """What the `walk` of a candidate pays, the mean over its walks."""
+    errors = {
+        "speed": walked["speed"],
+        "reward": 1.0 - walked["reward"] / level_reward,
+        "heel": np.maximum(walked["heel"] - HARD, 0.0),
+    }
+    paid = sum(np.hypot(1.0, error / TOLERANCE[name]) - 1.0 for name, error in errors.items())
+    return float(np.where(walked["missing"] > 0, FALL_COST * walked["missing"], paid).mean())
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlopeTuning(Study):
+    """Find the constants for slopes by CMA-ES and write them into a file of constants, if they pay less there."""
+
+    generations: int = 20
+    """Generations of the search."""
+    population: int = 12
+    """Candidates in each."""
+    sigma: float = 0.2
+    """First spread, in the constants' own units."""
+    walks: int = 3
+    """Walks of a candidate at each slope."""
+    seconds: float = 6.0
+    """Length of each [s]."""
+    seed: int = 0
+    """Seed of the search and of the walks."""
+    threads: int = 2
+    """Threads of the physics."""
+    constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
+    """File of constants to begin with and to write."""
+
+    QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4, "walks": 1, "seconds": 3.0}
+    PAGED: ClassVar[bool] = False
+    UNIT: ClassVar[str] = " generations"
+
+    def check(self) -> None:
+        """Refuse numbers out of range."""
+        for count, least in (("generations", 0), ("population", 4), ("walks", 1), ("seed", 0), ("threads", 1)):
+            require_count(count, getattr(self, count), least)
+        require_number("sigma", self.sigma, 0, above=True)
+        require_number("seconds", self.seconds, SETTLED, above=True)
+
+    @property
+    def total(self) -> float:
+        """Generations."""
+        return self.generations
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Search, judge what was found, and write it if it is better; with --quick never.
+
+        Raises `SpringfootError`, with nothing written, for another kind of file.
+        """
+        try:
+            began = slope_constants_from(read_constants(self.constants)["slope"]["constants"])
+        except (KeyError, TypeError):
+            raise SpringfootError(f"{self.constants} has no constants for slopes to begin with") from None
+        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(vector_of(began), self.sigma, options)
+        lines, how = [], (self.walks, self.seconds)
+        for generation in range(self.generations):
+            vectors, seed = strategy.ask(), self.seed + 1000 * generation
+            level = walk(None, (0.0,), *how, seed, self.threads)["reward"].mean()
+            found = [walk(constants_of(v), SLOPES_DEG, *how, seed, self.threads) for v in vectors]
+            paid = [cost(walked, level) for walked in found]
+            strategy.tell(vectors, paid)
+            lines.append([generation + 1, min(paid), np.median(paid)])
+            tqdm.write(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}")
+            progress(1)
+        pays, told = self._judge(began)
+        verdict = "wrote nothing: what it began with pays no more"
+        if self.generations:
+            found_pays, found_told = self._judge(mean := constants_of(strategy.mean))
+            told = f"{told}\n{found_told}"
+            if found_pays < pays:
+                verdict = "wrote nothing: --quick" if self.quick else "wrote what it found"
+                self._keep(mean)
+        files = {"generations.csv": csv_text(["generation", "best", "median"], lines)}
+        return Answer(text=f"{told}\n{verdict}", files=files)
+
+    def _keep(self, found: SlopeConstants) -> None:
+        """Write what was found, and the command that did, into the file of constants; with --quick nothing."""
+        if self.quick:
+            return
+        table = read_constants(self.constants)  # anew: another search may have written its own
+        table["slope"] = table["slope"] | {"found_by": self.command, "constants": asdict(found)}
+        write_constants(self.constants, table)
+
+    def _judge(self, constants: SlopeConstants) -> tuple[float, str]:
+        """What these constants pay on walks whose starts the search did not use, and how those walks go."""
+        walks, seconds = (1, 3.0) if self.quick else (JUDGED_WALKS, JUDGED_SECONDS)
+        seed = self.seed + 1_000_000
+        level = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()
+        walked = walk(constants, SLOPES_DEG, walks, seconds, seed, self.threads)
+        paid = cost(walked, level)
+        told = [f"{json.dumps(asdict(constants))} pays {paid:.2f} in {walked['missing'].size} walks of {seconds:g} s"]
+        for row, slope_deg in enumerate(SLOPES_DEG):
+            missing, speed, heel, reward = (walked[name][row] for name in ("missing", "speed", "heel", "reward"))
+            told.append(
+                f"  {slope_deg:+.1f} deg: {(missing > 0).sum()} fall, {speed.mean():+.3f} m/s too fast, heel peak "
+                f"{heel.mean():.2f} body weights, reward {reward.mean() / level:.2f} of the level walk's"
+            )
+        return paid, "\n".join(told)

@@ -1,0 +1,1 @@
+"""Studies of stiffness: agreement, identification, influence."""

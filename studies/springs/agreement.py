@@ -1,0 +1,248 @@
+"""Do seeds agree? The springs of several policies over the stride, and which criteria of a human-like walk each misses.
+
+    springfoot study agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --page docs/results.md
+
+Stiffness alone is not identified (`springfoot.studies.springs.any_stiffness`), so K stands beside the equilibrium and
+the torque. K of a joint is judged where that joint carries load, by its coefficient of variation (SD / mean) over the
+policies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import matplotlib
+import numpy as np
+import tyro
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from springfoot.agents.policies.baselines import and_copy
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers.criteria import HUMAN_LIKE, Criterion, number_text, numbers
+from springfoot.evaluation.numbers.metrics import Gait, measure
+from springfoot.evaluation.recording.policies import policy_label, prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.files.markdown import MISSING, table
+from springfoot.files.writing import csv_text
+from springfoot.gait.people.cycle import PERCENT
+
+from ..base.quantities import OPEN_LOOP, falls_text, rmse_text, walks_csv
+from ..base.study import Answer, OnProgress, WalkingStudy
+
+SECTION = "AGREEMENT"
+"""Of the results page."""
+LOADED = 0.1
+"""A joint carries load where its moment is beyond this share of its largest."""
+MOST = 0.15
+"""Coefficient of variation of K over seeds up to which they agree, wherever the joint carries load."""
+SPRING_COLUMNS = {
+    "ankle": ("ankle_stiffness_Nm_per_rad", "ankle_equilibrium_deg", "ankle_moment_Nm_per_kg"),
+    "toe": ("toe_stiffness_Nm_per_rad", "mtp_equilibrium_deg", "mtp_moment_Nm_per_kg"),
+}
+"""Joint -> columns of gait_cycle.csv: K, theta_eq, torque."""
+COLORS = {"ankle": "#0b6e8f", "toe": "#c26a1b"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Agreement:
+    """One joint's springs over the stride, of S policies; curves (S, 101) over percent."""
+
+    joint: str
+    stiffness: NDArray
+    """K [N m/rad]."""
+    equilibrium: NDArray
+    """theta_eq [deg]."""
+    torque: NDArray
+    """Moment, plantarflexion positive [N m/kg]."""
+
+    @property
+    def loaded(self) -> NDArray:
+        """(101,) where the joint carries load: the mean moment is beyond `LOADED` of its largest."""
+        size = np.abs(self.torque.mean(axis=0))
+        return size > LOADED * size.max()
+
+    @property
+    def variation(self) -> NDArray:
+        """(101,) coefficient of variation of K over the policies, SD with n - 1."""
+        return self.stiffness.std(axis=0, ddof=1) / self.stiffness.mean(axis=0)
+
+    @property
+    def worst(self) -> tuple[float, int]:
+        """Largest coefficient of variation under load, and its percent of the stride."""
+        percent = int(np.where(self.loaded, self.variation, -1.0).argmax())
+        return float(self.variation[percent]), percent
+
+    @property
+    def agree(self) -> bool:
+        """Whether the policies do, at every percent under load."""
+        return self.worst[0] <= MOST
+
+
+def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
+    """Ankle and toe of two gaits or more; raises `SpringfootError` for fewer, and for one without strides."""
+    _require_two(len(gaits))
+    if idle := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
+        raise SpringfootError(f"{idle[0]} walks no strides to compare")
+    found = []
+    for joint, names in SPRING_COLUMNS.items():
+        stiffness, equilibrium, torque = (np.stack([gait.both.mean(name) for gait in gaits]) for name in names)
+        found.append(Agreement(joint=joint, stiffness=stiffness, equilibrium=equilibrium, torque=torque))
+    return found
+
+
+def _require_two(policies: int) -> None:
+    if policies < 2:
+        raise SpringfootError(f"agreement needs two policies or more, got {policies}")
+
+
+def agreement_table(found: Sequence[Agreement]) -> str:
+    """Markdown: how far the springs of each joint vary over the policies where it carries load."""
+    head = ["joint", "carries load at", "CV of K: mean", "95th percentile", "worst", f"≤ {100 * MOST:.0f} %"]
+    head += ["SD of θ_eq: mean, worst", "SD of torque / peak: mean, worst"]
+    lines = []
+    for each in found:
+        loaded, (worst, percent) = each.loaded, each.worst
+        variation = 100 * each.variation[loaded]
+        rest = each.equilibrium.std(axis=0, ddof=1)[loaded]
+        torque = 100 * each.torque.std(axis=0, ddof=1)[loaded] / np.abs(each.torque.mean(axis=0)).max()
+        lines.append(
+            [
+                each.joint,
+                f"{_stretches(loaded)} % of the stride",
+                f"{variation.mean():.1f} %",
+                f"{np.percentile(variation, 95):.1f} %",
+                f"{100 * worst:.1f} % at {percent} %",
+                "agree" if each.agree else "**do not agree**",
+                f"{rest.mean():.2f}°, {rest.max():.2f}°",
+                f"{torque.mean():.1f} %, {torque.max():.1f} %",
+            ]
+        )
+    return table(head, lines)
+
+
+def _stretches(mask: NDArray) -> str:
+    """Where a mask over percent is true, in words: "2–60, 95–100"."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
+
+
+def criteria_table(
+    names: Sequence[str], metrics: Sequence[dict[str, Any]], copies: Sequence[dict[str, Any] | None] = ()
+) -> str:
+    """Markdown: every criterion and its number in each evaluation; in bold what is missed even when loosened.
+
+    A number in brackets meets the loosened criterion alone. The row `missed` counts. Falls and angles of the policies'
+    open-loop `copies` follow, unless none has one.
+    """
+    measured = [numbers(each) for each in metrics]
+    lines, missed = [], [0] * len(measured)
+    for criterion in HUMAN_LIKE:
+        cells = []
+        for column, values in enumerate(measured):
+            state = _state(criterion, values)
+            missed[column] += state == "**"
+            cells.append({"": "{}", "(": "({})", "**": "**{}**"}[state].format(number_text(criterion, values)))
+        loose = criterion.loosened()
+        lines.append([criterion.name, criterion.text, loose.text if loose != criterion else "", *cells])
+    lines.append(["missed", "", "", *map(str, missed)])
+    if any(copies):
+        falls = [MISSING if copy is None else falls_text(copy) for copy in copies]
+        angles = [MISSING if copy is None else rmse_text(copy) for copy in copies]
+        lines += [[f"{OPEN_LOOP}: falls", "", "", *falls], [f"{OPEN_LOOP}: thigh / knee / ankle °", "", "", *angles]]
+    return table(["", "criterion", "loosened", *(f"`{name}`" for name in names)], lines)
+
+
+def _state(criterion: Criterion, values: dict[str, Any]) -> str:
+    if criterion.holds(values):
+        return ""
+    return "(" if criterion.loosened().holds(values) else "**"
+
+
+def curves_csv(found: Sequence[Agreement]) -> str:
+    """CSV over percent of the stride: mean and SD over the policies of K, theta_eq and torque, CV of K, load."""
+    columns: dict[str, NDArray] = {"percent": PERCENT}
+    for each in found:
+        for name, curves in zip(
+            SPRING_COLUMNS[each.joint], (each.stiffness, each.equilibrium, each.torque), strict=True
+        ):
+            columns |= {name: curves.mean(axis=0), f"{name}_sd": curves.std(axis=0, ddof=1)}
+        columns |= {f"{each.joint}_stiffness_cv": each.variation, f"{each.joint}_loaded": each.loaded.astype(int)}
+    return csv_text(list(columns), zip(*columns.values(), strict=True))
+
+
+def save_figure(path: Path, found: Sequence[Agreement]) -> None:
+    """Write the picture: K, equilibrium and torque of each policy over the stride, grey where no load is carried."""
+    titles = ("stiffness K", "equilibrium θ_eq", "torque")
+    units = ("N·m/rad", "dorsiflexion, toe up (deg)", "plantarflexion (N·m/kg)")
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+        for row, each in zip(figure.subplots(len(found), 3, squeeze=False), found, strict=True):
+            for ax, curves, title, unit in zip(
+                row, (each.stiffness, each.equilibrium, each.torque), titles, units, strict=True
+            ):
+                mean, sd = curves.mean(axis=0), curves.std(axis=0, ddof=1)
+                ax.fill_between(PERCENT, mean - sd, mean + sd, color=COLORS[each.joint], alpha=0.22, lw=0)
+                ax.plot(PERCENT, curves.T, color=COLORS[each.joint], lw=0.9, alpha=0.8)
+                ax.fill_between(
+                    PERCENT, 0, 1, where=~each.loaded, transform=ax.get_xaxis_transform(), color="#f1f1f1", zorder=0
+                )
+                ax.set(title=f"{each.joint.capitalize()} {title}", ylabel=unit, xlabel="% of stride", xlim=(0, 100))
+            row[0].set_ylim(0, None)
+            worst, percent = each.worst
+            row[0].set_title(f"{each.joint.capitalize()} K, worst CV under load {100 * worst:.0f} % at {percent} %")
+        handles = {
+            "each policy": Line2D([], [], color="#777777", lw=0.9),
+            "mean ± SD over policies": Patch(color="#777777", alpha=0.22, lw=0),
+            f"moment below {100 * LOADED:.0f} % of its peak": Patch(color="#f1f1f1", lw=0),
+        }
+        figure.legend(
+            list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False, fontsize=9
+        )
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeedAgreement(WalkingStudy):
+    """Hold several policies, such as one training from several seeds, against each other and against people."""
+
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ()
+    """Two policies of evaluate.py or more: run folders, files, names."""
+
+    def check(self) -> None:
+        """Refuse fewer than two policies as well."""
+        super().check()
+        _require_two(len(self.policies))
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        return sum(len(and_copy(name)) for name in self.policies) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every policy."""
+        walked = [[self._walk(each, progress) for each in and_copy(name)] for name in self.policies]
+        gaits, copies = [first for first, *_ in walked], [rest[0].metrics if rest else None for _, *rest in walked]
+        found = agreements(gaits)
+        labels = [policy_label(name) for name in self.policies]
+        ran = (
+            f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened criterion alone; "
+            "**bold**: missed."
+        )
+        if any(copies):
+            ran += " Open loop: each policy's mean K over the stride at the same θ_eq, without feedback."
+        table_of_criteria = criteria_table(labels, [gait.metrics for gait in gaits], copies)
+        text = "\n\n".join([agreement_table(found), table_of_criteria, ran])
+        walks = walks_csv([({"policy": gait.metrics["policy"]}, gait.metrics) for each in walked for gait in each])
+        draw = partial(save_figure, found=found)
+        files = {"agreement.csv": curves_csv(found), "policies.csv": walks, "agreement.png": draw}
+        return Answer(text=text, files=files, sections={SECTION: text})
+
+    def _walk(self, name: str, progress: OnProgress) -> Gait:
+        policy, settings = prepare(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
+        return measure(record(policy, settings, name=policy_label(name), progress=progress, **self.how))

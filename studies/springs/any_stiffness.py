@@ -1,0 +1,269 @@
+"""Is the stiffness of a gait identified? The same gait walked with any other stiffness, its equilibrium rebuilt.
+
+    springfoot study any-stiffness schedule
+    springfoot study any-stiffness pretrained --episodes 100 --page docs/results.md
+
+A recorded gait has a mean angle, velocity and torque of ankle and toe at each phase of the leg controller. For any
+K(phase) > 0, theta_eq = theta + beta dtheta/dt + tau/K gives back that torque. Each such pair of K and theta_eq is a
+schedule for equilibrium `phase`, and walks here as the baseline `schedule`: undisturbed, pushed, on uneven ground. It
+is decided at 100 Hz, as theta_eq moves: held longer, K and theta_eq would be those of an earlier phase.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import inf, nan
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from springfoot.agents.policies.baselines import schedule
+from springfoot.arrays import NDArray
+from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, plateau_curve
+from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.physics.model import damping_times
+from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record
+from springfoot.files.markdown import table, text_of
+from springfoot.gait.body.body import Body
+from springfoot.gait.body.tissue import TOE_STIFFNESS
+from springfoot.gait.springs.stiffness import SPRINGS, Segment, StiffnessSchedule
+
+from ..base.quantities import falls_text, rmse_text, walks_csv
+from ..base.study import Answer, OnProgress, WalkingStudy
+
+SECTION = "ANY-K"
+"""Of the results page."""
+PHASE_SEGMENTS = 200
+"""Of a rebuilt schedule: half a percent of a stride each, less than the control window in which theta_eq is held."""
+STARTS = np.arange(PHASE_SEGMENTS) / PHASE_SEGMENTS
+"""Their first phases, (PHASE_SEGMENTS,)."""
+STIFFNESSES = ("recorded", "flat:150", "flat:250", "flat:400", "times:0.6", "times:1.6", "reversed", "people")
+"""The K walked with by default: the gait's own; the same at every phase [N m/rad of the ankle]; a multiple of its own;
+its own backwards in time; people's quasi-stiffness."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeanSprings:
+    """Ankle and toe of both legs over the phase of the leg controller, means of a recording: (PHASE_SEGMENTS, 2)."""
+
+    body: Body
+    angle: NDArray
+    """At the ends of the control windows that began in each segment [rad]."""
+    velocity: NDArray
+    """[rad/s]."""
+    torque: NDArray
+    """Of the springs [N m]."""
+    stiffness: NDArray
+    """K [N m/rad]."""
+
+
+def mean_springs(recording: Recording) -> MeanSprings:
+    """What the springs of a recorded gait did at each phase, the first `WARM_UP` seconds of each episode left out."""
+    begin = round(WARM_UP / TICK)
+    phase = recording.series["phase"][:, begin:].ravel()
+    walked = np.isfinite(phase)
+    segment = np.minimum((phase[walked] * PHASE_SEGMENTS).astype(int), PHASE_SEGMENTS - 1)
+    count = np.bincount(segment, minlength=PHASE_SEGMENTS)
+    if not walked.any() or (count > 0).sum() < PHASE_SEGMENTS / 2:
+        raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be rebuilt")
+
+    def mean(name: str) -> NDArray:
+        values = recording.series[name][:, begin:]
+        values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[walked].astype(float)
+        totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[count > 0] for joint in range(2)]
+        at = STARTS[count > 0]  # a leg that lands early skips the last phases
+        return np.stack([np.interp(STARTS, at, total / count[count > 0], period=1.0) for total in totals], -1)
+
+    return MeanSprings(
+        body=body_of(recording.settings),
+        **{name: mean(name) for name in ("angle", "velocity", "torque", "stiffness")},
+    )
+
+
+def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
+    """K (PHASE_SEGMENTS, 2) > 0 [N m/rad] and the equilibrium at which it gives the gait's torque on its course."""
+    beta = np.array(damping_times(springs.body))[FEET]
+    rest = springs.angle + beta * springs.velocity + springs.torque / stiffness
+    columns = zip(SPRINGS, stiffness.T, rest.T, strict=True)
+    return StiffnessSchedule(**{joint: tuple(map(Segment, STARTS, k, theta)) for joint, k, theta in columns})
+
+
+def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
+    """(PHASE_SEGMENTS, 2) K of ankle and toe [N m/rad]: one of `STIFFNESSES`, or those with other numbers."""
+    kind, _, text = name.partition(":")
+    try:
+        number = float(text) if text else nan
+    except ValueError:
+        number = nan
+    scale = springs.body.stiffness_scale
+    if kind in ("flat", "times") and 0 < number < inf:
+        if kind == "times":
+            return number * springs.stiffness
+        flat = number * np.array([1.0, TOE_STIFFNESS_UNIT / ANKLE_STIFFNESS_UNIT]) * scale
+        return np.tile(flat, (PHASE_SEGMENTS, 1))
+    if name == "recorded":
+        return springs.stiffness
+    if name == "reversed":
+        return springs.stiffness[::-1]
+    if name == "people":
+        ankle = np.interp(STARTS, GRID, plateau_curve(REFERENCE_STIFFNESS))
+        return np.stack([ankle, np.full(PHASE_SEGMENTS, TOE_STIFFNESS)], -1) * scale
+    raise SpringfootError(f"stiffness must be one of {', '.join(STIFFNESSES)} (or other numbers > 0), got {name!r}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Row:
+    """One stiffness, walked under every condition."""
+
+    name: str
+    metrics: dict[str, dict[str, Any]]
+    """Condition -> as metrics.json."""
+    work: dict[str, float | None]
+    """Net work put into one ankle's spring in an undisturbed stride [J/kg], by changing K and by moving theta_eq."""
+
+
+def walk_row(name: str, walks: dict[str, Recording]) -> Row:
+    """Measure the recordings of one stiffness, by condition; the first is the undisturbed one."""
+    metrics = {condition: measure(recording).metrics for condition, recording in walks.items()}
+    springs = next(iter(metrics.values()))["springs_J_kg"]["ankle"]
+    work = {source: springs[f"{source}_changes"] for source in ("stiffness", "equilibrium")}
+    return Row(name=name, metrics=metrics, work=work)
+
+
+def any_stiffness(
+    name: str,
+    given: dict[str, Any],
+    stiffnesses: Sequence[str] = STIFFNESSES,
+    disturbances: dict[str, dict[str, Any]] | None = None,
+    *,
+    progress: OnProgress = lambda seconds: None,
+    **how: Any,
+) -> tuple[list[Row], dict[str, StiffnessSchedule]]:
+    """The policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
+
+    Args:
+        name: any policy of `policies.prepare`.
+        given: environment settings that differ from the evaluation's standard conditions and the policy's own.
+        stiffnesses: as in `STIFFNESSES`; values beyond the action's range are the nearer end's.
+        disturbances: more conditions, by name: settings that differ from the undisturbed one's.
+        progress, how: as for `recording.record`.
+    """
+    policy, settings = prepare(name, given, how.get("seed", 0))
+    conditions = {"undisturbed": {}} | (disturbances or {})
+
+    def walk(name: str, make: Callable[[BipedSettings], Any], settings: BipedSettings) -> dict[str, Recording]:
+        recordings = {}
+        for condition, other in conditions.items():
+            changed = replace(settings, **other)
+            recordings[condition] = record(make(changed), changed, name=name, progress=progress, **how)
+        return recordings
+
+    own = walk(name, lambda _: policy, settings)
+    springs = mean_springs(own["undisturbed"])
+    rows, schedules = [walk_row(name, own)], {}
+    lowest, highest = stiffness_ranges(settings, springs.body)
+    for each in stiffnesses:
+        schedules[each] = rebuilt(springs, np.clip(stiffness_named(each, springs), lowest, highest))
+        own_springs = {"schedule": schedules[each].to_json(), "equilibrium": "phase", "decisions": "100hz"}
+        changed = replace(settings, action_mode="absolute", **own_springs)
+        rows.append(walk_row(each, walk(each, schedule, changed)))
+    return rows, schedules
+
+
+def stiffness_table(rows: Sequence[Row]) -> str:
+    """Markdown: a row for each stiffness; undisturbed, and what falls and how near people it walks when disturbed."""
+    undisturbed, *disturbed = rows[0].metrics
+    head = [
+        "K",
+        "falls",
+        "m/s",
+        "RMSE thigh / knee / ankle °",
+        "peak 1 / valley / peak 2 BW",
+        "ankle work + / − J/kg",
+        "put in by K / by θ_eq J/kg",
+        *(f"{condition}: falls, RMSE °" for condition in disturbed),
+    ]
+    lines = []
+    for row in rows:
+        m = row.metrics[undisturbed]
+        forces = [m["grf"][f"vertical_{name}_bw"] for name in ("peak1", "valley", "peak2")]
+        lines.append(
+            [
+                f"`{row.name}`",
+                falls_text(m),
+                text_of(m["speed_m_s"]["mean"], ".3f"),
+                rmse_text(m),
+                " / ".join(text_of(force, ".2f") for force in forces),
+                " / ".join(text_of(work, ".2f") for work in m["ankle_work_J_kg"].values()),
+                " / ".join(text_of(work, "+.3f") for work in row.work.values()),
+                *(f"{falls_text(row.metrics[name])}, {rmse_text(row.metrics[name])}" for name in disturbed),
+            ]
+        )
+    return table(head, lines)
+
+
+def _numbers(rows: Sequence[Row]) -> str:
+    """CSV: a line for each stiffness and condition."""
+    return walks_csv(
+        [
+            (
+                {"stiffness": row.name, "condition": name}
+                | {f"work_by_{by}_J_kg": work for by, work in row.work.items()},
+                m,
+            )
+            for row in rows
+            for name, m in row.metrics.items()
+        ]
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnyStiffness(WalkingStudy):
+    """Walk a gait again with any stiffness, its equilibrium rebuilt, undisturbed and disturbed.
+
+    Its folder also holds each K with its equilibrium, for evaluate.py schedule --equilibrium phase --decisions 100hz
+    --schedule FILE.
+    """
+
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "schedule"
+    """Whose gait: any policy of evaluate.py."""
+    stiffness: tuple[str, ...] = STIFFNESSES
+    """The K walked with: recorded, flat:N (ankle N N·m/rad, toe a fifth of it), times:X, reversed, people."""
+    seconds: float = 12.0
+    """Length of each."""
+    push_newton: float = 150.0
+    """Size of the pushes [N]."""
+    unevenness_m: float = 0.01
+    """Unevenness of the ground [m]."""
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        conditions = 3  # undisturbed, pushed, on uneven ground
+        return (1 + len(self.stiffness)) * conditions * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every row."""
+        disturbances = {
+            f"±{self.push_newton:g} N": {"push_newton": self.push_newton},
+            f"±{100 * self.unevenness_m:g} cm": {"unevenness_m": self.unevenness_m},
+        }
+        given = {"episode_seconds": self.seconds}
+        rows, schedules = any_stiffness(self.policy, given, self.stiffness, disturbances, progress=progress, **self.how)
+        text = (
+            f"{stiffness_table(rows)}\n\n"
+            f"First row: `{self.policy}` itself; each other row walks its mean torque with this K and "
+            f"θ_eq = θ + β·θ̇ + τ/K over the controller's phase. {self.episodes} episodes × {self.seconds:g} s, the "
+            f"same seeds in every row; RMSE to people's mean; work put into one ankle's spring a stride, net."
+        )
+        files = {
+            f"{name.replace(':', '-')}.json": json.dumps(each.to_json()) + "\n" for name, each in schedules.items()
+        }
+        return Answer(text=text, files={"stiffness.csv": _numbers(rows)} | files, sections={SECTION: text})

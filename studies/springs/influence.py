@@ -1,0 +1,258 @@
+"""Does stiffness move the body? The thesis's chain, link by link: K of ankle and toe, torque, CoM acceleration, walk.
+
+springfoot study influence
+
+K is changed in one joint and phase of the stride, its rest angle kept. At the states of the unchanged walk that changes
+torque and the CoM's acceleration exactly; walks with the change, each held against the unchanged one from the same
+start on the same ground, say what becomes of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite, sqrt
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.agents.policies.baselines import has_feedback
+from springfoot.envs.settings.settings import BipedSettings, reference_gait
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import WARM_UP
+from springfoot.files.markdown import MISSING, table
+from springfoot.files.writing import csv_text
+from springfoot.gait.body.body import REFERENCE_HEIGHT
+
+from ..base.study import Answer, OnProgress, Study
+from ..walks.ablations import phase_schedule
+from .influence_figure import save_influence_figure
+from .stiffness_responses import (
+    ACCELERATION,
+    CSV_HEAD,
+    IMPULSE,
+    LEAST_MOVEMENT,
+    LINKS,
+    LINKS_HEAD,
+    MANY_STRIDES_SPEED,
+    TORQUE,
+    VELOCITY,
+    Key,
+    Response,
+    csv_rows,
+    link_rows,
+    response,
+)
+from .stiffness_steps import CELLS, DURATIONS, PHASES, SPRINGS, paired_walks
+
+SECTION, FIGURE = "INFLUENCE", "influence.png"
+BODIES = {"1.55 m, 50 kg": (1.55, 50.0), "1.90 m, 95 kg": (1.90, 95.0)}
+"""Height [m] and mass [kg] of other bodies; their speed is Froude-equal to the policy's own."""
+INFLUENCE_CONDITIONS = (
+    "as it is",
+    "opposite change",
+    "level ground",
+    "θ_eq by phase",
+    "θ_eq neutral",
+    *BODIES,
+    "pretrained",
+)
+"""Under which stiffness is changed."""
+
+
+def walk_under(condition: str, policy: str, change: float, unevenness: float, seed: int = 0) -> tuple[Any, Any, float]:
+    """Policy, settings and change of K of one of `INFLUENCE_CONDITIONS`, from those of the first one.
+
+    What has no feedback decides at 100 Hz, as the body is controlled; at 50 Hz a level walk falls in step with the
+    decisions, in one of two strides.
+    """
+    if condition not in INFLUENCE_CONDITIONS:
+        raise SpringfootError(f"conditions must be of {', '.join(map(repr, INFLUENCE_CONDITIONS))}, got {condition!r}")
+    name = condition if condition == "pretrained" else policy
+    given: dict[str, Any] = {"unevenness_m": 0.0 if condition == "level ground" else unevenness}
+    if not has_feedback(name):
+        given["decisions"] = "100hz"
+    if condition in BODIES:
+        height, mass = BODIES[condition]
+        speed = prepare(name, {})[1].speed * sqrt(height / REFERENCE_HEIGHT)
+        given |= {"height": height, "mass": mass, "speed": speed}
+    elif condition == "θ_eq neutral":
+        given["equilibrium"] = "neutral"
+    elif condition == "θ_eq by phase":
+        given |= {"equilibrium": "phase", "schedule": phase_schedule(prepare("schedule", {})[1]).to_json()}
+    return *prepare(name, given, seed), -change if condition == "opposite change" else change
+
+
+@dataclass(frozen=True, kw_only=True)
+class Influence(Study):
+    """Change stiffness in each joint and phase, and follow torque, CoM acceleration and movement."""
+
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "schedule"
+    """Whose stiffness: any policy of evaluate.py."""
+    change_percent: float = 10.0
+    """Change of K [%]."""
+    conditions: tuple[str, ...] = INFLUENCE_CONDITIONS
+    """Under which, all unless given; the first is told in full."""
+    seeds: int = 16
+    """Walks of each change, from other starts on other ground."""
+    seed: int = 0
+    """Of the first walk."""
+    strides: int = 20
+    """Strides of each walk; the second half are the "many"."""
+    unevenness_m: float = 0.002
+    """Unevenness of the ground [m], the same footfall by footfall in walks held against each other."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"seeds": 2, "strides": 4, "conditions": INFLUENCE_CONDITIONS[:1]}
+
+    def check(self) -> None:
+        """Refuse what cannot be."""
+        for name, least in (("seeds", 2), ("seed", 0), ("strides", 4), ("threads", 1), ("conditions", 1)):
+            count = getattr(self, name)
+            require_count(name, len(count) if name == "conditions" else count, least)
+        require_number("change_percent", self.change_percent, -90.0, 900.0, "%")
+        for condition in self.conditions:
+            self._under(condition)
+
+    def _under(self, condition: str) -> tuple[Any, Any, float]:
+        return walk_under(condition, self.policy, self.change_percent / 100, self.unevenness_m, self.seed)
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        walks, stride = (1 + len(CELLS) * len(DURATIONS)) * self.seeds, reference_gait(BipedSettings()).stride_time
+        return len(self.conditions) * walks * (WARM_UP + (self.strides + 1) * stride)
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk under every condition."""
+        seeds, responses = range(self.seed, self.seed + self.seeds), {}
+        for condition in self.conditions:
+            policy, settings, change = self._under(condition)
+            how = {"strides": self.strides, "threads": self.threads, "progress": progress}
+            responses[condition] = response(paired_walks(policy, settings, change, seeds, **how), change)
+        text = f"{headline(self, responses)}\n\n{tables(self, responses)}"
+        return Answer(
+            text=text,
+            files={
+                "influence.csv": csv_text(CSV_HEAD, csv_rows(responses)),
+                "influence_links.csv": csv_text(LINKS_HEAD, link_rows(responses)),
+                FIGURE: partial(save_influence_figure, responses=responses),
+            },
+            sections={SECTION: f"![Stiffness, torque, CoM acceleration and movement]({FIGURE})\n\n{text}"},
+        )
+
+
+def headline(study: Influence, responses: Mapping[str, Response]) -> str:
+    """What moves the walk most, and how far the acceleration foretells it."""
+    first = next(iter(responses.values()))
+    mean = first.mean[MANY_STRIDES_SPEED]
+    most = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
+    rest = np.nanmax(np.abs(np.delete(mean, most)))
+    effects = [f"{_cell(cell)}, {_number(first, MANY_STRIDES_SPEED, cell, '+.1f', 1e3)} mm/s" for cell in most]
+    r, low, high, scrambled = first.links["∫Δa dt → Δspeed of many strides"]
+    return (
+        f"**{study.change_percent:+g} % of stiffness in one joint and phase of every stride, θ_eq kept, changes the "
+        f"speed of `{study.policy}` ({first.speed:.3f} m/s) most here: {'; '.join(effects) or 'nowhere'}. Elsewhere by "
+        f"at most {1e3 * rest:.1f} mm/s.** What it does to the CoM's forward acceleration at once foretells this with "
+        f"r = {r:.2f} [{low:.2f}, {high:.2f}] over the {len(CELLS)} joints and phases (a scrambled order of them does "
+        f"as well in {100 * scrambled:.1f} % of cases), and with the right sign in {first.foretold.sum()} of the "
+        f"{first.moved.sum()} that change speed by {1e3 * LEAST_MOVEMENT:g} mm/s or more."
+    )
+
+
+def _cell(cell: int) -> str:
+    joint, phase = CELLS[cell]
+    begin, end = PHASES[phase]
+    return f"{SPRINGS[joint]}, {phase} ({100 * begin:.0f}–{100 * end:.0f} %)"
+
+
+def _number(own: Response, key: Key, cell: int, pattern: str, unit: float = 1.0, interval: bool = True) -> str:
+    mean, low, high = (_signed(unit * value, pattern) for value in (own.mean[key][cell], *own.interval[key][cell]))
+    return f"{mean} [{low}, {high}]" if interval and mean != MISSING else mean
+
+
+def _signed(value: float, pattern: str) -> str:
+    """The number in a table; 0 has no sign."""
+    text = format(value, pattern)
+    return MISSING if not isfinite(value) else text.lstrip("+-") if float(text) == 0 else text
+
+
+def tables(study: Influence, responses: Mapping[str, Response]) -> str:
+    """Markdown: the first condition link by link; the eventual speed under each; how well links foretell; what ran."""
+    return "\n\n".join(
+        [_chain(responses), _everywhere(responses), _foretelling(responses), _what_ran(study, responses)]
+    )
+
+
+def _chain(responses: Mapping[str, Response]) -> str:
+    own = next(iter(responses.values()))
+    head = [
+        *("joint", "phase %", "Δτ N·m", "Δa forward m/s²", "Δa up m/s²", "∫Δa dt forward mm/s"),
+        *("Δv as the phase ends mm/s", "one stride: Δspeed 1 / 2 / many mm/s", "every stride: Δspeed 1 / 2 mm/s"),
+        *("many mm/s", "Δstep length mm", "CoM ahead after 1 / 2 / all mm", "CoM higher mm"),
+    ]
+    rows = []
+    for cell, (joint, phase) in enumerate(CELLS):
+        begin, end = PHASES[phase]
+
+        def several(changed: str, name: str, when: tuple[str, ...], pattern: str = "+.1f", cell: int = cell) -> str:
+            return " / ".join(_number(own, (changed, name, each), cell, pattern, 1e3, False) for each in when)
+
+        number = partial(_number, own, cell=cell)
+        rows.append(
+            [
+                SPRINGS[joint],
+                f"{100 * begin:.0f}–{100 * end:.0f} {phase}",
+                number(TORQUE, pattern="+.2f", interval=False),
+                number(ACCELERATION, pattern="+.3f"),
+                number(("fixed state", "upward_m_s2", ""), pattern="+.3f", interval=False),
+                number(IMPULSE, pattern="+.1f", unit=1e3, interval=False),
+                number(VELOCITY, pattern="+.1f", unit=1e3),
+                several("one stride", "speed_m_s", ("1", "2", "many")),
+                several("every stride", "speed_m_s", ("1", "2")),
+                number(MANY_STRIDES_SPEED, pattern="+.1f", unit=1e3),
+                number(("every stride", "step_length_m", "many"), pattern="+.1f", unit=1e3),
+                several("every stride", "com_ahead_m", ("1", "2", "many"), "+.0f"),
+                several("every stride", "com_height_m", ("many",), "+.2f"),
+            ]
+        )
+    return table(head, rows)
+
+
+def _everywhere(responses: Mapping[str, Response]) -> str:
+    rows = [
+        [_cell(cell), *(_number(own, MANY_STRIDES_SPEED, cell, "+.1f", 1e3) for own in responses.values())]
+        for cell in range(len(CELLS))
+    ]
+    rows.append(["unchanged m/s", *(f"{own.speed:.3f}" for own in responses.values())])
+    rows.append(["falls of all changed walks", *(str(own.falls.sum()) for own in responses.values())])
+    return table(["Δspeed of many strides, mm/s", *responses], rows)
+
+
+def _foretelling(responses: Mapping[str, Response]) -> str:
+    rows = [
+        [name, *(MISSING if not isfinite(r) else f"{r:.2f} [{low:.2f}, {high:.2f}]" for r, low, high, _ in each)]
+        for name, each in ((name, [own.links[name] for own in responses.values()]) for name in LINKS)
+    ]
+    signs = (f"{own.foretold.sum()} of {own.moved.sum()}" for own in responses.values())
+    rows.append(["right sign of ∫Δa dt, where speed changes", *signs])
+    return table(["r over joints and phases", *responses], rows)
+
+
+def _what_ran(study: Influence, responses: Mapping[str, Response]) -> str:
+    short = "".join(
+        f" The range of the actions cuts up to {own.cut.max():.0%} of a cell's changes short in `{name}`."
+        for name, own in responses.items()
+        if own.cut.any()
+    )
+    return (
+        f"First table: `{next(iter(responses))}`. Δτ (plantarflexion positive) and Δa (of the CoM), means over the "
+        f"phase: by `mj_forward` at each 10 ms of a stride of the unchanged walk, K alone changed; ∫Δa dt: over the "
+        f"phase of one leg. All else: a walk less the unchanged one from the same start on the same ground; "
+        f"{study.seeds} starts, ground uneven by ±{1e3 * study.unevenness_m:g} mm. K changes in the left leg's first "
+        f"stride alone, or in every stride of both; strides 1, 2 and {study.strides // 2 + 1}–{study.strides} (many). "
+        f"[95 % intervals]: bootstrap over starts. θ_eq is planned where nothing else is said; bodies walk at the "
+        f"Froude-equal speed.{short}"
+    )

@@ -1,0 +1,272 @@
+"""Do pushes find a policy's springs, and are they springs at all? Ankle and toe, beside the K that was applied.
+
+    springfoot study identify
+    springfoot study identify schedule frozen:pretrained pretrained --page docs/results.md
+    springfoot study identify schedule frozen:pretrained --repeats 200 --page docs/results.md
+
+`frozen:POLICY` is a policy's mean K over the phase, played open loop (`springfoot.evaluation.recording.open_loop`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import tyro
+
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.physics.model import damping_times
+from springfoot.envs.settings.settings import body_of
+from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.evaluation.recording.recording import record
+from springfoot.files.markdown import MISSING, table
+from springfoot.files.writing import csv_text
+from springfoot.gait.springs.perturbation import REACTS, SPRING
+from springfoot.gait.springs.spring_fit import Estimate
+from springfoot.gait.springs.stiffness import SPRINGS
+
+from ..base.study import Answer, OnProgress, WalkingStudy
+from .push_experiment import Row, identified, prepare_pushed, samples
+
+SECTION, COVERAGE_SECTION = "IDENTIFICATION", "IDENTIFICATION-COVERAGE"
+"""Of the results page."""
+UNDISTURBED_EPISODES = 8
+"""Episodes without pushes, whose springs stand beside."""
+REPEAT_EPISODES, REPEAT_SECONDS = 28, 6.0
+"""Size of each repeat of the experiment."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One policy, pushed."""
+
+    policy: str
+    """What was pushed."""
+    episodes: int
+    """How many."""
+    falls: int
+    """How many of them fell."""
+    damping_time: tuple[float, float]
+    """True beta of ankle and toe [s]."""
+    rows: tuple[Row, ...]
+    """Joint by joint, phase by phase."""
+    repeats: tuple[tuple[Row, ...], ...] = ()
+    """The same of every repeat, each of other episodes."""
+
+    def of(self, joint: str) -> list[Row]:
+        """Rows of a joint where it carries load."""
+        return [row for row in self.rows if row.joint == joint and row.loaded]
+
+    def repeated(self, row: Row) -> list[Row]:
+        """What the repeats found where `row` is."""
+        return [repeat[self.rows.index(row)] for repeat in self.repeats]
+
+
+def springs_table(experiment: Experiment) -> str:
+    """Markdown: a line for each joint and phase in which it carries load."""
+    head = (
+        "",
+        "% of stride",
+        "K applied",
+        "K pushed [95 %]",
+        "off",
+        "β ms [95 %]",
+        "explained by K and β",
+        "by further states",
+        "verdict",
+        "K undisturbed",
+    )
+    lines = []
+    for row in (row for joint in SPRINGS for row in experiment.of(joint)):
+        mean, low, high = row.applied
+        found, alone = row.pushed, row.undisturbed and row.undisturbed.stiffness
+        lines.append(
+            (
+                row.joint,
+                f"{100 * row.start:.0f}–{100 * row.end:.0f}",
+                f"{mean:.1f}" + (f" ({low:.0f}–{high:.0f})" if high - low > 0.01 * mean else ""),
+                _interval(found.stiffness, 1.0),
+                f"{100 * (found.stiffness.value / mean - 1):+.1f} %" if found.stiffness else MISSING,
+                _interval(found.damping_time, 1000.0),
+                f"{100 * found.explained:.0f} %",
+                f"{100 * found.reaction:.1f} %",
+                found.verdict,
+                f"{alone.value:.0f}" if alone else MISSING,
+            )
+        )
+    return table(head, lines)
+
+
+def sentence(experiment: Experiment) -> str:
+    """What the table says of each joint."""
+    said = []
+    for joint in SPRINGS:
+        rows = experiment.of(joint)
+        counts = [sum(row.pushed.verdict == verdict for row in rows) for verdict in (REACTS, SPRING)]
+        if counts[0]:
+            said.append(f"{joint} **{REACTS}**, in {counts[0]} of {len(rows)} phases")
+            continue
+        off = [abs(row.pushed.stiffness.value / row.applied[0] - 1) for row in rows if row.pushed.stiffness]
+        within = f", K within {100 * max(off):.1f} % of what was applied" if off else ""
+        said.append(f"{joint} a spring in {counts[1]} of {len(rows)} phases{within}")
+    return f"`{experiment.policy}`: {'; '.join(said)}. {experiment.falls} of {experiment.episodes} episodes fell."
+
+
+def coverage_table(experiments: Sequence[Experiment]) -> str:
+    """Markdown: of the repeats, how often intervals hold the truth and which verdict is given, where there is load."""
+    head = ("", "", "phases", "repeats", "K in its interval", "β in its interval", "called a spring", "called reacting")
+    lines = []
+    for experiment in experiments:
+        for column, joint in enumerate(SPRINGS):
+            rows, beta = experiment.of(joint), experiment.damping_time[column]
+            found = [experiment.repeated(row) for row in rows]
+            shares = [
+                [[_holds(row.pushed.stiffness, row.applied[0]) for row in each] for each in found],
+                [[_holds(row.pushed.damping_time, beta) for row in each] for each in found],
+                [[row.pushed.verdict == SPRING for row in each] for each in found],
+                [[row.pushed.verdict == REACTS for row in each] for each in found],
+            ]
+            counts = (f"{len(rows)}", f"{len(experiment.repeats)}")
+            lines.append((f"`{experiment.policy}`", joint, *counts, *map(_share, shares)))
+    return table(head, lines)
+
+
+def springs_csv(experiments: Sequence[Experiment]) -> str:
+    """CSV: a line for each policy, joint and phase, loaded or not, of the experiment (repeat 0) and of its repeats."""
+    spans = [f"{name}{end}" for name in ("stiffness_Nm_rad", "damping_time_s") for end in ("", "_low", "_high")]
+    head = (
+        *("policy", "repeat", "joint", "start", "end", "load", "applied_Nm_rad", "applied_lowest", "applied_highest"),
+        *("samples", "trials", *spans, "explained", "reaction", "reaction_p", "angle_spread_rad", "verdict", "reason"),
+        "undisturbed_Nm_rad",
+    )
+    lines = []
+    for experiment in experiments:
+        for repeat, rows in enumerate((experiment.rows, *experiment.repeats)):
+            for row in rows:
+                found, alone = row.pushed, row.undisturbed and row.undisturbed.stiffness
+                estimates = [*(found.stiffness or [None] * 3), *(found.damping_time or [None] * 3)]
+                numbers = (found.explained, found.reaction, found.reaction_p, found.angle_spread)
+                where = (experiment.policy, repeat, row.joint, row.start, row.end, row.load, *row.applied)
+                told = (found.samples, found.trials, *estimates, *numbers, found.verdict, found.reason)
+                lines.append((*where, *told, alone and alone.value))
+    return csv_text(head, lines)
+
+
+def _interval(estimate: Estimate | None, scale: float) -> str:
+    return MISSING if estimate is None else "{:.1f} [{:.1f}, {:.1f}]".format(*(scale * number for number in estimate))
+
+
+def _holds(estimate: Estimate | None, truth: float) -> bool:
+    return estimate is not None and estimate.low <= truth <= estimate.high
+
+
+def _share(found: Sequence[Sequence[bool]]) -> str:
+    """Percent of all, and of the phases with fewest and most."""
+    if not found:
+        return MISSING
+    each = 100 * np.mean(found, axis=1)
+    return f"{each.mean():.1f} % ({each.min():.1f}–{each.max():.1f})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identify(WalkingStudy):
+    """Find the springs of ankle and toe from walking under random pushes, and whether they are springs at all."""
+
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("pretrained",)
+    """Any policies of evaluate.py, as frozen:POLICY, its mean K over the phase played open loop."""
+    episodes: int = 128
+    """Episodes of each policy, each a trial of its own."""
+    push_newton: float = 100.0
+    """Size of the pushes, forward or backward at random [N]."""
+    push_seconds: float = 0.1
+    """Length of each [s]."""
+    push_interval: float = 2.0
+    """One push at a random time in each interval of this length [s]."""
+    noise_percent: float = 1.0
+    """Noise on the measured torque: standard deviation in percent of the largest torque of the mean stride."""
+    decisions: Literal["100hz", "50hz", "25hz"] | None = None
+    """When K is decided; unless given 100hz for what follows the phase alone, and as trained for a policy."""
+    margin: float = 0.0
+    """Part of the stride left out at both ends of each phase: 0.02 where K is held from the phase before."""
+    repeats: int = 0
+    """Ask instead how often the intervals of so many other experiments hold, each of 28 episodes × 6 s."""
+
+    QUICK: ClassVar = {"episodes": 28, "seconds": 4.5, "repeats": 0}
+
+    def check(self) -> None:
+        """Refuse pushes and noise that cannot be as well."""
+        super().check()
+        if not self.policies:
+            raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
+        require_number("push_newton", self.push_newton, 0, above=True, unit="N")
+        require_number("noise_percent", self.noise_percent, 0)
+        require_number("margin", self.margin, 0, 0.02, "of a stride")
+        require_count("repeats", self.repeats, 0)
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        own = (self.episodes + UNDISTURBED_EPISODES) * self.seconds + self.repeats * REPEAT_EPISODES * REPEAT_SECONDS
+        return len(self.policies) * own
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Push every policy."""
+        experiments = [self._push(name, progress) for name in self.policies]
+        if self.repeats:
+            sections = {COVERAGE_SECTION: f"{coverage_table(experiments)}\n\n{self._repeats_ran} {self._pushes}"}
+        else:
+            parts = [f"{sentence(each)}\n\n{springs_table(each)}" for each in experiments]
+            sections = {SECTION: "\n\n".join([*parts, f"{self._ran} {self._pushes}"])}
+        text = "\n\n".join(sections.values())
+        return Answer(text=text, files={"springs.csv": springs_csv(experiments)}, sections=sections)
+
+    @property
+    def _ran(self) -> str:
+        return (
+            "K in N·m/rad, with its range where it ramps. Rows: where the joint carries load, more than a tenth of its "
+            "largest torque; the CSV file has all. K undisturbed: what the estimator without pushes makes of the same "
+            f"walk. {self.what_ran} of each policy."
+        )
+
+    @property
+    def _repeats_ran(self) -> str:
+        return (
+            "Percent of all phases in which the joint carries load, and (of the phase with fewest – with most). "
+            f"{self.repeats} experiments of {REPEAT_EPISODES} episodes × {REPEAT_SECONDS:g} s each, no episode twice."
+        )
+
+    @property
+    def _pushes(self) -> str:
+        decided = f" K decided at {self.decisions}." if self.decisions else ""
+        decided += f" {100 * self.margin:g} % of the stride left out at both ends of each phase." if self.margin else ""
+        return (
+            f"A push of ±{self.push_newton:g} N × {self.push_seconds:g} s at a random time in each "
+            f"{self.push_interval:g} s; both legs together; noise on the torque of {self.noise_percent:g} % of the "
+            f"mean stride's largest, lasting 50 ms.{decided}"
+        )
+
+    def _push(self, name: str, progress: OnProgress) -> Experiment:
+        """The experiment on one policy, and its repeats."""
+        pushes = ("push_newton", "push_seconds", "push_interval")
+        given: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
+        given |= {"decisions": self.decisions} if self.decisions else {}
+        policy, settings = prepare_pushed(name, given, self.seed, self.threads)
+        said: dict[str, Any] = {"name": name, "threads": self.threads, "progress": progress}
+        pushed = record(policy, settings, episodes=self.episodes, seed=self.seed, **said)
+        alone = replace(settings, push_newton=0.0)
+        quiet = record(policy, alone, episodes=UNDISTURBED_EPISODES, seed=self.seed, **said)
+        rows = identified(samples(pushed, self.noise_percent, self.seed), samples(quiet), self.margin)
+        repeats, shorter = [], replace(settings, episode_seconds=REPEAT_SECONDS)
+        for repeat in range(self.repeats):
+            first = self.seed + self.episodes + repeat * REPEAT_EPISODES
+            again = record(policy, shorter, episodes=REPEAT_EPISODES, seed=first, **said)
+            repeats.append(tuple(identified(samples(again, self.noise_percent, first), margin=self.margin)))
+        ankle, toe = damping_times(body_of(settings))[FEET]
+        return Experiment(
+            policy=name,
+            episodes=self.episodes,
+            falls=int((pushed.fall_reason != "").sum()),
+            damping_time=(float(ankle), float(toe)),
+            rows=tuple(rows),
+            repeats=tuple(repeats),
+        )

@@ -1,0 +1,1 @@
+"""Studies of walks: policies side by side, bodies, trainings."""

@@ -1,0 +1,274 @@
+"""Ablations: what each part of preset `walk` contributes, trained without it, and each input of the fixed walk.
+
+    springfoot study ablations --seeds 3 --constant 363 79.5 --page docs/results.md
+
+Every row differs from the preset in its flags and in nothing else. A seed that is finished is not trained again, nor
+measured again, so the command may be stopped, begun anew with more rows or seeds, and run with `--no-train` to write
+the page from what there is. All rows earn the default reward when measured, so their returns compare.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.multi_seed import is_finished
+from springfoot.envs.control.equilibrium import PLATEAUS, foot_curves
+from springfoot.envs.control.leg_constants import LegConstants
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.physics.timing import ACTION_STEP
+from springfoot.envs.settings.settings import BipedSettings, reference_gait, settings_from, settings_to_json
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.report.gait_table import people_metrics
+from springfoot.files.markdown import MISSING, plus_minus, table, text_of
+from springfoot.files.writing import csv_text
+from springfoot.gait.people.scores import mean_sd
+from springfoot.gait.springs.stiffness import SPRINGS, Segment, StiffnessSchedule
+
+from ..base.protocol import Protocol, measured
+from ..base.quantities import COMPARED_JOINTS, Quantity
+from ..base.study import Answer, OnProgress
+from ..base.trainings import TrainingStudy
+
+ABLATIONS: dict[str, dict[str, Any]] = {
+    "walk": {},
+    "residual": {"action_mode": "residual"},
+    "plan-moments": {"feedforward": "plan"},
+    "neutral": {"equilibrium": "neutral"},
+    "phase": {"equilibrium": "phase"},
+    "100hz": {"decisions": "100hz"},
+    "25hz": {"decisions": "25hz"},
+    "event": {"decisions": "event"},
+    "no-com": {"reward_weights": {"com_x": 0.0, "com_z": 0.0}},
+    "no-zmp": {"reward_weights": {"zmp": 0.0}},
+    "no-plan": {"reward_weights": {"com_x": 0.0, "com_z": 0.0, "zmp": 0.0}},
+    "no-pose": {"reward_weights": {"pose": 0.0}},
+    "no-k-cost": {"reward_weights": {"stiffness": 0.0, "stiffness_rate": 0.0}},
+    "ankle-only": {"stiffness_joints": "ankle"},
+    "toe-only": {"stiffness_joints": "toe"},
+}
+"""Environment settings in which each training differs from preset `walk` (planned, absolute, 50 Hz, all terms,
+both joints); `phase` also has the schedule of `phase_schedule`."""
+MEANING = {
+    "walk": "the preset: planned equilibrium, 50 Hz, every reward term, ankle and toe",
+    "residual": "a factor on the fixed schedule, in place of K itself",
+    "plan-moments": "moments fed forward from the plan's inverse dynamics, not people's; leg constants of its own",
+    "neutral": "θ_eq constant, on the leg constants of `neutral`",
+    "phase": "θ_eq constant in each of ten phases, the planned one's mean",
+    "100hz": "K decided at 100 Hz",
+    "25hz": "K decided at 25 Hz",
+    "event": "K decided at heel strike, foot flat, heel-off and toe-off of each leg",
+    "no-com": "without reward for the CoM's x and z",
+    "no-zmp": "without reward for the CoP",
+    "no-plan": "without reward for the CoM's x and z and for the CoP",
+    "no-pose": "without reward for joint angles",
+    "no-k-cost": "without cost of K and of changing it",
+    "ankle-only": "toe with the fixed schedule",
+    "toe-only": "ankle with the fixed schedule",
+}
+KNOT_FIELDS = ("hip_knots_deg", "knee_knots_deg", "ankle_knots_deg")
+INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
+    "all inputs": lambda c: c,
+    "no moments of hip and knee fed forward": lambda c: replace(c, feedforward=(0.0, 0.0, c.feedforward[2])),
+    "no ankle moment fed forward": lambda c: replace(c, feedforward=(*c.feedforward[:2], 0.0)),
+    "no knots": lambda c: replace(c, **{name: (0.0,) * len(getattr(c, name)) for name in KNOT_FIELDS}),
+    "no speed feedback to the stance hip": lambda c: replace(c, speed_torque=0.0),
+    "no shift of the swing hip by speed": lambda c: replace(c, swing_speed_gain=0.0),
+}
+"""Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
+QUANTITIES = (
+    Quantity("falls", ".1f", ("undisturbed", "falls")),
+    Quantity("pushed", ".1f", ("pushed", "falls")),
+    Quantity("return", ".0f", ("undisturbed", "return", "mean")),
+    Quantity("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
+    *(Quantity(f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
+    *(Quantity(f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
+    Quantity("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
+    Quantity("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
+    Quantity("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
+    Quantity("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
+    Quantity("CoM x off m", ".4f", ("undisturbed", "com", "x_rmse_m")),
+    Quantity("CoP off m", ".4f", ("undisturbed", "zmp", "cop_rmse_single_support_m")),
+)
+"""Columns of every table."""
+
+RESULT = "ablation.json"
+"""In a trained row's folder, what was measured of it."""
+
+
+def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
+    """The planned equilibrium and fixed schedule of `settings`, constant on and between the plateaus of K: ten springs.
+
+    Each has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer, as between gait events,
+    the fixed schedule falls.
+    """
+    walk = reference_walk_at(settings, settings.speed)
+    planned = replace(settings, equilibrium="planned", schedule=None)
+    rest, stiffness = foot_curves(planned, walk.constants[0], walk)
+    place = np.searchsorted(PLATEAUS, GRID, side="right") - 1
+    segments: list[list[Segment]] = [[], []]
+    for index, start in enumerate(PLATEAUS):
+        for joint, own in enumerate(segments):
+            k, theta = stiffness[place == index, joint], rest[place == index, joint]
+            own.append(Segment(start, float(k.mean()), float((k * theta).mean() / k.mean())))
+    return StiffnessSchedule(**dict(zip(SPRINGS, map(tuple, segments), strict=True)))
+
+
+def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> TrainingConfig:
+    """The training of a row: as much walking as the preset's, or as `timesteps` of 20 ms, whatever the step."""
+    preset = PRESETS["walk"]
+    own = dict(ABLATIONS[name])
+    if name == "phase":
+        own["schedule"] = phase_schedule(preset.environment).to_json()
+    environment = settings_from(**settings_to_json(preset.environment) | own)
+    pace = ACTION_STEP / environment.step_seconds
+    return replace(
+        preset,
+        seed=seed,
+        environment=environment,
+        timesteps=round(pace * (timesteps or preset.timesteps)),
+        update_steps=round(pace * preset.update_steps),
+        eval_interval=round(pace * preset.eval_interval),
+    )
+
+
+def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> list[tuple[TrainingConfig, Path, str]]:
+    """Each row and seed to train: configuration, folder and what it is called."""
+    order = product(range(seeds), names)  # every row once before any twice
+    return [
+        (config_of(name, seed, timesteps), out / name / f"seed-{seed}", f"{name}, seed {seed}") for seed, name in order
+    ]
+
+
+def trained(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
+    """Row -> the metrics of each of its finished seeds, in order; rows without any are left out."""
+    rows = {}
+    for name in ABLATIONS:
+        folders = sorted((out / name).glob("seed-*"), key=lambda each: int(each.name.removeprefix("seed-")))
+        done = [folder for folder in folders if is_finished(folder)]
+        if done:
+            rows[name] = [measured(each / RESULT, how, name, partial(how.of, str(each))) for each in done]
+    return rows
+
+
+def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
+    """Each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
+    own = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for number, (name, change) in enumerate(INPUTS.items()):
+        legs = change(own)
+        make = partial(how.of, "schedule", legs=legs)
+        rows[name] = [measured(out / f"input-{number}.json", how, vars(legs), make)]
+    make = partial(how.of, "schedule", {"equilibrium": "angle"})
+    return rows | {"θ_eq: people's ankle angle alone": [measured(out / "input-angle.json", how, vars(own), make)]}
+
+
+def fixed(out: Path, how: Protocol, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
+    """The thesis's straight lines, and before them the best `constant` (ankle, toe) [N m/rad] where it is known."""
+    names = {"thesis lines": "thesis"}
+    if constant is not None:
+        names = {"best fixed spring": "constant:{:g},{:g}".format(*constant)} | names
+    return {
+        f"{label} (`{name}`)": [measured(out / f"{name.partition(':')[0]}.json", how, name, partial(how.of, name))]
+        for label, name in names.items()
+    }
+
+
+Rows = dict[str, list[dict[str, Any]]]
+"""Name -> metrics of each seed."""
+
+
+def rows_table(rows: Rows, head: str, people: bool = False) -> str:
+    """Markdown: rows down, `QUANTITIES` across, mean ± SD (n - 1) over the seeds of a row that has several."""
+    lines = []
+    for name, seeds in rows.items():
+        cells = [name, str(len(seeds))]
+        for each in QUANTITIES:
+            values = [value for value in map(each.of, seeds) if value is not None]
+            whole = each.path[-1] == "falls" and len(values) == 1
+            cells.append(plus_minus(mean_sd(values), ".0f" if whole else each.pattern))
+        lines.append(cells)
+    if people:
+        theirs = people_metrics(reference_gait(BipedSettings()))
+        known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
+        known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
+        lines.append(["people", MISSING, *(_known(known, each) for each in QUANTITIES)])
+    return table([head, "seeds", *(each.label for each in QUANTITIES)], lines)
+
+
+def _known(metrics: dict[str, Any], quantity: Quantity) -> str:
+    """A number of people's, where there is one."""
+    value: Any = metrics
+    for key in quantity.path[1:]:
+        value = value.get(key) if isinstance(value, dict) else None
+    return text_of(value, quantity.pattern)
+
+
+def _numbers(tables: dict[str, Rows]) -> str:
+    """CSV: a line for each seed of each row."""
+    lines = [
+        [section, row, index, *(each.of(metrics) for each in QUANTITIES)]
+        for section, rows in tables.items()
+        for row, seeds in rows.items()
+        for index, metrics in enumerate(seeds)
+    ]
+    return csv_text(["table", "row", "seed", *(each.column for each in QUANTITIES)], lines)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ablations(TrainingStudy):
+    """Train preset `walk` without each of its parts, measure, and tell what each contributes.
+
+    A seed that is finished is neither trained nor measured again: the command may be stopped and begun anew.
+    """
+
+    runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/ablations")
+    """Folder of all trainings and what was measured of them; what is finished in it is kept."""
+    only: tuple[str, ...] = ()
+    """Rows to train, all of them unless given."""
+    constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
+    """Best fixed spring [N m/rad], as `springfoot study best-constant` finds it."""
+    push_newton: float = 150.0
+    """Size of the pushes [N]."""
+
+    QUICK: ClassVar[dict[str, Any]] = {
+        **TrainingStudy.QUICK,
+        **{"runs": Path("runs/ablations-quick"), "only": ("walk",)},
+    }
+
+    def check(self) -> None:
+        """Refuse unknown rows as well."""
+        super().check()
+        for name in self.only:
+            if name not in ABLATIONS:
+                raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        rows = len(self.only or ABLATIONS) * self.seeds + len(INPUTS) + 1 + 1 + (self.constant is not None)
+        return 2 * rows * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Train what is missing, and measure."""
+        how = Protocol(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
+        failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
+        rows = trained(self.runs, how)
+        springs = fixed(self.runs, how, self.constant)
+        learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
+        springs |= {f"{label} (`{name}`)": rows[name] for name, label in learned.items() if name in rows}
+        explained = {f"`{name}`: {MEANING[name]}": each for name, each in rows.items()}
+        tables = {"SPRINGS": springs, "ABLATIONS": explained, "INPUTS": inputs(self.runs, how)}
+        heads = {"SPRINGS": "spring", "ABLATIONS": "training", "INPUTS": "fixed schedule"}
+        ran = f"{how.sentence} Mean ± SD over training seeds."
+        texts = {name: rows_table(each, heads[name], people=name == "SPRINGS") for name, each in tables.items()}
+        sections = {name: text if name == "INPUTS" else f"{text}\n\n{ran}" for name, text in texts.items()}
+        text = "\n\n".join([*texts.values(), ran])
+        return Answer(text=text, files={"ablations.csv": _numbers(tables)}, sections=sections, failed=failed)

@@ -1,0 +1,200 @@
+"""Many bodies at many speeds: one episode of a policy for each pair drawn, held against people at its Froude speed.
+
+    springfoot study bodies pretrained --pairs 300
+
+Heights, masses and speeds are drawn independently and evenly over the ranges of `train.py --preset any-body`; a
+height and a mass that make no body (`springfoot.gait.body.body.BMI_RANGE`) are drawn again.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.agents.policies.baselines import PolicyFunction, and_copy
+from springfoot.agents.training.config import PRESETS
+from springfoot.arrays import NDArray
+from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.subjects import DRAWN, Subjects
+from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait
+from springfoot.errors import require_count
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import policy_label, prepare
+from springfoot.evaluation.recording.recording import BATCH, Recording, record_each
+from springfoot.files.markdown import table
+from springfoot.files.writing import csv_text
+
+from ..base.flags import SettingsFlags, given
+from ..base.quantities import COMPARED_JOINTS, OPEN_LOOP, open_loop_note
+from ..base.study import Answer, OnProgress, Study
+
+RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
+"""What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
+PAIRS = "pairs.csv"
+"""Name of the file with a row for each pair."""
+PAIRS_OPEN_LOOP = "pairs_open_loop.csv"
+"""Name of the file with a row for each pair as walked by the policy's open-loop copy."""
+VERTICAL_R = "grf_vertical_r"
+"""The one column that is not told of the copy."""
+WORST_FALLS = 10
+"""Falls that are told one by one."""
+
+QUANTITIES = (
+    ("speed error %", "speed_error_percent", ".1f", abs),
+    *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
+    ("vertical force r", VERTICAL_R, ".3f", lambda r: -r),
+)
+"""Label, column, format, and how bad a value is."""
+
+
+def draw_pairs(settings: BipedSettings, pairs: int, seed: int = 0) -> dict[str, NDArray]:
+    """`height` [m], `mass` [kg] and `speed` [m/s], (pairs,) each, drawn as at a reset of `settings`."""
+    subjects = Subjects(settings, tabulated_speeds(settings), pairs)
+    subjects.reset(np.arange(pairs), [np.random.default_rng(seed)] * pairs)
+    height, mass = np.array([(body.height, body.mass) for body in subjects.bodies]).T
+    return {"height": height, "mass": mass, "speed": subjects.speed}
+
+
+def walk_pairs(
+    policy: PolicyFunction,
+    settings: BipedSettings,
+    who: Mapping[str, NDArray],
+    *,
+    name: str,
+    seed: int = 0,
+    threads: int = 2,
+    block: int = BATCH,
+    progress: OnProgress = lambda seconds: None,
+) -> list[dict[str, Any]]:
+    """One episode of each pair, and its numbers as in pairs.csv (docs/metrics.md); None where there is none.
+
+    Arguments as for `recording.record_each`; `block` pairs at a time, whose series are then let go.
+    """
+    rows = []
+    for first in range(0, len(who["height"]), block):
+        part = {key: values[first : first + block] for key, values in who.items()}
+        recordings = record_each(
+            policy, settings, part, name=name, seed=seed + first, threads=threads, progress=progress
+        )
+        rows += [_row(recording) for recording in recordings]
+    return rows
+
+
+def _row(recording: Recording) -> dict[str, Any]:
+    metrics, settings = measure(recording).metrics, recording.settings
+    speed = metrics["speed_m_s"]["mean"]
+    return {
+        "height_m": settings.height,
+        "mass_kg": settings.mass,
+        "speed_m_s": settings.speed,
+        "froude_speed": body_of(settings).froude_speed(settings.speed),
+        "people_clamped": int(reference_gait(settings).clamped),
+        "seconds": metrics["seconds_mean"],
+        "fall": str(recording.fall_reason[0]),
+        "measured_speed_m_s": speed,
+        "speed_error_percent": None if speed is None else 100 * (speed / settings.speed - 1),
+        **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS},
+        "grf_vertical_r": metrics["grf"]["vertical_r"],
+    }
+
+
+def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, Any]] = ()) -> str:
+    """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst.
+
+    The same pairs walked by the policy's open-loop `copy` stand beside, falls, speed and angles.
+    """
+    lines: list[list[str]] = [["falls", _falls(rows), "", "", "", *([_falls(copy), "", ""] if copy else [])]]
+    for label, column, pattern, badness in QUANTITIES:
+        if standing := _standing(rows, column, badness):
+            line = [label, *_spread(standing, column, pattern), _who(standing[-1])]
+            if copy:
+                beside = _standing(copy, column, badness) if column != VERTICAL_R else []
+                line += _spread(beside, column, pattern) if beside else ["", "", ""]
+            lines.append(line)
+    columns = ("median", "95 % within", "worst")
+    text = table(["", *columns, "worst pair", *(f"{OPEN_LOOP}: {each}" for each in columns if copy)], lines)
+    fallen = [row for row in rows if row["fall"]]
+    told = [f"{_who(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
+    return "\n".join([text, "", *told]).rstrip("\n")
+
+
+def _falls(rows: Sequence[Mapping[str, Any]]) -> str:
+    return f"{sum(bool(row['fall']) for row in rows)} of {len(rows)}"
+
+
+def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
+    """The pairs that did not fall, the worst last."""
+    return sorted(
+        (row for row in rows if not row["fall"] and row[column] is not None), key=lambda row: badness(row[column])
+    )
+
+
+def _spread(standing: Sequence[Mapping[str, Any]], column: str, pattern: str) -> list[str]:
+    size = [abs(row[column]) for row in standing]
+    most = size[int(np.ceil(0.95 * len(size))) - 1]
+    return [format(value, pattern) for value in (np.median(size), most, size[-1])]
+
+
+def _who(row: Mapping[str, Any]) -> str:
+    return f"{row['height_m']:.2f} m, {row['mass_kg']:.0f} kg, {row['speed_m_s']:.2f} m/s"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bodies(Study):
+    """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs.
+
+    A trained policy stands beside its open-loop copy, whose mean stiffness goes with the speed and scales with body.
+    """
+
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
+    """Any policy of evaluate.py."""
+    pairs: int = 300
+    """Bodies and speeds drawn, from --height-range, --mass-range and --speed-range."""
+    seconds: float = 20.0
+    """Length of the one episode of each."""
+    seed: int = 0
+    """Of the draw; the episode of pair i is seeded with seed + i."""
+    threads: int = 2
+    """Threads of the physics; the results are the same with any number."""
+    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
+    """What to walk in; a trained policy brings its own settings, standard conditions aside."""
+
+    QUICK: ClassVar[dict[str, Any]] = {"pairs": 2, "seconds": 5.0}
+
+    def check(self) -> None:
+        """Refuse counts out of range."""
+        for name, least in (("pairs", 1), ("seed", 0), ("threads", 1)):
+            require_count(name, getattr(self, name), least)
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls."""
+        return len(and_copy(self.policy)) * self.pairs * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every pair."""
+        conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
+        settings = prepare(self.policy, conditions, self.seed)[1]
+        who, how = draw_pairs(settings, self.pairs, self.seed), {"seed": self.seed, "threads": self.threads}
+        walks = []
+        for name in and_copy(self.policy):
+            prepared = prepare(name, conditions, self.seed, self.threads)
+            walks.append(walk_pairs(*prepared, who, name=policy_label(name), progress=progress, **how))
+        clamped = sum(row["people_clamped"] for row in walks[0])
+        text = (
+            f"{pairs_table(*walks)}\n\n`{self.policy}`, {self.pairs} pairs × {settings.episode_seconds:g} s, seed "
+            f"{self.seed}: {_ranges(settings)}, independent and even. Of the pairs that did not fall; {clamped} of all "
+            f"lie beyond people's measured speeds, and are held against the nearest.{open_loop_note(self.policy)}"
+        )
+        numbers = [csv_text(list(rows[0]), (list(row.values()) for row in rows)) for rows in walks]
+        files = dict(zip([PAIRS, PAIRS_OPEN_LOOP], numbers, strict=False))
+        return Answer(text=text, files={**files}, sections={"BODIES": text})
+
+
+def _ranges(settings: BipedSettings) -> str:
+    """What was drawn from, in words."""
+    units = dict(zip(DRAWN, ("m", "kg", "m/s"), strict=True))
+    spans = {name: getattr(settings, f"{name}_range") for name in DRAWN}
+    return ", ".join(f"{span[0]:g}–{span[1]:g} {units[name]}" for name, span in spans.items())

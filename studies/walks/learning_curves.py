@@ -1,0 +1,118 @@
+"""How fast a walk is learned: curves of one training from several seeds, and whether each came to walk.
+
+springfoot study learning-curves runs/seed-0 runs/seed-1 runs/seed-2 --page docs/learning.md
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Annotated, Any
+
+import matplotlib
+import tyro
+from matplotlib.figure import Figure
+
+from springfoot.agents.policies.policy import RUN
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers.criteria import WALKS, unmet
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.files.json_file import read_object
+from springfoot.files.markdown import MISSING, table
+from springfoot.files.writing import csv_text
+
+from ..base.quantities import walks_csv
+from ..base.study import Answer, OnProgress, WalkingStudy
+
+KEYS = ("timesteps", "seconds", "return_mean", "falls")
+"""Of a periodic evaluation: what is drawn and kept."""
+
+
+def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """The first periodic evaluation in which, and after which, no episode fell."""
+    steady = None
+    for entry in evaluations:
+        steady = None if entry["falls"] else steady or entry
+    return steady
+
+
+def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
+    """Write the picture: return of the periodic evaluations over environment steps and over wall time, a line a run."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 3.0), layout="constrained")
+        by_steps, by_time = figure.subplots(1, 2, sharey=True)
+        for name, run in runs.items():
+            entries = run["evaluations"]
+            returns = [entry["return_mean"] for entry in entries]
+            by_steps.plot([entry["timesteps"] / 1e6 for entry in entries], returns, label=name)
+            by_time.plot([entry["seconds"] for entry in entries], returns)
+        by_steps.set(
+            xlabel="environment steps (millions)", ylabel="return of an evaluation episode (10 s)", ylim=(0, None)
+        )
+        by_time.set(xlabel="wall time (s)")
+        by_steps.legend(frameon=False)
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearningCurves(WalkingStudy):
+    """Learning curves of several runs of the same training, and whether each came to walk.
+
+    Tells the wall time of each whole training, when its policy first fell in no evaluation episode, and which criteria
+    of a walk its best policy misses.
+    """
+
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
+    """Run folders of train.py."""
+
+    def check(self) -> None:
+        """Refuse an empty list of runs as well."""
+        super().check()
+        if not self.runs:
+            raise SpringfootError("give one run folder of train.py or more")
+
+    @property
+    def total(self) -> float:
+        """Simulated time [s], without falls."""
+        return len(self.runs) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Judge every run."""
+        runs = {folder.name: _read(folder) for folder in self.runs}
+        lines, walks = [], []
+        for folder, (name, run) in zip(self.runs, runs.items(), strict=True):
+            policy, settings = prepare(str(folder), {"episode_seconds": self.seconds}, self.seed)
+            metrics = measure(record(policy, settings, name=name, progress=progress, **self.how)).metrics
+            steady = first_without_falls(run["evaluations"])
+            when = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else MISSING
+            missed = ", ".join(unmet(metrics, WALKS)) or "nothing"
+            lines.append([name, f"{run['seconds']:.0f}", f"{run['timesteps']:,}", when, missed])
+            walks.append(({"run": name} | {f"training_{key}": run[key] for key in ("seconds", "timesteps")}, metrics))
+        head = ["run", "wall time s", "steps", "no falls from"]
+        head.append(f"missed over {self.episodes} episodes × {self.seconds:g} s")
+        text = f"{table(head, lines)}\n\nMedian wall time {median(run['seconds'] for run in runs.values()):.0f} s."
+        evaluations = [
+            [name, *(entry[key] for key in KEYS)] for name, run in runs.items() for entry in run["evaluations"]
+        ]
+        files = {
+            "evaluations.csv": csv_text(["run", *KEYS], evaluations),
+            "policies.csv": walks_csv(walks),
+            "learning.png": partial(save_curves, runs=runs),
+        }
+        return Answer(text=text, files=files, sections={"LEARNING": text})
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """The record of a finished run, with the time of every evaluation."""
+    record_of_run = read_object(folder / RUN, "record of a run") if (folder / RUN).is_file() else {}
+    try:
+        numbers = [entry[key] for entry in record_of_run["evaluations"] for key in KEYS]
+        float(sum(numbers) + record_of_run["seconds"] + record_of_run["timesteps"])
+    except (ValueError, KeyError, TypeError, OverflowError):
+        raise SpringfootError(
+            f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"
+        ) from None
+    return record_of_run

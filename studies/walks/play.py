@@ -1,0 +1,142 @@
+"""A page to play with: walks recorded over stiffness, speed and feet, between which its sliders blend.
+
+springfoot study play --page docs/play.md
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise, product
+from typing import Any, ClassVar
+
+import numpy as np
+
+from springfoot.agents.policies.baselines import PolicyFunction
+from springfoot.arrays import NDArray
+from springfoot.envs.control.foot_springs import action_of, stiffness_of
+from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.errors import SpringfootError, require_count
+from springfoot.evaluation.page.play_data import episodes_of
+from springfoot.evaluation.page.play_page import Grid, play_page
+from springfoot.evaluation.page.report_page import PAGE_PACKAGES
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import BATCH, WARM_UP, Recording, record
+from springfoot.files.markdown import table
+from springfoot.files.provenance import source
+from springfoot.gait.springs.stiffness import SPRINGS
+
+from ..base.study import Answer, OnProgress, WalkingStudy, without_places
+
+PAGE_NAME = "play.html"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Play(WalkingStudy):
+    """Record walks of a policy whose K of ankle and toe is scaled, over speed and right foot; write a page of them."""
+
+    policy: str = "schedule"
+    """Whose stiffness is scaled."""
+    ankle: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4, 2.0)
+    """Factors on the stiffness of both ankles, ascending; a device keeps its own."""
+    toe: tuple[float, ...] = (0.5, 1.0, 2.0)
+    """Factors on the stiffness of both toes, ascending."""
+    speed: tuple[float, ...] = (0.8, 1.0, 1.2, 1.4, 1.6)
+    """Commanded speeds [m/s], ascending."""
+    feet: tuple[str, ...] = ("intact", "passive", "rigid_toe", "no_toe", "weak")
+    """Kinds of the right foot; the left one is intact."""
+    episodes: int = 2
+    """Episodes of each point."""
+    seconds: float = 12.0
+    """Length of each."""
+    seed: int = 0
+    """Of the first episode of each foot and speed; the next ones count on."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {
+        "episodes": 1,
+        "seconds": 6.0,
+        "ankle": (0.7, 1.4),
+        "toe": (0.5, 1.0),
+        "speed": (1.0, 1.2),
+        "feet": ("intact", "passive"),
+    }
+
+    def check(self) -> None:
+        """Refuse marks of a slider that do not ascend, and too many episodes of a point."""
+        super().check()
+        for name in ("ankle", "toe", "speed"):
+            marks = getattr(self, name)
+            if len(marks) < 2 or marks[0] <= 0.0 or any(after <= before for before, after in pairwise(marks)):
+                raise SpringfootError(f"{name} must be at least two ascending positive numbers, got {marks}")
+        if not self.feet:
+            raise SpringfootError("feet must be at least one kind of foot")
+        require_count("episodes", self.episodes, 1, BATCH)
+        if self.seconds <= WARM_UP:
+            raise SpringfootError(f"seconds must be more than the warm-up of {WARM_UP:g} s, got {self.seconds:g}")
+
+    @property
+    def grid(self) -> Grid:
+        """What is recorded."""
+        return Grid(feet=self.feet, speed=self.speed, toe=self.toe, ankle=self.ankle)
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls."""
+        return self.grid.size * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk at every point."""
+        recordings = [
+            walk for foot, speed in product(self.feet, self.speed) for walk in self._walks(foot, speed, progress)
+        ]
+        words = (
+            f"Recorded: the policy {self.policy}, its K of ankles and toes times a factor, at {self.grid.size} points, "
+            f"{self.episodes} episode{'s' * (self.episodes > 1)} of {self.seconds:g} s each, on level ground, "
+            "1.70 m and 63 kg."
+        )
+        versions = (f"{name} {number}" for name, number in source(PAGE_PACKAGES)["versions"].items())
+        how = "\n".join([f"command: {without_places(self.command)}", f"seeds from {self.seed} on", *versions])
+        page = play_page(self.grid, recordings, words, how)
+        falls = np.array([each["falls"] for each in page.told]).reshape(len(self.feet), len(self.speed), -1)
+        rows = [
+            [foot.replace("_", " "), *(f"{(own == 0).sum()} / {(own == self.episodes).sum()}" for own in of_foot)]
+            for foot, of_foot in zip(self.feet, falls, strict=True)
+        ]
+        text = (
+            f"{words}\n\n{table(['right foot', *(f'{speed:g} m/s' for speed in self.speed)], rows)}\n\n"
+            f"Of {falls.shape[-1]} pairs of factors: never fell / always fell."
+        )
+        return Answer(text=text, files={PAGE_NAME: page.text}, sections={"PLAY": text})
+
+    def _walks(self, foot: str, speed: float, progress: OnProgress) -> Iterator[Recording]:
+        """A recording of each pair of factors, the ankle's changing fastest; as many side by side as a batch takes."""
+        conditions = {"right_foot": foot, "speed": speed, "episode_seconds": self.seconds}
+        policy, settings = prepare(self.policy, conditions, self.seed, self.threads)
+        if settings.action_mode != "absolute":
+            raise SpringfootError(f"policy must set K itself (action_mode absolute), got {self.policy}")
+        pairs = np.array([(ankle, toe) for toe, ankle in product(self.toe, self.ankle)])
+        side_by_side = BATCH // self.episodes
+        for begin in range(0, len(pairs), side_by_side):
+            factor = np.repeat(pairs[begin : begin + side_by_side], self.episodes, axis=0)
+            whole = record(
+                _scaled(policy, factor, settings),
+                settings,
+                name=self.policy,
+                episodes=len(factor),
+                seed=self.seed,
+                threads=self.threads,
+                progress=progress,
+            )
+            for first in range(0, len(factor), self.episodes):
+                yield episodes_of(whole, np.arange(first, first + self.episodes))
+
+
+def _scaled(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) -> PolicyFunction:
+    """`policy` with K of ankles and toes times `factor` (N, 2), as far as actions go."""
+    body = body_of(settings)
+
+    def scaled(observation: NDArray) -> NDArray:
+        own = policy(observation).astype(float).reshape(-1, len(SIDES), len(SPRINGS))
+        stiffness = stiffness_of(own, settings, body) * factor[:, None]
+        return action_of(stiffness, settings, body).reshape(len(factor), -1).astype(np.float32)
+
+    return scaled

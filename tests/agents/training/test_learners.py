@@ -1,0 +1,53 @@
+"""Learners of other libraries: two learn here, and the judge of `make test-learners` is right about who did."""
+
+import json
+from importlib.util import module_from_spec, spec_from_file_location
+
+import pytest
+
+from benchmarks import learners
+from springfoot.agents import load_policy
+from springfoot.errors import SpringfootError
+
+
+@pytest.mark.parametrize("example", ["sb3", "cleanrl_ppo"])
+def test_a_library_learns_to_walk_better(example, tmp_path):
+    """Half of the steps that `make test-learners` gives."""
+    spec = spec_from_file_location(example, learners.EXAMPLES / f"{example}.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    policies = []
+    for timesteps in (0, 65_536):
+        out = tmp_path / f"{timesteps}.safetensors"
+        module.main(out=str(out), timesteps=timesteps)
+        policies.append(load_policy(str(out)))
+    assert policies[1].settings == learners.TASK
+    result = learners.judge(*policies, must_learn=True)
+    assert result["p"] < learners.SIGNIFICANT and result["after"] > 1.1 * result["before"], result
+
+
+def test_who_did_not_get_better_has_not_learned():
+    pretrained = load_policy("pretrained")
+    assert learners.judge(pretrained, pretrained, must_learn=True)["passed"] is False
+    assert learners.judge(pretrained, pretrained, must_learn=False)["passed"] is True
+
+
+def test_what_is_done_is_kept_until_its_example_changes(tmp_path, monkeypatch):
+    learner = learners.LEARNERS[0]
+    (tmp_path / "results").mkdir()
+    kept = {"key": learners._key(learner), "passed": True}
+    (tmp_path / "results" / "sb3.json").write_text(json.dumps(kept))
+    assert learners.result_of(learner, tmp_path) == kept
+    (tmp_path / "sb3.py").write_text("# another")
+    monkeypatch.setattr(learners, "EXAMPLES", tmp_path)
+    with pytest.raises(SpringfootError, match=r"no virtual environment .* make test-learners"):
+        learners.result_of(learner, tmp_path)
+
+
+def test_every_example_is_a_learner_short_and_in_the_page():
+    examples = {path.stem: path.read_text(encoding="utf-8") for path in learners.EXAMPLES.glob("*.py")}
+    assert set(examples) == {learner.example for learner in learners.LEARNERS}
+    assert max(len(text.splitlines()) for text in examples.values()) <= 60
+    page = (learners.ROOT / "docs" / "learners.md").read_text(encoding="utf-8")
+    assert all(f"(../examples/learners/{name}.py)" in page for name in examples)

@@ -1,0 +1,174 @@
+"""train.py as it is typed: flags, refusals that leave nothing behind, Ctrl-C, and going on."""
+
+import json
+import math
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import tyro
+
+import train
+from springfoot.agents.policies.policy import read_policy
+from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.cli import train as train_command
+from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
+from springfoot.studies.base.flags import SettingsFlags, given
+
+SCRIPT, RUN = Path(train.__file__), "run.json"
+SHORT = [
+    *("--num-envs", "8", "--threads", "1", "--update-steps", "1024", "--eval-interval", "1024"),
+    *("--eval-episodes", "2", "--episode-seconds", "1"),
+]
+
+
+def main(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["train.py", *map(str, words)])
+    return train_command.train_main()
+
+
+def test_every_setting_is_a_flag_with_the_settings_own_help(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "100")  # a wider one sets groups side by side
+    with pytest.raises(SystemExit) as stopped:
+        main(monkeypatch, "--help")
+    assert stopped.value.code == 0
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())  # frames of the groups
+    for name in (*BipedSettings.__dataclass_fields__, *TrainingConfig.__dataclass_fields__):
+        assert name == "environment" or f"--{name.replace('_', '-')} " in text
+    assert "Commanded walking speed [m/s]. (default: 1.2)" in text
+    assert "None" not in text.replace("(default: None)", "")
+
+
+def flagged(*words: str) -> dict:
+    """The settings that these words on a command line give."""
+    return given(tyro.cli(SettingsFlags, args=words))
+
+
+def test_flags_that_were_not_given_are_not_given():
+    assert flagged() == {}
+    assert flagged("--height", "1.8", "--start", "random") == {"height": 1.8, "start": "random"}
+
+
+def test_help_groups_the_settings_by_theme_and_says_what_a_trained_policy_brings(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "100")
+    with pytest.raises(SystemExit):
+        flagged("--help")
+    _, *parts = re.split(r"(\w+) options [-─╮]+", " ".join(capsys.readouterr().out.replace("│", " ").split()))
+    groups = dict(zip(parts[::2], parts[1::2], strict=True))
+    assert list(groups) == list(THEMES)
+    for theme, says in THEMES.items():
+        assert says in groups[theme]
+        for name, its in THEME_OF.items():
+            assert (f"--{name.replace('_', '-')} " in groups[theme]) == (its == theme), name
+    assert "a trained policy brings nothing with it" in groups["body"]
+    assert "a trained policy brings --speed-rate with it" in groups["speed"]
+    assert "nothing" in groups["episode"] and "A trained policy brings its own." in groups["springs"]
+
+
+def test_flags_take_the_place_of_the_preset():
+    preset = PRESETS["walk"]
+    config = train_command.configured(preset, {"timesteps": 5}, {"height": 1.8, "ankle_stiffness_range": (30, 300)})
+    assert config.timesteps == 5 and config.learning_rate == preset.learning_rate
+    assert config.environment.height == 1.8
+    assert config.environment.ankle_stiffness_range == (30.0, 300.0)
+    assert config.environment.push_newton == preset.environment.push_newton
+
+
+def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
+    rows = [f"{percent},{10 + percent % 100 / 2},{name}" for name in ("slow", "fast") for percent in range(101)]
+    (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
+    own = flagged("--human", f"{tmp_path / 'mean.csv'}:fast")["human"]
+    assert own["name"] == "mean.csv:fast" and list(own["mean"]) == ["knee"]
+    assert train_command.configured(PRESETS["walk"], {}, {"human": own}).environment.human == own
+    time = [k / 100 for k in range(500)]
+    thigh = [f"{t},{20 * math.cos(2 * math.pi * t)}" for t in time]
+    knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t - 0.22))}" for t in time]
+    for name, curve in (("thigh", thigh), ("knee", knee)):
+        (tmp_path / f"{name}.csv").write_text("\n".join([f"time_s,{name}_flexion_deg", *curve]))
+    own = flagged("--human", f"{tmp_path / 'thigh.csv'},{tmp_path / 'knee.csv'}")["human"]
+    assert own["name"] == "thigh.csv,knee.csv" and own["stride_time"] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--out", "new", "--human", "nothing.csv"], "no file nothing.csv"),
+        (["--out", "new", "--human", "file"], "must be a .csv, .mot, .sto or .c3d file"),
+        ([], "give either --out NEW_FOLDER or --resume FOLDER"),
+        (["--out", "new", "--resume", "old"], "give either"),
+        (["--out", "new", "--mass", "-1"], "mass must be"),
+        (["--out", "new", "--ankle-stiffness-range", "800", "20"], "ankle_stiffness_range must be"),
+        (["--out", "new", "--reward-weights", '{"speeed": 1}'], "'speeed'"),
+        (["--out", "new", "--timesteps", "0"], "timesteps must be"),
+        (["--out", "new", "--equilibrium", "phase"], "schedule"),
+        (["--out", "file/new"], "cannot make the folder"),
+        (["--out", "file"], "already exists"),
+        (["--resume", "old"], "holds no run"),
+        (["--resume", "old", "--height", "1.8"], "drop --height"),
+    ],
+)
+def test_bad_input_is_one_line_exit_code_2_and_nothing_on_disk(monkeypatch, capsys, tmp_path, words, message):
+    (tmp_path / "file").write_text("kept")
+    monkeypatch.chdir(tmp_path)
+    assert main(monkeypatch, *words) == 2
+    out, error = capsys.readouterr()
+    assert out == "" and error.count("\n") == 1 and message in error
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.parametrize("words", [["--hight", "1.7"], ["--height", "tall"], ["--reward-weights", "nothing.json"]])
+def test_what_is_no_flag_is_refused(monkeypatch, capsys, tmp_path, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        main(monkeypatch, "--out", "new", *words)
+    assert stopped.value.code == 2
+    assert words[0] in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, capsys, tmp_path):
+    (tmp_path / "weights.json").write_text('{"grf": 0.1}')
+    weights = tmp_path / "weights.json"
+    words = ["--out", tmp_path / "run", "--timesteps", "1024", *SHORT, "--reward-weights", weights]
+    assert main(monkeypatch, *words) == 0
+    out, progress = capsys.readouterr()
+    assert "0 of 1,024 steps · return " in progress and "1,024 of 1,024 steps · return " in progress
+    assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
+    assert f"springfoot evaluate {tmp_path / 'run'}" in out
+    assert read_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number):
+    folder = tmp_path / "run"
+    command = [sys.executable, SCRIPT, "--out", folder, "--timesteps", "10_000_000", *SHORT]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            deadline = time.monotonic() + 60
+            while not (folder / RUN).exists() or json.loads((folder / RUN).read_text())["timesteps"] < 1024:
+                assert process.poll() is None, process.stderr and process.stderr.read()
+                assert time.monotonic() < deadline
+                time.sleep(0.05)
+            process.send_signal(number)
+            out, error = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 128 + number, error
+    assert "Traceback" not in error
+    assert f"springfoot train --resume {folder}" in out
+    record = json.loads((folder / RUN).read_text())
+    assert (record["status"], record["signal"]) == ("interrupted", number.name)
+    policy = read_policy(folder)
+    action = policy(policy.observation_mean)
+    assert action.shape == (4,) and (abs(action) <= 1).all()
+    if number == signal.SIGINT:
+        done = record["timesteps"]
+        again = [sys.executable, SCRIPT, "--resume", folder, "--timesteps", "1000"]
+        resumed = subprocess.run(again, capture_output=True, text=True)
+        assert resumed.returncode == 0, resumed.stderr
+        assert json.loads((folder / RUN).read_text())["timesteps"] == done + 1024

@@ -1,0 +1,98 @@
+"""The observation: each entry is what its name says, finite and within bounds."""
+
+import numpy as np
+import pytest
+from planned_body import Setup
+
+from springfoot.envs.physics.model import ACTIONS, LEFT, RIGHT
+from springfoot.envs.task.observation_entries import OBSERVATION
+from springfoot.gait.body.body import GRAVITY
+
+
+@pytest.fixture(scope="module")
+def thesis_body():
+    return Setup()
+
+
+def test_every_entry_of_the_observation_is_what_its_name_says(thesis_body):
+    setup = Setup(height=1.5, mass=80, speed=0.9)
+    measured = setup.measurement([0.1, 0.7])
+    measured.base[:, 1:] = [0.7, 0.1]
+    measured.base_velocity[:] = [0.9, -0.1, 0.5]
+    measured.angle[:] = np.arange(8).reshape(2, 4) / 10
+    measured.velocity[:] = -np.arange(8).reshape(2, 4)
+    force = np.zeros((2, 2, 3, 2))
+    force[..., 1] = np.arange(6).reshape(2, 3) * 100.0
+    action = np.tile([0.1, 0.2, 0.3, 0.4], (2, 1))
+    planned = setup.human.mean("ankle", np.array([0.1, 0.6]))
+    seen = setup.observe(measured, [0.1, 0.7], last_action=action, force=force)
+    row, other = (dict(zip(setup.task(2).names, values, strict=True)) for values in seen)
+
+    leg = setup.body.leg_length
+    froude, rate = np.sqrt(GRAVITY * leg), np.sqrt(leg / GRAVITY)
+    expected = {
+        "hip_height": 0.7 / leg,
+        "pitch": 0.1,
+        "hip_left": 0.0,
+        "toe_left": 0.3,
+        "hip_right": 0.4,
+        "ankle_right": 0.6,
+        "hip_velocity_x": 0.9 / froude,
+        "hip_velocity_z": -0.1 / froude,
+        "pitch_rate": 0.5 * rate,
+        "knee_rate_left": -1 * rate,
+        "toe_rate_right": -7 * rate,
+        "phase_sin": np.sin(0.2 * np.pi),
+        "phase_cos": np.cos(0.2 * np.pi),
+        "phase_sin_2": np.sin(0.4 * np.pi),
+        "phase_cos_2": np.cos(0.4 * np.pi),
+        "load_heel_left": 0.0,
+        "load_toe_left": 200 / (80 * GRAVITY),
+        "load_heel_right": 300 / (80 * GRAVITY),
+        "com_x_error": 0.0,
+        "com_z_error": 0.0,
+        "last_action_ankle_left": 0.1,
+        "last_action_toe_right": 0.4,
+        "planned_ankle_left": planned[LEFT],
+        "planned_ankle_right": planned[RIGHT],
+        "leading_leg": 1.0,
+        "command_speed": setup.body.froude_speed(0.9),
+        "height_ratio": 1.5 / 1.7,
+    }
+    for name, value in expected.items():
+        assert row[name] == pytest.approx(value, rel=1e-6, abs=1e-4), name
+    assert other["leading_leg"] == -1.0
+    assert other["com_x_error"] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_observation_is_finite_and_within_bounds_whatever_happens(thesis_body):
+    task = thesis_body.task(3)
+    measured = thesis_body.measurement([0.2, 0.3, 0.4])
+    for values, wild in ((measured.angle, 1e9), (measured.velocity, -1e9), (measured.base_velocity, np.nan)):
+        values[:] = wild
+    measured.com[:] = np.inf
+    seen = thesis_body.observe(measured, [0.2, 0.3, 0.4])
+    assert seen.dtype == np.float32
+    assert seen.shape == (3, len(OBSERVATION)) == (3, len(task.low))
+    assert np.isfinite(seen).all()
+    assert ((seen >= task.low) & (seen <= task.high)).all()
+    assert np.isfinite(task.low).all() and np.isfinite(task.high).all()
+    assert (task.low < task.high).all()
+
+
+def test_names_are_unique_and_name_the_actions():
+    names = [entry.name for entry in OBSERVATION]
+    assert len(set(names)) == len(names)
+    assert [name.removeprefix("last_action_") for name in names if name.startswith("last_action_")] == list(ACTIONS)
+
+
+def test_contact_loads_are_in_weights_of_the_body_with_what_it_carries(thesis_body):
+    loaded = Setup(carried_ratio=0.25)
+    force = np.zeros((1, 2, 3, 2))
+    force[..., 1] = 100.0
+    entry = [each.name for each in OBSERVATION].index("load_ball_left")
+    alone, carrying = (
+        setup.observe(setup.measurement([0.1]), [0.1], force=force)[0, entry] for setup in (thesis_body, loaded)
+    )
+    assert alone == pytest.approx(100.0 / (63.0 * GRAVITY), rel=1e-6)
+    assert carrying == pytest.approx(alone / 1.25, rel=1e-6)

@@ -1,0 +1,131 @@
+"""The live walk in a real browser: its sliders and buttons steer the simulation, and nothing else is loaded."""
+
+import re
+import socket
+import threading
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from springfoot.cli.live import live_main
+from springfoot.cli.main import main
+from springfoot.evaluation.live.steered_walk import ELSEWHERE, LiveSession
+
+viser = pytest.importorskip("viser", reason="the extra live")
+
+
+@pytest.fixture(scope="module")
+def view():
+    """A walk that goes on in a thread of its own, as the command's does in the main one."""
+    from springfoot.evaluation.live.view import LiveView
+
+    view = LiveView(LiveSession("pretrained"), port=0)
+    ended = threading.Event()
+    walker = threading.Thread(target=lambda: [view.run(0.2) for _ in iter(ended.is_set, True)])
+    walker.start()
+    yield view
+    ended.set()
+    walker.join()
+    view.stop()
+
+
+def reaches(condition, seconds=30.0):
+    """Whether something comes true while the walk goes on."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return condition()
+
+
+def test_in_a_browser_sliders_set_the_k_that_acts_and_buttons_push_and_restart(chromium, view):
+    session = view._session
+    tab = chromium.new_page(viewport={"width": 1280, "height": 1000})
+    told, asked = [], []
+    tab.on("pageerror", lambda error: told.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(view.address)
+    tab.get_by_text("K that acts").wait_for(timeout=60_000)
+
+    tab.get_by_role("combobox").first.click()
+    tab.get_by_role("option", name="by hand").first.click()
+    assert reaches(lambda: session.wishes.ankle_source == "by hand")
+    (number,) = (each for each in tab.get_by_role("textbox").all() if each.input_value() == "300")
+    number.fill("420")
+    number.press("Enter")
+    assert reaches(lambda: np.allclose(session.frame.stiffness[:, 0], 420.0))  # as it acted in the simulation
+    assert session.data().ctrl.reshape(2, 4, 2)[:, 2, 0] == pytest.approx([420.0, 420.0])
+    tab.get_by_role("cell", name="420").first.wait_for()  # and as the page tells
+
+    tab.get_by_role("button", name="Push").click()
+    assert reaches(lambda: 150.0 in [frame.push for frame in list(view._history)])
+    assert reaches(lambda: view._history[-1].push == 0.0)
+    frames = list(view._history)
+    begin = next(at for at, frame in enumerate(frames) if frame.push)
+    assert frames[begin + 4].speed - frames[begin - 1].speed > 0.1  # 150 N for 0.1 s on 63 kg are 0.24 m/s
+    tab.get_by_role("button", name="Restart").click()
+    assert reaches(lambda: session.frame.time < 2.0)
+    tab.close()
+    assert told == []
+    assert {url.split("/")[2] for url in asked if url.startswith("http")} == {view.address.split("/")[2]}
+
+
+def test_only_this_machine_reaches_it_unless_told_otherwise(view):
+    assert view.address.startswith("http://127.0.0.1:")
+    assert view._server.get_host() == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "comes_in"),
+    [
+        ("http://127.0.0.1:{port}", None, True),
+        (None, None, True),  # no browser
+        ("https://example.org", None, False),
+        ("http://127.0.0.1:1", None, False),
+        ("null", None, False),
+        ("http://example.org:{port}", "example.org:{port}", False),  # a name that leads here
+    ],
+)
+def test_no_other_page_of_the_browser_can_steer(view, origin, host, comes_in):
+    port = view._server.get_port()
+    sent = {"Origin": origin, "Host": host or "127.0.0.1:{port}"}
+    lines = [f"{name}: {value.format(port=port)}" for name, value in sent.items() if value]
+    lines += ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+    lines += ["Sec-WebSocket-Key: c3ByaW5nZm9vdCBmZWV0IQ==", f"Sec-WebSocket-Protocol: viser-v{viser.__version__}"]
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as connection:
+        connection.sendall("\r\n".join(["GET / HTTP/1.1", *lines, "", ""]).encode())
+        answer = connection.recv(1000).decode(errors="replace")
+    assert answer.split()[1] == ("101" if comes_in else "403")
+
+
+def test_the_command_says_where_and_ends_in_its_time(capsys):
+    assert main(["live", "schedule", "--port", "0", "--seconds", "1"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("Live at http://127.0.0.1:") and said[1].endswith("pictures a second")
+    assert len(said) == 2
+
+
+def test_help_marks_every_flag_that_live_refuses_and_no_other(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit, match=r"^0$"):
+        live_main(["--help"])
+    flag, text = r"--[a-z][a-z-]+(?= )", capsys.readouterr().out
+    marked = {before for before, word in pairwise(re.findall(rf"{flag}|Refused: ", text)) if word == "Refused: "}
+    assert marked == {f"--{name.replace('_', '-')}" for name in ELSEWHERE}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nonsense"], "no policy 'nonsense'"),
+        (["schedule", "--port", "70000"], "port must be a whole number >= 0 and <= 65535, got 70000"),
+        (["schedule", "--speed", "2.0"], "speed must be a finite number >= 0.6 and <= 1.8, got 2.0"),
+        (["schedule", "--push-newton", "300"], "live takes no push_newton: the button Push pushes"),
+        (["schedule", "--seconds", "0"], "seconds must be a finite number > 0 s, got 0.0"),
+    ],
+)
+def test_bad_flags_are_one_line(words, said, capsys):
+    assert live_main(words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("springfoot live: error: ") and said in error and error.count("\n") == 1

@@ -1,0 +1,292 @@
+"""The measurement of a gait: people fed in as a recording come out as people."""
+
+import json
+
+import numpy as np
+import pytest
+
+from springfoot.envs.physics.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
+from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.task.reward import TERMS
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
+from springfoot.evaluation.numbers.tally import tally_strides
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
+from springfoot.gait import GRAVITY, Body, human_gait
+from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT
+
+BODY = Body()
+HUMAN = human_gait(1.2)
+STRIDE_LENGTH = 2 * HUMAN.step_length
+SPEED = STRIDE_LENGTH / HUMAN.stride_time
+WEIGHT = BODY.mass * GRAVITY
+PITCH = 0.05
+CLEARANCE = 0.03
+
+
+def people(episodes=2, seconds=10.0, fell=(), cut=None, **settings) -> Recording:
+    """Episodes of people's mean curves walking over a flat plan; `cut` is the length of those that `fell` [ticks]."""
+    count = round(seconds * 100)
+    time = (np.arange(count) + 1) * 0.01
+    strides = time[:, None] / HUMAN.stride_time + np.array([0.3, 0.8])
+    phase = strides % 1
+    middle = (strides - 0.005 / HUMAN.stride_time) % 1
+
+    def joints(curve):
+        return np.stack([curve(name) for name in ("thigh", "knee", "ankle", "toe")], -1)
+
+    angle = joints(lambda name: HUMAN.mean(name, phase))
+    velocity = joints(lambda name: HUMAN.rate(name, phase) / HUMAN.stride_time)
+    angle[..., 0] += PITCH  # hip = thigh + trunk pitch
+    torque = np.zeros((count, 2, 4))
+    for joint, name in enumerate(("hip", "knee", "ankle")):
+        torque[..., joint] = -HUMAN.mean(f"{name}_moment", phase) * BODY.mass
+    mean_torque = np.zeros_like(torque)
+    for joint, name in enumerate(("hip", "knee", "ankle")):
+        mean_torque[..., joint] = -HUMAN.mean(f"{name}_moment", middle) * BODY.mass
+    rate = joints(lambda name: HUMAN.rate(name, middle) / HUMAN.stride_time)
+    work = mean_torque * rate * 0.01
+    energy = np.zeros((count, len(ledger_entries())))
+    energy[:, [ledger_entries().index(name) for name in ("actuators", "contact")]] = 0.3, -0.1  # J a tick
+    energy[:, ledger_entries().index("mechanical")] = 600.0 + 0.25 * np.arange(count)
+    force = np.zeros((count, 2, 3, 2))
+    force[:, :, 1, 0] = HUMAN.mean("grf_forward", middle) * WEIGHT
+    force[:, :, 1, 1] = HUMAN.mean("grf_vertical", middle) * WEIGHT
+    # A foot stands where it landed and moves evenly through its swing; a third of a step behind the CoM on landing.
+    swing = np.clip((phase - HUMAN.toe_off) / (1 - HUMAN.toe_off), 0, 1)
+    com = np.stack([SPEED * time, 0.97 - 0.02 * np.cos(4 * np.pi * phase[:, 0])], -1)
+    landed = (np.floor(strides) - [0.3, 0.8]) * STRIDE_LENGTH + 0.2
+    ankle = np.stack([landed + swing * STRIDE_LENGTH, np.full_like(phase, 0.07)], -1)
+    contact = np.zeros((count, 2, 3, 2))
+    # Spheres that roll: their lowest points move against the turn of foot and toe, the sole's material stays.
+    foot = angle[..., 0] - PITCH - angle[..., 1] + angle[..., 2]
+    turn = np.stack([foot, foot + angle[..., 3], foot + angle[..., 3]], -1)
+    contact[..., 0] = ankle[..., None, 0] - turn * [HEEL_RADIUS, BALL_RADIUS, TOE_RADIUS]
+    contact[..., 1] = np.where(swing > 0, CLEARANCE, 0.0)[..., None]
+    step = PERCENT / 100
+    plan = np.stack([-0.2 + HUMAN.step_length * step, 0.97 - 0.02 * np.cos(2 * np.pi * step)], -1)
+    series = {
+        "base": np.tile([0.0, 0.88, PITCH], (count, 1)),
+        "angle": angle,
+        "velocity": velocity,
+        "torque": torque,
+        "joint_torque": mean_torque,
+        "joint_work": np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1),
+        "energy": energy,
+        "com": com,
+        "com_velocity": np.gradient(com, 0.01, axis=0),
+        "com_reference": com,
+        "ankle": ankle,
+        "contact": contact,
+        "force": force,
+        "phase": phase,
+        "stiffness": np.broadcast_to([300.0, 40.0], (count, 2, 2)),
+        "equilibrium": np.zeros((count, 2, 2)),
+        "reward": np.broadcast_to(np.arange(len(TERMS)) / 10, (count, len(TERMS))),
+    }
+    stacked = {name: np.stack([values] * episodes).astype(np.float32) for name, values in series.items()}
+    ticks = np.full(episodes, count)
+    for episode in fell:
+        ticks[episode] = cut
+        for values in stacked.values():
+            values[episode, cut:] = np.nan
+    return Recording(
+        policy="people",
+        settings=BipedSettings(episode_seconds=seconds, **settings),
+        seed=0,
+        ticks=ticks,
+        returns=np.arange(episodes, dtype=float),
+        fall_reason=np.array(["fell: hip too low" if i in fell else "" for i in range(episodes)]),
+        plan_com=plan,
+        plan_zmp=plan[:, 0],
+        series=stacked,
+    )
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return measure(people())
+
+
+def test_people_recorded_are_people_measured(gait):
+    metrics = gait.metrics
+    for name, joint in metrics["joints"].items():
+        assert joint["rmse_deg"] < 0.3, name
+        assert joint["r"] > 0.999
+        assert joint["within_1sd_percent"] == 100
+    grf = metrics["grf"]
+    assert grf["vertical_peak1_bw"] == pytest.approx(HUMAN.mean("grf_vertical", PERCENT / 100)[3:26].max(), abs=0.01)
+    assert grf["vertical_r"] > 0.99 and grf["forward_r"] > 0.99
+    for name in ("hip", "knee", "ankle"):
+        assert metrics["moments"][name]["r"] > 0.99
+    ankle = HUMAN.mean("ankle_moment", PERCENT / 100)
+    assert metrics["moments"]["ankle"]["peak_Nm_kg"] == pytest.approx(ankle.max(), abs=0.01)
+    assert metrics["moments"]["ankle"]["peak_percent"] == pytest.approx(ankle.argmax(), abs=1)
+    assert metrics["moments"]["toe"] == {
+        "peak_Nm_kg": 0.0,
+        "peak_percent": 0,
+        "late_swing_peak_Nm_kg": 0.0,
+        "r": None,
+        "within_2sd_percent": None,
+    }
+    hip = HUMAN.mean("hip_moment", PERCENT / 100)
+    assert metrics["moments"]["hip"]["late_swing_peak_Nm_kg"] == pytest.approx(hip[80:].max(), abs=0.01)
+    assert all(metrics["moments"][name]["within_2sd_percent"] > 95 for name in ("hip", "knee", "ankle"))
+
+
+def test_distances_and_times_of_the_gait(gait):
+    metrics = gait.metrics
+    assert metrics["speed_m_s"]["mean"] == pytest.approx(SPEED, rel=1e-4)
+    assert metrics["step_length_m"] == pytest.approx(HUMAN.step_length, abs=0.005)
+    assert metrics["cadence_steps_min"] == pytest.approx(120 / HUMAN.stride_time, rel=1e-3)
+    assert metrics["double_support_s"] == pytest.approx((HUMAN.toe_off - 0.5) * HUMAN.stride_time, abs=0.015)
+    assert metrics["toe_off_percent"] == pytest.approx(100 * HUMAN.toe_off, abs=1.5)
+    assert metrics["contact_travel_m"] == pytest.approx(0.0, abs=1e-3)
+    assert metrics["toe_clearance_m"] == pytest.approx(CLEARANCE, abs=1e-6)
+
+
+def test_centre_of_mass_on_its_plan_has_no_error(gait):
+    com = gait.metrics["com"]
+    # Heel strike is seen at 0.05 BW, a few ms after it: 1.2 m/s makes that a few mm.
+    assert com["x_rmse_m"] < 0.008
+    assert com["z_rmse_m"] < 0.001
+    assert com["z_r"] > 0.995
+    assert com["rise_m"] == pytest.approx(0.04, abs=5e-4)
+
+
+def test_energies_of_a_stride_are_the_sums_of_its_ticks(gait):
+    energy, ticks = gait.metrics["energy_J_kg"], HUMAN.stride_time / 0.01
+    assert energy["actuators"] == pytest.approx(0.3 * ticks / BODY.mass, rel=1e-3)
+    assert energy["mechanical_change"] == pytest.approx(0.25 * ticks / BODY.mass, rel=1e-3)
+    assert energy["residual"] == pytest.approx((0.25 - 0.3 + 0.1) * ticks / BODY.mass, rel=1e-3)
+    assert energy["pushes"] == 0.0
+
+
+def test_joint_work_is_that_of_peoples_moments_and_rates(gait):
+    phase = np.arange(1000) / 1000
+    for joint, curve in (("hip", "thigh"), ("knee", "knee"), ("ankle", "ankle")):
+        power = -HUMAN.mean(f"{joint}_moment", phase) * HUMAN.rate(curve, phase)  # of a stride
+        work = gait.metrics["joint_work_J_kg"][joint]
+        assert work["positive"] == pytest.approx(np.maximum(power, 0.0).mean(), rel=0.03)
+        assert work["negative"] == pytest.approx(-np.minimum(power, 0.0).mean(), rel=0.03)
+    assert gait.metrics["ankle_work_J_kg"] == gait.metrics["joint_work_J_kg"]["ankle"]
+
+
+@pytest.mark.parametrize("off", [0.0, 0.03])
+def test_a_cop_beside_the_planned_zmp_is_as_far_off_as_it_is(off):
+    recording = people(1)  # whose planned ZMP runs below the planned CoM
+    recording.series["contact"][..., 0] = recording.series["com"][..., None, None, 0] + off
+    zmp = measure(recording).metrics["zmp"]
+    # Heel strike is seen at 0.05 BW, a few ms after it: 1.2 m/s makes that a few mm.
+    assert zmp["cop_rmse_single_support_m"] == pytest.approx(off, abs=0.008)
+    assert zmp["cop_rmse_m"] == pytest.approx(off, abs=0.008)
+    assert zmp["r"] > 0.999
+    tally = tally_strides(recording)
+    ahead = (tally.cop.mean("x") - tally.com.mean("x"))[2:]  # beyond the tick in which the ankle lands
+    np.testing.assert_allclose(ahead, off, atol=5e-4)  # half a tick is 6 mm
+
+
+def test_moments_are_actuator_and_passive_torque_with_extension_positive(gait):
+    moment = gait.both.mean("ankle_moment_Nm_per_kg")
+    assert moment[48] == pytest.approx(HUMAN.mean("ankle_moment", 0.48), abs=0.02)
+    power = gait.both.mean("ankle_power_W_per_kg")
+    assert power.argmax() == pytest.approx(HUMAN.mean("ankle_power", PERCENT / 100).argmax(), abs=1)
+    assert power.max() > 2
+
+
+def test_a_load_on_the_back_leaves_moments_per_kg_of_body(gait):
+    carrying = measure(people(carried_ratio=0.25))
+    for name in ("hip_moment_Nm_per_kg", "knee_moment_Nm_per_kg", "ankle_moment_Nm_per_kg"):
+        np.testing.assert_array_equal(carrying.both.mean(name), gait.both.mean(name), err_msg=name)
+
+
+def test_curves_of_states_and_of_means_begin_together_as_the_foot_lands(gait):
+    """States are known at the end of a tick, means belong to its middle: 0.0045 of a stride between them."""
+    fine = np.arange(5000) / 1e5
+    landed = fine[(HUMAN.mean("grf_vertical", fine) >= CONTACT_THRESHOLD_BW).argmax()]
+    phase = PERCENT[:-1] / 100 + landed
+
+    def late(name, curve):
+        slope = (HUMAN.mean(name, phase + 1e-4) - HUMAN.mean(name, phase - 1e-4)) / 2e-4
+        return (curve[:-1] - HUMAN.mean(name, phase)) @ slope / (slope @ slope)
+
+    mean = gait.both.mean
+    state = late("knee", np.radians(mean("knee_flexion_deg")))
+    assert state == pytest.approx(0.0, abs=0.0025)  # a straight line between two samples meets the threshold early
+    for name, column in (("grf_vertical", "grf_vertical_bw"), ("ankle_moment", "ankle_moment_Nm_per_kg")):
+        assert late(name, mean(column)) == pytest.approx(state, abs=0.001), name
+
+
+def test_segment_angles_follow_from_joint_angles(gait):
+    mean = gait.both.mean
+    assert mean("pelvis_anterior_tilt_deg") == pytest.approx(np.degrees(PITCH), abs=1e-4)
+    assert mean("hip_flexion_deg") == pytest.approx(mean("thigh_flexion_deg") + mean("pelvis_anterior_tilt_deg"))
+    assert mean("shank_pitch_deg") == pytest.approx(mean("thigh_flexion_deg") - mean("knee_flexion_deg"))
+    assert mean("foot_pitch_deg") == pytest.approx(mean("shank_pitch_deg") + mean("ankle_dorsiflexion_deg"))
+
+
+def test_cost_of_transport_is_the_positive_work_of_all_joints(gait):
+    phase = np.arange(1000) / 1000
+    power = sum(
+        np.maximum(-HUMAN.mean(f"{joint}_moment", phase) * HUMAN.rate(curve, phase), 0).mean()
+        for joint, curve in (("hip", "thigh"), ("knee", "knee"), ("ankle", "ankle"))
+    )
+    # The rate is per stride, so the mean over phase is work per stride, body mass and leg.
+    assert gait.metrics["cost_of_transport"] == pytest.approx(2 * power / (GRAVITY * STRIDE_LENGTH), rel=0.03)
+
+
+def test_feet_and_both_are_consistent(gait):
+    left, right = gait.plan.foot
+    assert left.count + right.count == gait.both.count == gait.metrics["strides"]["count"]
+    for name in GAIT_CYCLE_COLUMNS:
+        pooled = (left.mean(name) * left.count + right.mean(name) * right.count) / gait.both.count
+        assert gait.both.mean(name) == pytest.approx(pooled, abs=1e-9)
+    assert gait.both.sd("knee_flexion_deg").max() < 0.5
+
+
+def test_falls_are_counted_and_their_strides_too():
+    whole, cut = measure(people(3)), measure(people(3, fell=[1], cut=600))
+    assert (cut.metrics["falls"], cut.metrics["fall_reasons"]) == (1, {"fell: hip too low": 1})
+    assert cut.metrics["seconds_mean"] == pytest.approx((10 + 6 + 10) / 3)
+    assert 0 < cut.metrics["strides"]["in_episodes_that_fell"] < whole.both.count / 3
+    assert cut.both.count < whole.both.count
+    assert cut.metrics["return"] == {"mean": 1.0, "sd": 1.0}
+
+
+def test_a_gait_that_never_was_is_null_never_nan():
+    gait = measure(people(2, fell=[0, 1], cut=150))
+    text = json.dumps(gait.metrics, allow_nan=False)
+    assert gait.metrics["falls"] == 2 and gait.metrics["strides"]["count"] == 0
+    for path in (("speed_m_s", "mean"), ("joints", "knee", "rmse_deg"), ("grf", "vertical_max_bw"), ("com", "rise_m")):
+        value = json.loads(text)
+        for key in path:
+            value = value[key]
+        assert value is None, path
+
+
+def test_numbers_can_be_recomputed_from_the_saved_series(tmp_path):
+    recording = people(2, fell=[1], cut=700)
+    recording.save(tmp_path / "strides.npz")
+    with np.load(tmp_path / "strides.npz", allow_pickle=False) as file:
+        assert not any(values.dtype.hasobject for values in file.values())
+        assert set(SERIES) < set(file)
+    assert measure(load_recording(tmp_path / "strides.npz")).metrics == measure(recording).metrics
+
+
+def test_bodies_side_by_side_are_measured_each_in_its_own_units():
+    ranges = {"height_range": (1.5, 1.9), "mass_range": (50.0, 100.0), "speed_range": (1.0, 1.3)}
+    policy, settings = prepare("quasi_stiffness", ranges | {"episode_seconds": 5.0})
+    who = {"height": [1.7, 1.9], "mass": [63.0, 100.0], "speed": [1.2, 1.2 * np.sqrt(1.9 / 1.7)]}
+    own, other = record_each(policy, settings, who, name="quasi_stiffness", seed=3)
+    alone = record(*prepare("quasi_stiffness", {"episode_seconds": 5.0}), name="quasi_stiffness", episodes=1, seed=3)
+    for key, values in alone.series.items():
+        np.testing.assert_array_equal(own.series[key], values, err_msg=key)
+    assert measure(own).metrics == measure(alone).metrics
+    assert (other.settings.height, other.settings.mass, other.settings.height_range) == (1.9, 100.0, None)
+    assert other.fall_reason[0] == ""
+    metrics = measure(other).metrics
+    assert metrics["reference"]["speed_m_s"] == pytest.approx(who["speed"][1])
+    ours = measure(own).metrics["grf"]["vertical_peak1_bw"]
+    assert metrics["grf"]["vertical_peak1_bw"] == pytest.approx(ours, rel=0.3)  # in newtons it is 1.6 times as large

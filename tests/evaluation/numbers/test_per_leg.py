@@ -1,0 +1,127 @@
+"""Legs whose feet differ: each leg's numbers, how far they are apart, and which is which in table and pictures."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn import has_line, kept_figures
+from PIL import Image
+from rich.console import Console
+
+from springfoot.envs.settings.settings import settings_from
+from springfoot.errors import SpringfootError
+from springfoot.evaluation import measure, prepare, record
+from springfoot.evaluation.numbers.per_leg import asymmetry, leg_numbers
+from springfoot.evaluation.report.animation import FAR, NEAR, save_animation
+from springfoot.evaluation.report.gait_figure import save_gait_figure
+from springfoot.evaluation.report.gait_table import print_table
+from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
+from springfoot.gait.people.cycle import PERCENT
+
+
+def walked(**feet):
+    policy, settings = prepare("schedule", {"episode_seconds": 6.0, **feet})
+    return record(policy, settings, name="schedule", episodes=2, threads=1)
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return walked(right_foot="passive"), walked(left_foot="passive"), walked()
+
+
+def test_left_and_right_change_places_with_the_feet(recordings):
+    right, left = (measure(recording).metrics for recording in recordings[:2])
+    assert right["feet"] == {"left": "intact", "right": "passive"} and left["falls"] == right["falls"] == 0
+    ranges = [metrics["per_leg"][side]["joint_range_deg"] for metrics, side in ((right, "right"), (left, "left"))]
+    sound = [metrics["per_leg"][side]["joint_range_deg"] for metrics, side in ((right, "left"), (left, "right"))]
+    for joint in ("thigh", "knee", "ankle", "toe"):  # of other starts, so not the same strides
+        assert ranges[0][joint] == pytest.approx(ranges[1][joint], abs=5.0)
+        assert sound[0][joint] == pytest.approx(sound[1][joint], abs=5.0)
+    assert ranges[0]["ankle"] < 0.5 * sound[0]["ankle"]
+    for name, value in right["asymmetry"].items():
+        assert value == pytest.approx(-left["asymmetry"][name], abs=0.2) and abs(value) < 0.5
+    for metrics, side in ((right, "right"), (left, "left")):
+        assert metrics["per_leg"][side]["stiffness_Nm_rad"]["ankle"]["swing"] == pytest.approx(600.0)
+
+
+def test_the_legs_together_are_the_whole(recordings):
+    gait = measure(recordings[0])
+    left, right = gait.metrics["per_leg"].values()
+    count = gait.metrics["strides"]["count"]
+    assert left["strides"] + right["strides"] == count
+    for joint in ("hip", "knee", "ankle", "toe"):
+        whole = gait.metrics["joint_work_J_kg"][joint]["positive"]
+        parts = sum(leg["strides"] * leg["joint_work_J_kg"][joint]["positive"] for leg in (left, right))
+        assert parts / count == pytest.approx(whole)
+    assert gait.metrics["grf"]["vertical_max_bw"] > max(leg["vertical_max_mean_bw"] for leg in (left, right))
+    steps = np.bincount(gait.tally.step_sides)
+    mean = (steps * [left["step_length_m"], right["step_length_m"]]).sum() / steps.sum()
+    assert mean == pytest.approx(gait.metrics["step_length_m"])
+
+
+def test_with_the_same_feet_there_are_no_legs_apart_and_they_are_alike(recordings):
+    gait = measure(recordings[2])
+    assert gait.metrics["per_leg"] is None and gait.metrics["asymmetry"] is None
+    assert all(abs(value) < 0.1 for value in asymmetry(leg_numbers(gait.tally)).values() if value is not None)
+
+
+def test_a_walk_without_strides_has_no_numbers():
+    policy, settings = prepare("schedule", {"episode_seconds": 1.0, "right_foot": "rigid"})
+    gait = measure(record(policy, settings, name="schedule", episodes=1, threads=1))
+    left, right = gait.metrics["per_leg"].values()
+    assert left == right and left["strides"] == 0 and left["joint_work_J_kg"]["ankle"]["positive"] is None
+    assert set(gait.metrics["asymmetry"].values()) == {None}
+
+
+def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
+    recording = recordings[0]
+    gait = measure(recording)
+    console = Console(record=True, width=120, force_terminal=False)
+    print_table(gait.metrics, console)
+    text = console.export_text()
+    assert "feet: left intact, right passive" in text and "right: passive" in text and "ankle range" in text
+    narrow = Console(record=True, width=60, force_terminal=True, color_system=None)
+    print_table(gait.metrics, narrow)
+    lines = [" ".join(line.split()) for line in narrow.export_text().splitlines()]
+    assert not [line for line in lines if "…" in line or len(line) > 60]
+    for label in ("each leg", "vertical force, peak 1, BW", "vertical force, peak 2, BW", "ankle work, positive, J/kg"):
+        assert any(line.startswith(f"{label} ") for line in lines)
+    assert any(line.endswith("left: intact right: passive") for line in lines)
+    with kept_figures() as figures:
+        save_gait_figure(tmp_path / "gait.png", recording, gait)
+    knee = next(ax for ax in figures["gait.png"].axes if ax.get_title(loc="left") == "Knee angle")
+    for leg in gait.plan.foot:
+        assert has_line(knee, PERCENT, leg.mean("knee_flexion_deg"))
+    save_animation(tmp_path / "walk.gif", recording)
+    with Image.open(tmp_path / "walk.gif") as clip:
+        seen = np.asarray(clip.convert("RGB")).reshape(-1, 3)
+    assert all((seen == colour).all(axis=1).sum() > 200 for colour in (NEAR, FAR))  # both legs
+
+
+def test_feedback_is_of_the_leg_that_decides(recordings):
+    share = measure(recordings[0]).metrics["feedback"]["ankle"]["share"]
+    alike = measure(recordings[2]).metrics["feedback"]["ankle"]["share"]
+    assert np.isfinite(share) and share < alike + 0.2
+    weak = measure(walked(right_foot="drop")).metrics["feedback"]["ankle"]
+    assert weak["share"] is None or np.isfinite(weak["share"])
+    assert settings_from(right_foot="drop").right_foot == "drop"
+
+
+@pytest.mark.parametrize(("which", "changed"), [(0, (True, False)), (1, (False, True)), (2, (True, True))])
+def test_finite_states_are_of_the_legs_whose_stiffness_the_policy_sets(recordings, which, changed):
+    recording = recordings[which]
+    states = finite_states(recording)["states"]
+    for side in (0, 1):
+        stiffness = recording.series["stiffness"].copy()
+        stiffness[:, :, side] *= 1.5
+        other = finite_states(replace(recording, series=recording.series | {"stiffness": stiffness}))["states"]
+        assert (states != other) == changed[side]
+
+
+def test_without_a_leg_that_decides_there_is_no_table_of_finite_states(recordings, tmp_path):
+    feet = {"left_foot": "rigid", "right_foot": "passive"}
+    recording = replace(recordings[2], settings=replace(recordings[2].settings, **feet))
+    write_schedules(tmp_path, recording)
+    assert [path.name for path in tmp_path.iterdir()] == ["stiffness_schedule.csv"]
+    with pytest.raises(SpringfootError, match=r"^a table of finite states needs a foot without a device$"):
+        finite_states(recording)

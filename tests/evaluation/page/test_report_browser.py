@@ -1,0 +1,141 @@
+"""report.html in a real browser, Debian's Chromium by Playwright, from file://, as wide as a desk's and a phone's."""
+
+import pytest
+
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.page.report_page import write_page
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+
+CUT_OFF = """() => [...document.querySelectorAll("svg text")].filter(text => {
+  const own = text.getBoundingClientRect(), around = text.ownerSVGElement.getBoundingClientRect();
+  return own.width && (own.left < around.left - 1 || own.right > around.right + 1
+    || own.top < around.top - 1 || own.bottom > around.bottom + 1);
+}).map(text => text.textContent)"""
+"""Words of the drawings that reach beyond them."""
+CROWDED = """() => [...document.querySelectorAll("svg text.unit[transform]")].flatMap(unit => {
+  const right = unit.getBoundingClientRect().right;
+  return [...unit.ownerSVGElement.querySelectorAll("text[text-anchor='end']:not(.unit)")].filter(
+    text => text.getBoundingClientRect().left < right).map(text => text.textContent);
+})"""
+"""Numbers of an axis that reach into its unit."""
+BROKEN = """() => [...document.querySelectorAll("td.number")].filter(cell => {
+  const words = document.createRange(); words.selectNodeContents(cell);
+  return new Set([...words.getClientRects()].map(line => line.top)).size > 1;
+}).map(cell => cell.textContent)"""
+"""Numbers of the tables that stand on more than one line."""
+
+
+def walked(name, **given):
+    policy, settings = prepare(name, {"episode_seconds": 8.0} | given)
+    recording = record(policy, settings, name=name, episodes=2)
+    return recording, measure(recording)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    other = walked("constant", right_foot="no_toe", left_foot={"kind": "rigid_toe", "orthosis": {}})
+    write_page(path, [walked("schedule"), other], "evaluate.py schedule constant")
+    return path
+
+
+def opened(browser, page, width, **how):
+    """A tab with the page, and what its console told and what it asked for."""
+    tab = browser.new_page(viewport={"width": width, "height": 900}, **how)
+    told, asked = [], []
+    tab.on("console", lambda message: told.append(message.text))
+    tab.on("pageerror", lambda error: told.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(page.as_uri())
+    return tab, told, asked
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scrubber(chromium, page, width):
+    tab, told, asked = opened(chromium, page, width)
+    assert tab.evaluate(CUT_OFF) == [] and tab.evaluate(CROWDED) == []
+    assert tab.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    cursors, walkers = tab.locator(".cursor"), tab.locator("svg[data-frame]")
+    assert walkers.count() == 2 and cursors.count() > 20
+
+    def at():
+        return [each.get_attribute("data-frame") for each in walkers.all()], cursors.first.get_attribute("data-percent")
+
+    (begin, _), first = at()
+    for title in ("CoM height", "Left ankle, stiffness K"):  # where the stride begins, so do step and leg
+        assert float(tab.locator(f"svg[aria-label^='{title}'] .cursor").get_attribute("data-percent")) < 3.0
+    tab.keyboard.press("ArrowRight")
+    (after, _), second = at()
+    assert (begin, after) == ("0", "1") and float(second) > float(first)
+    tab.locator("#scrub").evaluate("each => { each.value = 250; each.dispatchEvent(new Event('input')) }")
+    frames, percent = at()
+    assert float(percent) == pytest.approx(50.0, abs=1.5) and int(frames[0]) > 40
+    dot = tab.locator("svg[aria-label^='Knee angle'] .dot").first
+    line = tab.locator("svg[aria-label^='Knee angle'] .cursor").first
+    assert float(dot.get_attribute("cx")) == pytest.approx(float(line.get_attribute("x1")), abs=2.0)
+    tab.keyboard.press(" ")
+    assert tab.locator("#play").inner_text() == "Pause"
+    while at()[0] == frames:  # it plays, so that this ends
+        tab.wait_for_timeout(50)
+    tab.locator("#play").click()
+    tab.keyboard.press("Home")  # of the walk, though the button has the focus
+    assert at()[0][0] == "0"
+    assert tab.evaluate(BROKEN) == []
+    tab.close()
+    assert told == [] and asked == [page.as_uri()]
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("ends", [(0.0, 5e-24), (0.0, 3e-4), (-1.2e-4, 1.1e-4), (-2e4, 2e4), (0.0, 0.0123)])
+def test_numbers_of_any_size_stand_on_an_axis(chromium, page, width, ends):
+    tab, told, _ = opened(chromium, page, width)
+    tab.evaluate(
+        "ends => frame(document.querySelector('.grid'), 'a title', '% of the stride', 'N·m', [0, 100], ends)", ends
+    )
+    assert tab.evaluate(CUT_OFF) == [] and tab.evaluate(CROWDED) == [] and told == []
+    tab.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_axe_finds_no_fault(chromium, page, width, scheme):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install axe-playwright-python")
+    tab, _, _ = opened(chromium, page, width, color_scheme=scheme)
+    faults = axe.Axe().run(tab).response["violations"]
+    tab.close()
+    assert [(fault["id"], fault["impact"]) for fault in faults] == []
+
+
+def test_the_first_screen_has_the_verdict_and_the_body(chromium, page, tmp_path):
+    write_page(tmp_path / "report.html", [walked("schedule")])
+    for path, width in ((page, 1280), (tmp_path / "report.html", 1280), (tmp_path / "report.html", 390)):
+        tab, _, _ = opened(chromium, path, width)
+        bodies = [each.bounding_box() for each in tab.locator("svg[data-frame]").all()]
+        falls = tab.get_by_text("Never fell").or_(tab.get_by_text("Fell in")).first.bounding_box()
+        assert all(body["y"] < 700 for body in bodies) and falls["y"] < 800
+        tab.close()
+
+
+def test_feet_are_drawn_by_what_they_are(chromium, page):
+    tab, _, _ = opened(chromium, page, 1280)
+    body = tab.locator("svg[data-frame]").nth(1)
+    kinds = [each.get_attribute("class") for each in body.locator(".joint").all()]
+    assert kinds == ["joint muscles", "joint lock", "joint muscles", "joint lock"]  # right leg, then left
+    shown = [each.get_attribute("visibility") for each in body.locator(".joint").all()]
+    assert shown == ["visible", "hidden", "visible", "visible"]  # a foot of one piece has no toe joint
+    assert "left foot rigid toe (in an orthosis" in tab.locator("figcaption").nth(1).inner_text()
+    assert "locked" in body.text_content()
+    knee = tab.locator("svg[aria-label^='Knee angle'] .mean")
+    assert knee.count() == 3  # one policy, and both legs of the other
+    tab.close()
+
+
+def test_on_paper_the_page_is_black_on_white_without_its_buttons(chromium, page):
+    tab, _, _ = opened(chromium, page, 1280, color_scheme="dark")
+    tab.emulate_media(media="print")
+    assert not tab.locator(".controls").is_visible() and not tab.get_by_text("Space plays").is_visible()
+    assert tab.get_by_text("Lines and bands").is_visible()  # which line is whose
+    assert tab.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert tab.evaluate("getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
+    tab.close()

@@ -1,0 +1,40 @@
+"""gait.png and walk.gif: what is drawn is the walk that was measured, over people."""
+
+import numpy as np
+import pytest
+from drawn import has_line, kept_figures
+from PIL import Image, ImageSequence
+
+from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.report.animation import save_animation
+from springfoot.evaluation.report.gait_figure import save_gait_figure
+from springfoot.gait import human_gait
+from springfoot.gait.people.cycle import PERCENT
+
+
+@pytest.fixture(scope="module")
+def recording():
+    policy, settings = prepare("schedule", {"episode_seconds": 6.0})
+    return record(policy, settings, name="schedule", episodes=2)
+
+
+def test_the_picture_draws_the_walk_over_people(recording, tmp_path):
+    gait, human = measure(recording), human_gait(1.2)
+    with kept_figures() as figures:
+        save_gait_figure(tmp_path / "gait.png", recording, gait)
+    of = {ax.get_title(loc="left"): ax for ax in figures["gait.png"].axes}
+    assert has_line(of["Knee angle"], PERCENT, gait.both.mean("knee_flexion_deg"))
+    assert has_line(of["Knee angle"], PERCENT, np.degrees(human.mean("knee", PERCENT / 100)))
+    assert has_line(of["Ankle moment"], PERCENT, gait.both.mean("ankle_moment_Nm_per_kg"))
+    assert has_line(of["Vertical force"], PERCENT, gait.both.mean("grf_vertical_bw"))
+
+
+def test_the_animation_is_two_strides_below_a_megabyte(recording, tmp_path):
+    save_animation(tmp_path / "walk.gif", recording)
+    assert (tmp_path / "walk.gif").stat().st_size < 1_000_000
+    with Image.open(tmp_path / "walk.gif") as clip:
+        frames, delay = sum(1 for _ in ImageSequence.Iterator(clip)), clip.info["duration"]
+    stride = 120 / measure(recording).metrics["cadence_steps_min"]
+    assert frames * delay / 1000 == pytest.approx(2 * stride, abs=0.1)

@@ -1,0 +1,197 @@
+"""One owner a folder: two at once, dead owners, free names, and commands that signals end."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import evaluate
+import train
+from springfoot.command_line import exit_code
+from springfoot.errors import SpringfootError
+from springfoot.files import locks as ownership
+from springfoot.files.locks import OWNER, TakenError, owned
+from springfoot.files.writing import whole_folder
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from springfoot.files.locks import owned
+with owned(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """A process that owns tmp_path / "run"."""
+    with subprocess.Popen([sys.executable, "-c", HOLD, tmp_path / "run"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "held\n"
+        yield process
+        process.kill()
+
+
+def test_a_folder_that_another_process_writes_is_refused_until_it_is_dead(holder, tmp_path, capsys):
+    folder = tmp_path / "run"
+    with (
+        pytest.raises(TakenError, match=rf"being written by process {holder.pid} on .*, begun \d+ s ago"),
+        owned(folder),
+    ):
+        raise AssertionError
+    assert json.loads((folder / OWNER).read_text())["pid"] == holder.pid
+    holder.kill()
+    holder.wait()
+    with owned(folder):
+        assert json.loads((folder / OWNER).read_text())["pid"] == os.getpid()
+    assert f"taken over from process {holder.pid} on" in capsys.readouterr().err
+    assert list(folder.iterdir()) == []
+
+
+def test_a_folder_that_was_made_and_left_empty_vanishes(tmp_path):
+    with owned(tmp_path / "runs" / "walk"):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("silent", [ownership.DEAD - 60, ownership.DEAD + 60])
+def test_an_owner_on_another_host_is_dead_after_a_while_without_a_sign_of_life(tmp_path, capsys, silent):
+    there = {"pid": 1, "host": "elsewhere.invalid", "began": "2026-01-01T00:00:00+00:00"}
+    (tmp_path / OWNER).write_text(json.dumps(there))
+    os.utime(tmp_path / OWNER, (time.time() - silent,) * 2)
+    if silent < ownership.DEAD:
+        with (
+            pytest.raises(
+                TakenError, match=r"process 1 on elsewhere.invalid, begun \d+ d ago, last heard of 9 min ago"
+            ),
+            owned(tmp_path),
+        ):
+            raise AssertionError
+        assert json.loads((tmp_path / OWNER).read_text()) == there
+    else:
+        with owned(tmp_path):
+            assert "taken over from process 1 on elsewhere.invalid" in capsys.readouterr().err
+
+
+def test_an_owner_by_a_clock_far_ahead_is_told_with_what_to_remove(tmp_path):
+    (tmp_path / OWNER).write_text(json.dumps({"pid": 1, "host": "elsewhere.invalid", "began": "x"}))
+    ahead = time.time() + 3 * 86400
+    os.utime(tmp_path / OWNER, (ahead, ahead))
+    said = rf"by another process, by a clock 3 d ahead; remove {tmp_path / OWNER} if not; wait for it, or choose"
+    with pytest.raises(TakenError, match=said), owned(tmp_path):
+        raise AssertionError
+
+
+def test_without_locks_an_owner_is_dead_whose_process_has_ended(holder, tmp_path, monkeypatch, capsys):
+    def no_locks(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(ownership.fcntl, "flock", no_locks)
+    with (
+        pytest.raises(TakenError, match=rf"by process {holder.pid} on .*, last heard of \d+ s ago"),
+        owned(tmp_path / "run"),
+    ):
+        raise AssertionError
+    holder.kill()
+    holder.wait()
+    with owned(tmp_path / "run"):
+        assert f"taken over from process {holder.pid} on" in capsys.readouterr().err
+
+
+def test_free_names_are_taken_before_anything_is_written(tmp_path):
+    free = tmp_path / "eval"
+    with whole_folder(None, free) as (one, first), whole_folder(None, free) as (other, second):
+        assert (first.name, second.name) == ("eval-1", "eval-2")
+        (one / "mine").touch()
+        (other / "yours").touch()
+        with pytest.raises(TakenError, match="is being written by process"), whole_folder(first, free):
+            raise AssertionError
+    assert (tmp_path / "eval-1" / "mine").exists() and (tmp_path / "eval-2" / "yours").exists()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["eval-1", "eval-2", "mine", "yours"]
+
+
+def test_results_are_kept_where_somebody_else_took_their_name_meanwhile(tmp_path, capsys):
+    out = tmp_path / "new"
+    with whole_folder(out, out) as (folder, _):
+        (folder / "mine").touch()
+        (out / "theirs").mkdir(parents=True)
+    assert f"{out} exists by now: the results are in {out}-2" in capsys.readouterr().err
+    assert (tmp_path / "new-2" / "mine").exists() and not list(tmp_path.glob(".*"))
+
+
+def test_what_a_killed_process_wrote_for_a_folder_is_removed(tmp_path, capsys):
+    part = tmp_path / ".new.part"
+    (part / "old").mkdir(parents=True)
+    (part / OWNER).write_text(json.dumps({"pid": 1, "host": ownership.socket.gethostname(), "began": "x"}))
+    with whole_folder(tmp_path / "new", tmp_path / "free") as (folder, _):
+        (folder / "mine").touch()
+    assert "taken over from another process, which has ended" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["mine"] and not part.exists()
+
+
+def test_two_trainings_into_one_folder_are_one_training(tmp_path):
+    words = ["--out", "run", "--timesteps", "512", "--num-envs", "4", "--update-steps", "256", "--threads", "1"]
+    command = [sys.executable, train.__file__, *words, "--eval-episodes", "1", "--episode-seconds", "1"]
+    both = [subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    errors = [process.communicate()[1] for process in both]
+    told = dict(zip((process.returncode for process in both), errors, strict=True))
+    assert sorted(told) == [0, 2]
+    assert told[2].count("\n") == 1 and ("being written by process" in told[2] or "already exists" in told[2])
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "finished"
+
+
+STARTS = {
+    "train": [train.__file__, "--out", "new"],
+    "evaluate": [evaluate.__file__, "pretrained", "--out", "new"],
+    "study": ["-c", "from springfoot.cli.main import main; exit(main())", "study", "criteria", "--out", "new"],
+}
+
+
+@pytest.mark.parametrize(
+    ("number", "delay", "said"), [(signal.SIGINT, 0.2, "interrupted"), (signal.SIGTERM, 0.5, "ended by SIGTERM")]
+)
+@pytest.mark.parametrize("words", STARTS.values(), ids=STARTS)
+def test_a_signal_at_the_start_is_one_line_and_leaves_nothing(tmp_path, words, number, delay, said):
+    with subprocess.Popen([sys.executable, *words], cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        time.sleep(delay)
+        process.send_signal(number)
+        assert process.stderr is not None
+        error = process.stderr.read().decode()
+    assert process.returncode == 128 + number, error
+    assert error.count("\n") == 1 and said in error
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_leaves_nothing_of_an_evaluation(tmp_path, number):
+    command = [sys.executable, evaluate.__file__, "constant", "--episodes", "500"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        owner = tmp_path / "runs" / ".eval-constant-1.part" / OWNER
+        while not (owner.exists() and owner.read_text()):
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(number)
+        _, error = process.communicate()
+    assert process.returncode == 128 + number
+    assert b"Traceback" not in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_no_text_is_one_line(tmp_path, capsys):
+    said = r"cannot make the folder .*\\udcff: its name must be UTF-8 text"
+    with pytest.raises(SpringfootError, match=said), owned(tmp_path / "bad\udcff"):
+        raise AssertionError
+    assert exit_code("name", lambda: (tmp_path / "text").write_text("bad\udcff", encoding="utf-8")) == 2
+    assert capsys.readouterr().err == "name: error: a name must be UTF-8 text, got 'bad\\udcff'\n"
+
+
+def test_a_read_only_parent_is_one_line(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match="cannot make the folder"), owned(Path(tmp_path, "file", "run")):
+        raise AssertionError

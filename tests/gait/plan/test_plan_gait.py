@@ -1,0 +1,118 @@
+"""A plan as a gait, its effort, and the committed style of least effort."""
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from springfoot.cli.main import main
+from springfoot.gait import Body, plan_walk, planned_moments
+from springfoot.gait.body.body import GRAVITY
+from springfoot.gait.body.tissue import passive_moments
+from springfoot.gait.plan.effort import MOTION_RANGE_DEG, Muscle, effort_of
+from springfoot.gait.plan.plan_gait import gait_of
+from springfoot.gait.plan.walk_style import least_work, style_from
+from springfoot.studies.searches.plan_tuning import CHOICES, price, style_at, vector_of
+
+PHASE = np.arange(200) / 200
+BODY = Body()
+PLAN = plan_walk(BODY, 1.2, style=least_work(1.2))
+
+
+def test_a_plans_gait_has_its_angles_moments_and_forces():
+    gait, half = gait_of(PLAN), len(PHASE) // 2
+    for name, curve in PLAN.joint_angles(PHASE).items():
+        off = np.degrees(gait.mean(name, PHASE) - curve)
+        assert np.sqrt(np.mean(off**2)) < (0.5 if name != "toe" else 2.0), name
+    for joint, moment in planned_moments(PLAN, PHASE).items():
+        own = gait.mean(f"{joint}_moment", PHASE) * BODY.total_mass * BODY.length_scale
+        assert np.corrcoef(own, moment)[0, 1] > 0.97, joint
+    vertical, forward = (gait.mean(f"grf_{name}", PHASE) for name in ("vertical", "forward"))
+    assert np.mean(vertical + np.roll(vertical, half)) == pytest.approx(1.0, abs=0.01)
+    assert np.mean(forward) == pytest.approx(0.0, abs=0.005)
+    assert gait.stride_time == PLAN.stride_time and gait.toe_off == PLAN.feet.toe_off
+    assert not gait.sd("knee", PHASE).any() and gait.foot.ankle_quasi_stiffness is None
+    assert np.all(np.diff(gait.foot.plateaus) > 0)
+
+
+def test_effort_is_the_same_for_froude_equal_bodies():
+    tall = Body(2.0, 63.0 * (2.0 / 1.7) ** 3)
+    other = effort_of(plan_walk(tall, 1.2 * sqrt(tall.height / BODY.height), style=least_work(1.2)))
+    own = effort_of(PLAN)
+    # Strength scales with mass x height; the toe's tissue likewise.
+    assert (other.work, other.activation) == pytest.approx((own.work, own.activation), rel=0.01)
+
+
+def test_effort_counts_energy_and_joints_beyond_their_range():
+    own, bare = effort_of(PLAN), effort_of(PLAN, Muscle(tissue=0.0, tendon=0.0))
+    assert own.beyond_range < 0.5 and own.total == pytest.approx(
+        own.work + own.activation + own.rate + 3 * own.acceleration
+    )
+    # Over a stride joints do no net work, so that energy per weight and distance is cost of transport x (4 + 1/1.2).
+    gait = gait_of(PLAN)
+    power = [np.maximum(gait.mean(f"{joint}_power", PHASE), 0.0) for joint in ("hip", "knee", "ankle")]
+    transport = 2 * np.sum(power) / len(PHASE) * PLAN.stride_time / (GRAVITY * 2 * PLAN.step_length)
+    assert bare.work / (4 + 1 / 1.2) == pytest.approx(transport, rel=0.1)
+    assert own.work < effort_of(PLAN, Muscle(tendon=0.0)).work  # what the tendon gives back is no muscle's
+    foot = replace(least_work(1.2).foot, toe_swing=1.4)
+    bent = effort_of(plan_walk(BODY, 1.2, style=replace(least_work(1.2), foot=foot)))
+    assert bent.beyond_range > 5.0 and MOTION_RANGE_DEG["toe"][1] == 70.0
+
+
+def test_styles_are_linear_between_speeds_and_their_json_is_exact():
+    style = least_work(1.2)
+    assert style_from(style.to_json()) == style
+    assert least_work(0.5) == least_work(1.0) == style  # one speed is committed
+
+
+def test_no_small_step_from_the_committed_style_costs_much_less():
+    style, paid = least_work(1.2), price(BODY, 1.2, vector_of(least_work(1.2)))[0]
+    assert style_at(vector_of(style)) == style
+    random = np.random.default_rng(0)
+    tried = [price(BODY, 1.2, vector_of(style) + 0.05 * random.standard_normal(len(CHOICES)))[0] for _ in range(12)]
+    assert min(tried) > paid - 0.05 and paid < 0.5 * price(BODY, 1.2, np.zeros(len(CHOICES)))[0]
+
+
+def test_the_search_runs_and_leaves_the_file_alone_with_quick(tmp_path, capsys):
+    styles = tmp_path / "styles.json"
+    assert main(["study", "plan-tuning", "--quick", "--styles", str(styles), "--out", str(tmp_path / "out")]) == 0
+    assert "paid" in capsys.readouterr().out and not styles.exists()
+    assert (tmp_path / "out" / "generations.csv").is_file()
+
+
+def test_passive_moments_are_those_of_the_source():
+    def ankle(deg, knee=0.0):
+        return passive_moments(BODY, np.radians([0.0, knee, deg, 0.0]))[2]
+
+    # Worked by hand from the published regression: neutral ankle, straight knee.
+    assert ankle(0.0) == pytest.approx(np.exp(2.1016) - np.exp(-7.9763) - 1.792)
+    assert ankle(20.0) > 30.0 > ankle(20.0, knee=60.0) > ankle(0.0, knee=60.0) > ankle(-50.0)  # the calf spans the knee
+    hip, knee, *_ = passive_moments(BODY, np.radians([-20.0, 0.0, 0.0, 0.0]))
+    assert hip < -15.0 and knee < 0.0  # an extended hip is drawn forward, a straight knee gives way
+    assert passive_moments(Body(2.0, 63.0), np.zeros(4)) == pytest.approx(passive_moments(BODY, np.zeros(4)) * 2 / 1.7)
+
+
+def test_a_round_heel_rolls_where_it_touches():
+    feet = PLAN.feet
+    landing = np.linspace(0.0, feet.foot_flat, 60)
+    x, z = feet.heel(landing)
+    assert np.abs(z).max() < 1e-12
+    assert x == pytest.approx(feet.on_ground(landing)[0])
+    rolled = feet.style.heel_radius * feet.heel_strike_pitch
+    assert x[-1] - x[0] == pytest.approx(rolled) and x[-1] == pytest.approx(feet.flat_heel)
+    step = landing[1] - landing[0]
+    slip = np.gradient(x, step) - feet.style.heel_radius * -np.gradient(feet.pitch(landing), step)
+    assert np.abs(slip).max() < 1e-6 * np.abs(np.gradient(x, step)).max() + 1e-9
+
+
+def test_the_heel_rises_as_its_two_numbers_say():
+    feet = PLAN.feet
+    assert feet.style.heel_rise is not None
+    half, fast = feet.style.heel_rise
+    lasts = feet.toe_off - feet.heel_off
+    middle = feet.heel_off + 0.5 * lasts
+    assert feet.pitch(middle) == pytest.approx(-half * feet.toe_off_pitch)
+    rate = (feet.pitch(feet.toe_off) - feet.pitch(feet.toe_off - 1e-6)) / 1e-6
+    assert rate == pytest.approx(-fast * feet.toe_off_pitch / lasts, rel=1e-3)
+    assert feet.pitch(feet.heel_off + 1e-6) == pytest.approx(0.0, abs=1e-8)

@@ -1,0 +1,60 @@
+"""The house stays easy to see: no file too long, no public name with two meanings; and no file is run by reading it."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli")
+MOST_LINES = 300
+FILES = sorted(path for room in ROOMS for path in (REPOSITORY / room).rglob("*.py"))
+
+
+def names_defined_in(path: Path) -> set[str]:
+    """Names without a leading underscore that a module defines at its top level; imports do not define."""
+    names: set[str] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            names.add(node.name)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)}
+    return {name for name in names if not name.startswith("_")} - {"main"}  # what a module does as a command
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(REPOSITORY)))
+def test_no_file_of_the_five_packages_is_too_long(path):
+    lines = path.read_text(encoding="utf-8").count("\n")
+    assert lines <= MOST_LINES
+
+
+def test_no_public_name_means_different_things_in_two_packages():
+    rooms_of: dict[str, set[str]] = defaultdict(set)
+    for path in FILES:
+        for name in names_defined_in(path):
+            rooms_of[name].add(path.relative_to(REPOSITORY).parts[0])
+    assert {name: sorted(rooms) for name, rooms in rooms_of.items() if len(rooms) > 1} == {}
+
+
+OF_NUMBA = {"kernel.py": {"pickle"}}  # its cache of compiled kernels, which are pickles; no file that a user hands over
+SOURCES = sorted(path for room in ("package", "examples", "benchmarks") for path in (REPOSITORY / room).rglob("*.py"))
+SOURCES += [*FILES, *sorted(REPOSITORY.glob("*.py"))]
+UNPICKLERS = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
+LOADERS = {"torch.load", "PPO.load", "VecNormalize.load"}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(REPOSITORY)))
+def test_nothing_executes_what_a_file_says(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = {alias.name.partition(".")[0] for alias in node.names} - OF_NUMBA.get(path.name, set())
+            assert not UNPICKLERS & names, f"{path}:{node.lineno}"
+        elif isinstance(node, ast.ImportFrom):
+            assert (node.module or "").partition(".")[0] not in UNPICKLERS, f"{path}:{node.lineno}"
+        elif isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            assert called not in {"eval", "exec"}, f"{path}:{node.lineno}"
+            assert ".".join(called.split(".")[-2:]) not in LOADERS, f"{path}:{node.lineno}"
+            assert "allow_pickle" not in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"

@@ -1,0 +1,130 @@
+"""What the documents say exists and runs."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tyro
+
+from springfoot.cli.evaluate import EvaluateFlags
+from springfoot.cli.export import ExportFlags
+from springfoot.cli.live import LiveFlags
+from springfoot.cli.main import STUDIES, main, study_class
+from springfoot.cli.train import TrainFlags
+from springfoot.evaluation import prepare
+from springfoot.gait import human_gait
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+PREFIXES = ("python ", "make ", "springfoot ", "train.py ", "evaluate.py ")
+
+
+def commands_in(text):
+    """Every command in a page: each line of a block of shell, and each `code` that begins like one."""
+    blocks = re.findall(r"```(?:sh|bash)?\n(.*?)```", text, re.DOTALL)
+    lines = [line.partition("#")[0] for block in blocks for line in block.splitlines()]
+    prose = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    lines += [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", prose)]
+    return [line.strip() for line in lines if line.startswith(PREFIXES)]
+
+
+MAKE_HELP = re.findall(r'@echo "(make [\w-]+)', (ROOT / "Makefile").read_text(encoding="utf-8"))
+COMMANDS = sorted({*(line for page in PAGES for line in commands_in(page.read_text(encoding="utf-8"))), *MAKE_HELP})
+
+
+def program_of(command):
+    """The program of a command, as words, and what is told it."""
+    words = shlex.split(command)
+    if words[0] in ("train.py", "evaluate.py"):
+        words = ["python", *words]
+    if words[0] == "python" and words[1] in ("train.py", "evaluate.py"):
+        words = ["springfoot", words[1].removesuffix(".py"), *words[2:]]
+    several = words[:2] in (["python", "-m"], ["springfoot", "study"])
+    size = 3 if several and words[2:] and words[2] not in ("--help", "NAME") else 2
+    return tuple(words[:size]), words[size:]
+
+
+PROGRAMS = sorted({program_of(command)[0] for command in COMMANDS})
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A reader's folder, with the file of own curves that the README speaks of."""
+    percent = np.arange(101)
+    knee = np.degrees(human_gait(1.2).mean("knee", percent / 100))
+    rows = [f"{at},{angle:.3f}" for at, angle in zip(percent, knee, strict=True)]
+    (tmp_path / "my_gait.csv").write_text("\n".join(["percent,knee_flexion_deg", *rows]) + "\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    links = re.findall(r"\]\(([^)#]+)", re.sub(r"\s+", " ", page.read_text(encoding="utf-8")))
+    assert all(link.startswith("https://") or (page.parent / link).exists() for link in links), links
+
+
+def test_readme_examples_run_in_their_order(folder):
+    code = "\n".join(BLOCKS).replace("range(500)", "range(50)").replace("1_000_000", "1")
+    assert len(BLOCKS) == 6
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert prepare("mine.safetensors", {})[1].action_mode == "absolute"
+
+
+def test_the_examples_of_the_page_on_policies_run(folder):
+    page = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
+    for command in commands_in(re.findall(r"```sh.*?```", page, re.DOTALL)[0]):
+        assert main(shlex.split(command)[1:]) == 0
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_documents_name_the_commands_there_are():
+    assert {("springfoot", "train"), ("springfoot", "evaluate"), ("make", "test"), ("make", "walk")} <= set(PROGRAMS)
+    named = {program[2] for program in PROGRAMS if program[:2] == ("springfoot", "study") and program[2:]}
+    assert named == set(STUDIES)
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=" ".join)
+def test_every_program_that_a_document_names_answers_help(program, capsys):
+    if program[0] == "make":
+        done = subprocess.run(["make", "--dry-run", "--always-make", *program[1:]], cwd=ROOT, capture_output=True)
+        assert done.returncode == 0, done.stderr
+    elif program[:2] == ("python", "-m"):
+        done = subprocess.run([sys.executable, *program[1:], "--help"], cwd=ROOT, capture_output=True)
+        assert done.returncode == 0 and done.stdout, done.stderr
+    elif program[0] == "python":
+        assert (ROOT / program[1]).is_file()  # test_examples.py runs it
+    else:
+        try:
+            code = main([*program[1:], "--help"])
+        except SystemExit as end:  # how tyro ends
+            code = end.code
+        assert code == 0 and "usage: springfoot" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS if "…" not in command])
+def test_every_command_that_a_document_names_is_understood(command):
+    program, words = program_of(command)
+    if program[:2] == ("springfoot", "study") and program[2:]:
+        tyro.cli(study_class(program[2]), args=words)  # exits where it does not understand
+    elif program[0] == "springfoot" and program[1] != "study" and words:
+        flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags, "live": LiveFlags}
+        tyro.cli(flags[program[1]], args=words)
+    else:
+        assert program[0] != "springfoot" or words in ([], ["--help"], ["NAME"])
+
+
+def test_every_test_that_guarantees_name_exists():
+    named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", (ROOT / "docs" / "guarantees.md").read_text(encoding="utf-8"))
+    assert len(named) > 20
+    for file, test in named:
+        assert f"def {test}(" in (ROOT / "tests" / file).read_text(encoding="utf-8"), (file, test)

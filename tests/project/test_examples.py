@@ -1,0 +1,52 @@
+"""The examples run as their own words say, with short settings."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from springfoot.evaluation import prepare
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+RUNS = {
+    "one_walk.py": (["--ankle", "250", "--seconds", "1"], "1.00 s, no fall, return "),
+    "many_walks.py": (
+        ["--num", "3", "--seconds", "3", "--push-newton", "900"],
+        "ankle N m/rad   walked s   mean speed m/s\n           20 ",
+    ),
+    "train_with_sb3.py": (
+        ["--timesteps", "32", "--num-envs", "4", "--steps", "8", "--seconds", "0.4"],
+        "walked 0.40 s, return ",
+    ),
+    "plot_schedule.py": (
+        ["schedule", "--episodes", "1", "--seconds", "7", "--out", "schedule.png"],
+        "schedule.png: 0 of 1 fell",
+    ),
+    "search_with_optuna.py": (
+        ["--trials", "2", "--timesteps", "9000", "--seconds", "0.4"],
+        "best of 2 trials: learning rate ",
+    ),
+}
+
+
+def test_every_example_is_run_and_short():
+    assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
+    assert all(len(path.read_text().splitlines()) <= 60 for path in EXAMPLES.glob("*.py"))
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_example_does_what_it_says(name, tmp_path):
+    words, said = RUNS[name]
+    if name == "search_with_optuna.py":
+        pytest.importorskip("optuna", reason="needs Optuna: pip install optuna")
+    command = [sys.executable, "-W", "error", str(EXAMPLES / name), *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert said in done.stdout
+    if name == "train_with_sb3.py":
+        assert prepare(str(tmp_path / "mine.safetensors"), {})[1].action_mode == "absolute"
+    if name == "plot_schedule.py":
+        with Image.open(tmp_path / "schedule.png") as picture:
+            assert len(picture.convert("RGB").getcolors(1 << 20) or []) > 50  # curves, no blank page

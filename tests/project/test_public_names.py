@@ -1,0 +1,69 @@
+"""Each room hands out its public names, and readers need no other import."""
+
+import ast
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli")
+PUBLIC = {f"springfoot.{room}": import_module(f"springfoot.{room}") for room in ROOMS}
+
+
+@pytest.mark.parametrize("room", PUBLIC)
+def test_every_public_name_is_there(room):
+    module = PUBLIC[room]
+    assert module.__doc__ and len(set(module.__all__)) == len(module.__all__)
+    assert all(getattr(module, name) is not None for name in module.__all__)
+    with pytest.raises(AttributeError, match=f"module '{room}' has no attribute 'nothing'"):
+        module.nothing  # noqa: B018
+
+
+def test_a_name_means_one_thing_in_every_room():
+    meanings: dict[str, set[int]] = {}
+    for module in PUBLIC.values():
+        for name in module.__all__:
+            meanings.setdefault(name, set()).add(id(getattr(module, name)))
+    assert not [name for name, things in meanings.items() if len(things) > 1]
+
+
+def sources():
+    """What readers copy: the examples, and the Python blocks of the pages."""
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        yield path.name, path.read_text(encoding="utf-8")
+    for page in sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]):
+        blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+        if blocks:
+            yield page.name, "\n".join(blocks)
+
+
+@pytest.mark.parametrize(("name", "code"), [pytest.param(*source, id=source[0]) for source in sources()])
+def test_readers_import_from_rooms_only(name, code):
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("springfoot"):
+            assert node.module in PUBLIC, f"{name}: {node.module}"
+            assert {alias.name for alias in node.names} <= set(PUBLIC[node.module].__all__), name
+        elif isinstance(node, ast.Import):
+            ours = {alias.name for alias in node.names if alias.name.startswith("springfoot")}
+            assert ours <= set(PUBLIC), f"{name}: {ours}"
+
+
+@pytest.mark.parametrize(
+    ("code", "absent"),
+    [
+        (
+            "from springfoot.agents import baseline, load_policy; load_policy('pretrained')",
+            {"stable_baselines3", "torch"},
+        ),
+        ("from springfoot.evaluation import measure, prepare, record", {"matplotlib", "PIL", "torch"}),
+    ],
+)
+def test_a_light_name_imports_nothing_heavy(code, absent):
+    code = f"import sys; {code}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert not absent & set(done.stdout.split())

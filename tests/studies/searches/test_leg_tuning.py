@@ -1,0 +1,150 @@
+"""The search for leg constants: its units, what it pays for, and what it writes."""
+
+import csv
+import json
+from dataclasses import asdict, replace
+from importlib import resources
+from math import exp
+
+import numpy as np
+import pytest
+
+from springfoot.cli.main import study_main
+from springfoot.envs.control.leg_constants import constants_from, leg_constants
+from springfoot.envs.control.legs import KNOTS
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.gait.people.human import human_gait
+from springfoot.studies.searches import leg_cost
+from springfoot.studies.searches import leg_tuning as tuning
+from springfoot.studies.searches.leg_search import LEAD_STEP, LED, Search
+from springfoot.studies.searches.leg_walks import SECONDS
+
+COMMITTED = leg_constants("planned", "people")
+
+
+@pytest.fixture
+def constants(tmp_path):
+    """A copy of the committed file of constants."""
+    path = tmp_path / "legs.json"
+    path.write_text(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
+    return path
+
+
+def test_the_search_begins_at_its_start_and_steps_in_the_constants_own_units():
+    search = Search(COMMITTED)
+    assert search.constants(np.zeros(search.size)) == COMMITTED
+    stepped = search.constants(np.append(np.ones(search.size - len(LED)), np.zeros(len(LED))))
+    assert stepped.knee_knots_deg == pytest.approx(np.array(COMMITTED.knee_knots_deg) + 2.0, abs=1e-5)
+    assert stepped.hip_stiffness == pytest.approx(np.array(COMMITTED.hip_stiffness) * exp(0.15), rel=1e-6)
+    assert stepped.trunk_pitch_deg == pytest.approx(COMMITTED.trunk_pitch_deg + 1.0, abs=1e-5)
+
+
+def test_only_a_body_that_follows_its_plan_places_its_foot_by_the_com():
+    placed = leg_constants("planned", "people", guide="plan")
+    search = Search(placed, placing=True)
+    assert search.constants(np.zeros(search.size)) == placed
+    assert search.size == Search(placed).size + 1
+    assert Search(COMMITTED).constants(np.ones(Search(COMMITTED).size)).swing_place_gain == 0.0
+
+
+@pytest.mark.parametrize(
+    ("place", "joint", "curve"), [(-3, "hip", "thigh"), (-2, "knee", "knee"), (-1, "ankle", "ankle")]
+)
+def test_one_step_brings_the_whole_target_of_a_joint_earlier(place, joint, curve):
+    search = Search(COMMITTED)
+    vector = np.zeros(search.size)
+    vector[place] = 1.0
+    led, human, name = search.constants(vector), human_gait(tuning.TUNED_SPEED), f"{joint}_knots_deg"
+    added = np.array(getattr(led, name)) - getattr(COMMITTED, name)
+    earlier = human.mean(curve, KNOTS + LEAD_STEP) - human.mean(curve, KNOTS)
+    assert added == pytest.approx(np.rad2deg(earlier), abs=0.2)  # to first order; the knee moves 1.5 deg
+    assert replace(led, **{name: getattr(COMMITTED, name)}) == COMMITTED
+
+
+def test_the_planned_set_is_made_of_two_searches_as_its_note_says():
+    sets = tuning.read_constants(tuning.CONSTANTS)["front"]
+    two = [sets[name] for name in ("planned, targets later", "planned, less hip work")]
+    mean = {name: np.mean([each[name] for each in two], axis=0).tolist() for name in two[0]}
+    search = Search(constants_from(mean))
+    vector = np.zeros(search.size)
+    vector[-2] = 0.8
+    made = asdict(search.constants(vector))
+    for name, value in asdict(COMMITTED).items():
+        assert made[name] == pytest.approx(value, abs=2e-5), name
+
+
+def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_legs_that_fall():
+    farther = replace(COMMITTED, hip_knots_deg=tuple(1.5 + knot for knot in COMMITTED.hip_knots_deg))
+    limp = replace(COMMITTED, hip_stiffness=(20.0, 20.0), knee_stiffness=(20.0, 20.0))
+    settings = BipedSettings(episode_seconds=SECONDS + 1)
+    paid = leg_cost.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=0.0, foreign=0.0)
+    assert paid[1] < paid[2] < paid[0]
+
+
+def run(*words):
+    return study_main(["leg-tuning", *map(str, words)])
+
+
+def test_a_search_writes_its_constants_and_its_command_and_leaves_the_others_alone(constants):
+    before = json.loads(constants.read_text())
+    words = ["--generations", "1", "--population", "4", "--threads", "1", "--constants", constants]
+    words += ["--out", constants.parent / "out"]
+    assert run(*words) == 0
+    after = json.loads(constants.read_text())
+    found = after["constants"].pop("planned")
+    assert found != before["constants"].pop("planned") and set(found) == set(asdict(COMMITTED))
+    assert after["constants"] == before["constants"]
+    assert after["found_by"]["planned"] == " ".join(["springfoot study leg-tuning", *map(str, words)])
+    (row,) = csv.DictReader((constants.parent / "out" / "generations.csv").read_text().splitlines())
+    assert row["generation"] == "1" and float(row["best"]) <= float(row["median"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--start", "nobody"], "no constants 'nobody' to start from"),
+        (["--equilibrium", "neutral", "--cadence", "thesis"], "'neutral, thesis cadence'"),
+        (["--generations", "0"], "generations must be"),
+        (["--sigma", "nan"], "sigma must be"),
+        (["--push-newton", "-1"], "push_newton must be"),
+        (["--constants", "nowhere.json"], "nowhere.json"),
+        (["--constants", "foreign.json"], "not a file of leg constants"),
+    ],
+)
+def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, capsys, tmp_path, constants, words, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "foreign.json").write_text("[1]")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert run("--constants", "legs.json", "--population", "2", *words) == 2
+    out, error = capsys.readouterr()
+    assert said in error and error.count("\n") == 1 and not out
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_search_at_another_price_is_kept_beside_the_constants_that_walk(constants):
+    before = json.loads(constants.read_text())
+    words = ["--generations", "1", "--population", "2", "--threads", "1", "--foreign", "0", "--keep", "front"]
+    assert run(*words, "--constants", constants, "--out", constants.parent / "out") == 0
+    after = json.loads(constants.read_text())
+    assert after["constants"] == before["constants"]
+    assert set(after["front"]["planned, --foreign 0"]) == set(asdict(COMMITTED))
+
+
+def test_a_search_pushes_from_a_generation_on(constants):
+    own = constants.read_bytes()
+
+    def paid(name, *words):
+        constants.write_bytes(own)  # a search begins at what is there, and replaces it
+        words = ["--guide", "plan", "--population", "2", "--threads", "1", "--generations", "2", *words]
+        out = constants.parent / name
+        assert run(*words, "--constants", constants, "--out", out) == 0
+        return [float(row["best"]) for row in csv.DictReader((out / "generations.csv").read_text().splitlines())]
+
+    never, later = paid("never", "--push-newton", 0), paid("later", "--push-newton", 400, "--pushed-from", 1)
+    assert later[0] == never[0] and later[1] > never[1] + leg_cost.FALL_COST / 3
+
+
+def test_a_quick_search_writes_no_constants(constants, capsys):
+    before = constants.read_text()
+    assert run("--quick", "--generations", "150", "--constants", constants, "--out", constants.parent / "out") == 0
+    assert constants.read_text() == before and "these figures mean nothing" in capsys.readouterr().out

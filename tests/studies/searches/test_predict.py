@@ -1,0 +1,90 @@
+"""A walk from nothing by one command: its stages, its table, the file of what it found."""
+
+import json
+from dataclasses import asdict
+
+import cma
+import numpy as np
+import pytest
+
+from springfoot.cli.main import study_main
+from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.gait import SpringfootError
+from springfoot.gait.plan.walk_style import STYLES
+from springfoot.studies.searches.kept_search import generations
+from springfoot.studies.searches.prediction_table import PREDICTION, people_numbers, plan_numbers, prediction_table
+
+
+def test_all_stages_run_and_a_second_time_nothing_is_done_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    pages, before = [], {}
+    for number in range(2):
+        words = ["--quick", "--runs", "runs", "--out", f"out-{number}", "--page", "page.md", "--threads", "1"]
+        assert study_main(["predict", *words]) == 0
+        pages.append((tmp_path / "page.md").read_text(encoding="utf-8").replace("out-1", "out-0"))
+        kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs-quick").rglob("*.json")}
+        kept[tmp_path / "runs-quick" / "found.json"] = (tmp_path / "runs-quick" / "found.json").read_bytes()
+        if number:
+            assert kept == before
+        before = kept
+    assert pages[0] == pages[1] and "<!-- PREDICTION BEGIN -->" in pages[0]
+    found = json.loads((tmp_path / "runs-quick" / "found.json").read_text(encoding="utf-8"))
+    assert list(found["styles"]) == ["1.2"] and list(found["constants"]) == [
+        "predicted",
+        "predicted, 0.9 m/s",
+        "predicted, 1.5 m/s",
+    ]
+    capsys.readouterr()
+    assert study_main(["predict", "--quick", "--runs", "runs", "--search-seed", "1"]) == 2
+    assert "is of a search with other settings" in capsys.readouterr().err
+
+
+def test_a_stopped_search_goes_on_with_the_same_bits(tmp_path):
+    def searched(count, kept=None, asked="a bowl"):
+        strategy = cma.CMAEvolutionStrategy(np.ones(4), 0.5, {"seed": 3, "popsize": 6, "verbose": -9})
+        priced = []
+
+        def price(generation, vectors):
+            priced.append(generation)
+            return np.array([np.sum(vector**2) for vector in vectors])
+
+        list(generations(strategy, count, price, kept, asked))
+        return strategy.mean.tobytes(), priced
+
+    whole, _ = searched(9)
+    path = tmp_path / "log.json"
+    searched(4, path)
+    assert searched(9, path) == (whole, [4, 5, 6, 7, 8]) and searched(9, path) == (whole, [])
+    with pytest.raises(SpringfootError, match="is of a search with other settings"):
+        searched(9, path, "another bowl")
+    path.write_text("[]", encoding="utf-8")
+    with pytest.raises(SpringfootError, match="is not what a search paid"):
+        searched(9, path)
+
+
+def test_the_table_has_people_in_range_and_bold_where_a_walk_is_not():
+    settings = BipedSettings(guide="plan")
+    columns = {"people": people_numbers(settings), "the plan": plan_numbers(settings)}
+    assert all(each.holds(columns["people"]) for each in PREDICTION if each.name not in ("falls", "speed off by [m/s]"))
+    lines = prediction_table(columns, ("the plan",)).splitlines()
+    assert len(lines) == len(PREDICTION) + 3
+    for each, line in zip(PREDICTION[2:], lines[4:], strict=False):  # a plan cannot fall, and keeps its speed
+        _, name, _, people, plan, *_ = (cell.strip() for cell in line.split("|"))
+        assert name == each.name and plan.startswith("**") != each.holds(columns["the plan"]), name
+        assert people == "0.0" or "RMSE" not in name
+
+
+def test_a_plan_file_takes_the_place_of_the_packages_own_and_another_kind_is_refused(tmp_path):
+    path, styles = tmp_path / "found.json", json.loads(STYLES.read_text(encoding="utf-8"))["styles"]
+    sets = {"predicted": asdict(leg_constants("planned", "people", guide="plan"))}
+    path.write_text(json.dumps({"styles": styles, "constants": sets}), encoding="utf-8")
+    own, given = (plan_numbers(settings_from(guide="plan", plan_file=file)) for file in (None, str(path)))
+    assert own == given
+    for values, said in (
+        ({"plan_file": str(path)}, "plan_file needs guide 'plan', got 'people'"),
+        ({"guide": "plan", "plan_file": str(tmp_path / "none.json")}, "none.json is not a file of styles"),
+        ({"guide": "plan", "plan_file": 3}, "plan_file must be the name of a file, got 3"),
+    ):
+        with pytest.raises(SpringfootError, match=said):
+            settings_from(**values)

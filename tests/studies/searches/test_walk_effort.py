@@ -1,0 +1,123 @@
+"""What a simulated walk pays for its effort: closed forms, and that it tells walks apart."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.errors import SpringfootError
+from springfoot.gait import Body, plan_walk
+from springfoot.gait.body.body import GRAVITY
+from springfoot.gait.body.leg import JOINTS
+from springfoot.gait.plan.effort import (
+    ACTIVATION_TIME,
+    MUSCLE_EFFICIENCY,
+    PRICES,
+    STRENGTH,
+    VOLUME,
+    Muscle,
+    effort_of,
+    effort_of_stride,
+)
+from springfoot.gait.plan.kinetics import planned_moments
+from springfoot.gait.plan.walk_style import least_work
+from springfoot.studies.searches.leg_cost import FALL_COST, cost, misses
+from springfoot.studies.searches.leg_tuning import LegTuning
+from springfoot.studies.searches.leg_walks import SETTLED, series, walk
+from springfoot.studies.searches.walk_effort import effort_and_impact, effort_price, impact_of
+
+BODY = Body()
+BARE = Muscle(tissue=0.0, tendon=0.0)
+SETTINGS = BipedSettings(guide="plan", episode_seconds=10.0)
+LEGS = leg_constants("planned", "people", guide="plan")
+
+
+def test_a_moment_at_rest_costs_its_squared_activation_and_rate():
+    phase, time = np.arange(1000) / 1000, 1.1
+    angle, moment = np.zeros((1000, 4)), np.zeros((1000, 4))
+    share = 0.3 + 0.2 * np.sin(2 * np.pi * phase)
+    moment[:, JOINTS.index("knee")] = share * STRENGTH["knee"][0] * BODY.mass * GRAVITY * BODY.height
+    found = effort_of_stride(BODY, angle, None, moment, time, 1.3, BARE)
+    weight = VOLUME["knee"][0] / np.mean(list(VOLUME.values()))
+    assert found.work == found.acceleration == found.beyond_range == 0.0
+    assert found.activation == pytest.approx(2 * weight * (0.3**2 + 0.2**2 / 2), rel=1e-9)
+    assert found.rate == pytest.approx(2 * weight * (ACTIVATION_TIME * 0.2 * 2 * np.pi / time) ** 2 / 2, rel=1e-4)
+
+
+def test_work_costs_its_metabolic_energy_over_weight_and_distance():
+    # A constant moment against a swinging hip: as much positive as negative work, moment x twice the swing each.
+    phase, time, distance, moment = np.arange(2000) / 2000, 1.1, 1.3, 20.0
+    angle, torque = np.zeros((2000, 4)), np.zeros((2000, 4))
+    angle[:, 0] = 0.4 * np.sin(2 * np.pi * phase)
+    torque[:, 0] = moment
+    found = effort_of_stride(BODY, angle, None, torque, time, distance, BARE)
+    spent = moment * 0.8 * (1 / MUSCLE_EFFICIENCY[0] + 1 / MUSCLE_EFFICIENCY[1])
+    assert found.work == pytest.approx(2 * spent / (BODY.mass * GRAVITY * distance), rel=1e-4)
+    expected = (0.4 * (ACTIVATION_TIME * 2 * np.pi / time) ** 2) ** 2  # both legs, half of the peak's square each
+    assert found.acceleration == pytest.approx(expected, rel=1e-4)
+    assert found.total == pytest.approx(np.dot(PRICES, found.terms))
+
+
+def test_of_a_plans_own_stride_it_is_the_plans():
+    plan, phase = plan_walk(BODY, 1.2, style=least_work(1.2)), np.arange(200) / 200
+    angles, moments = plan.joint_angles(phase), planned_moments(plan, phase)
+    angle = np.stack([angles[name] for name in ("thigh", "knee", "ankle", "toe")], -1)
+    moment = np.stack([moments[joint] for joint in JOINTS], -1)
+    own = effort_of_stride(BODY, angle, None, moment, plan.stride_time, 2 * plan.step_length)
+    assert own.total == pytest.approx(effort_of(plan).total, rel=0.03)
+    assert own.acceleration == pytest.approx(effort_of(plan).acceleration, rel=0.1)
+
+
+def test_impact_is_the_mean_square_of_the_forces_rate():
+    time = np.arange(0.0, 4.0, 0.001)
+    force = np.stack([0.1 * np.cos(2 * np.pi * time), 1.0 + 0.2 * np.sin(2 * np.pi * time)], -1)
+    expected = 2 * ACTIVATION_TIME**2 * (2 * np.pi) ** 2 * (0.1**2 + 0.2**2) / 2
+    assert impact_of(force, 0.001) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_walk_is_measured_as_it_was_simulated():
+    missing, biped, ticks = walk(SETTINGS, [LEGS], [0], 1, foreign=())
+    record = series(biped, ticks)
+    measured, missed = effort_and_impact(record, 0, biped, SETTLED), misses(record, 0, biped, SETTLED)
+    assert missing[0] == 0.0 and measured is not None and missed is not None
+    effort, impact, held = measured
+    assert held["speed"] == pytest.approx(0.0, abs=0.05) and held["period"] == pytest.approx(0.0, abs=0.03)
+    # Over strides that repeat themselves hip, knee and ankle do little net work, and the energy is that of their work.
+    own = record["work"][:, 0, :, :3].sum((0, 1))
+    way = np.ptp(record["com"][:, 0, 0])
+    spent = own[:, 0].sum() / MUSCLE_EFFICIENCY[0] + np.abs(own[:, 1]).sum() / MUSCLE_EFFICIENCY[1]
+    assert effort.work < 1.1 * spent / (BODY.mass * GRAVITY * way)  # tissue and tendon give some of it
+    assert effort.work > 0.4 * spent / (BODY.mass * GRAVITY * way)
+    paid = effort_price(record, 0, biped, SETTLED, missed)
+    assert paid is not None and paid > 10 * (effort.total + impact)
+    assert effort_price(record, 0, biped, 6.0, missed) is None
+
+
+def test_a_limp_is_unsteady_and_a_walk_off_its_plan_is_out_of_place():
+    _, biped, ticks = walk(SETTINGS, [LEGS], [0], 1, foreign=())
+    record = series(biped, ticks)
+    force, com = record["force"].copy(), record["com"].copy()
+    force[:, 0, 0, 1] *= 0.8  # the left foot carries less than the right, in every stride
+    com[..., 0] += 0.3
+    changes = {}, {"force": force}, {"com": com}, {"phase": 0.9 * record["phase"]}
+    level, limping, ahead, early = (effort_and_impact(record | each, 0, biped, SETTLED) for each in changes)
+    assert level is not None and limping is not None and ahead is not None and early is not None
+    assert limping[2]["unsteady"] > level[2]["unsteady"] + 0.03
+    assert ahead[2]["place"] == pytest.approx(0.3, abs=1.5 * level[2]["place"])
+    assert ahead[2]["speed"] == pytest.approx(level[2]["speed"], abs=1e-9)
+    way = 2 * biped.plan.step_length
+    assert 0.0 <= level[2]["skipped"] < 0.1 * way
+    assert 1.0 - early[2]["skipped"] / way == pytest.approx(0.9 * (1.0 - level[2]["skipped"] / way))
+
+
+def test_no_walk_pays_as_much_as_a_fall():
+    limp = replace(LEGS, hip_stiffness=(20.0, 20.0), knee_stiffness=(20.0, 20.0))
+    own, fallen = cost(SETTINGS, [LEGS, limp], 0, 1, 0.0, pays="effort")
+    assert own < FALL_COST < fallen
+
+
+def test_a_search_by_effort_refuses_least_squares():
+    with pytest.raises(SpringfootError, match="refinements must be 0 where a walk pays for effort, got 2"):
+        LegTuning(pays="effort", refinements=2).check()

@@ -1,0 +1,119 @@
+"""The laboratory's experiment: known springs are found from pushes, and a policy that reacts is called so."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from springfoot.cli.main import study_main
+from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.physics.model import damping_times
+from springfoot.envs.settings.settings import body_of
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.gait import SpringfootError
+from springfoot.gait.springs.perturbation import REACTS, SPRING
+from springfoot.studies.springs.push_experiment import Row, identified, prepare_pushed, samples
+
+PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}
+
+
+@cache
+def pushed(name, decisions=None):
+    policy, settings = prepare_pushed(name, PUSHES | ({"decisions": decisions} if decisions else {}))
+    return record(policy, settings, name=name, episodes=32)
+
+
+def loaded(rows: list[Row]) -> list[Row]:
+    return [row for row in rows if row.loaded]
+
+
+def test_torque_is_recorded_at_the_same_instant_as_angle_and_velocity():
+    recording = pushed("schedule")
+    series, begun = recording.series, np.isfinite(recording.series["phase"])
+    beta = damping_times(body_of(recording.settings))[FEET]
+    torque, angle, velocity = (series[name][..., FEET] for name in ("torque", "angle", "velocity"))
+    spring = series["stiffness"] * (series["equilibrium"] - angle - beta * velocity)
+    assert torque[begun] == pytest.approx(spring[begun], abs=1e-3)
+
+
+def test_springs_are_found_in_every_loaded_phase_ramps_included():
+    rows = loaded(identified(samples(pushed("schedule"))))
+    assert {row.joint for row in rows} == {"ankle", "toe"} and len(rows) >= 8
+    rows += loaded(identified(samples(pushed("frozen:pretrained"))))  # whose ramps are steeper
+    for row in rows:
+        assert row.pushed.stiffness and row.pushed.damping_time
+        assert row.pushed.stiffness.value == pytest.approx(row.applied[0], rel=0.01)
+        assert row.pushed.damping_time.value == pytest.approx(0.02, rel=0.05)
+        assert row.pushed.verdict == SPRING
+    assert any(row.applied[2] > 3 * row.applied[1] for row in rows)
+
+
+def test_noise_on_the_torque_leaves_the_truth_within_intervals_and_the_undisturbed_estimator_is_blind():
+    policy, settings = prepare_pushed("schedule", PUSHES | {"push_newton": 0.0})
+    quiet = samples(record(policy, settings, name="schedule", episodes=4))
+    rows = loaded(identified(samples(pushed("schedule"), 1.0, seed=1), quiet))
+    held = [
+        row.pushed.stiffness.low <= row.applied[0] <= row.pushed.stiffness.high for row in rows if row.pushed.stiffness
+    ]
+    assert len(held) == len(rows) and sum(held) >= len(rows) - 2
+    stance = next(row for row in rows if (row.joint, row.start) == ("ankle", 0.30))
+    assert stance.undisturbed and stance.undisturbed.stiffness
+    blind = stance.undisturbed.stiffness
+    assert stance.applied[0] - blind.value > 5 * (blind.high - blind.value)  # and its interval knows nothing of it
+
+
+def test_the_pretrained_policy_reacts_in_every_loaded_phase():
+    rows = loaded(identified(samples(pushed("pretrained"), 1.0)))
+    assert len(rows) >= 8 and {row.pushed.verdict for row in rows} == {REACTS}
+
+
+def test_a_stiffness_held_for_20_ms_is_no_function_of_the_phase_where_it_ramps():
+    ankle = {row.start: row for row in identified(samples(pushed("schedule", "50hz"))) if row.joint == "ankle"}
+    assert ankle[0.22].pushed.verdict == REACTS
+
+
+def test_scrambled_torque_makes_no_spring():
+    data = samples(pushed("schedule"))
+    order = np.random.default_rng(0).permutation(len(data.torque))
+    data.torque[:] = data.torque[order]
+    assert all(row.pushed.verdict != SPRING for row in identified(data))
+
+
+def test_the_command_writes_table_and_numbers_and_the_same_seeds_the_same(capsys, tmp_path):
+    page, numbers = tmp_path / "results.md", []
+    page.write_text("# Results\n\n<!-- IDENTIFICATION BEGIN -->\nold\n<!-- IDENTIFICATION END -->\n", encoding="utf-8")
+    for threads in ("1", "2"):
+        out = tmp_path / threads
+        words = ["schedule", "--quick", "--threads", threads, "--page", str(page), "--out", str(out)]
+        assert study_main(["identify", *words]) == 0
+        numbers.append((out / "springs.csv").read_bytes())
+    assert numbers[0] == numbers[1] and numbers[0].count(b"\n") == 1 + 2 * 10
+    late_stance = leg_constants("planned", "people").ankle_schedule[2]
+    assert f"| ankle | 30–44 | {late_stance:.1f} | " in capsys.readouterr().out
+    text = page.read_text(encoding="utf-8")
+    assert "old" not in text and "`schedule`: ankle a spring in " in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nobody"], "no policy 'nobody'"),
+        (["frozen"], "as in frozen:pretrained"),
+        (["frozen:schedule"], "schedule has no feedback"),
+        (["schedule", "--push-newton", "0"], "push_newton must be"),
+        (["schedule", "--noise-percent", "-1"], "noise_percent must be"),
+        (["schedule", "--repeats", "-1"], "repeats must be"),
+    ],
+)
+def test_bad_input_gets_one_line(words, said, capsys, tmp_path):
+    assert study_main(["identify", *words, "--out", str(tmp_path / "new")]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1 and not (tmp_path / "new").exists()
+
+
+def test_a_policy_that_falls_at_once_is_refused():
+    policy, settings = prepare("thesis", {"episode_seconds": 2.0})
+    with pytest.raises(SpringfootError, match="thesis walks no strides"):
+        samples(record(policy, settings, name="thesis", episodes=2))

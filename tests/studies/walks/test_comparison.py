@@ -1,0 +1,191 @@
+"""Comparisons: rows that differ in the policy and in nothing else, and what is concluded from them."""
+
+import csv
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from springfoot.agents.policies.baselines import BASELINES, constant
+from springfoot.cli.main import study_main
+from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import record
+from springfoot.studies.base import intervals, quantities
+from springfoot.studies.constant_search import best_constant
+from springfoot.studies.walks import comparison
+from springfoot.studies.walks.seeds import seeds_table
+
+SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
+THESIS = {"thesis", "thesis_printed"}
+
+
+@pytest.fixture(scope="module")
+def rows():
+    found = comparison.contenders("schedule", SHORT, constant=(200.0, 30.0), factor=1.2, seed=3)
+    return [comparison.run_row(*each, episodes=2, seed=3) for each in found]
+
+
+def test_every_spring_that_needs_no_learning_is_a_row(rows):
+    names = [row.name for row in rows]
+    assert names[:4] == ["schedule", "untrained", "schedule", "schedule:1.2"]  # its own open-loop copy
+    assert set(BASELINES) < set(names) and "quasi_stiffness, commanded 1.35 m/s" in names
+    stiffness = {row.name: row.metrics["stiffness_Nm_rad"] for row in rows}
+    assert stiffness["constant:200,30"]["ankle"]["mid_stance"] == pytest.approx(200.0)
+    assert stiffness["constant:200,30"]["toe"]["mid_stance"] == pytest.approx(30.0)
+    own, factor = (stiffness[name]["ankle"]["mid_stance"] for name in ("schedule", "schedule:1.2"))
+    assert factor == pytest.approx(1.2 * own, rel=0.02)
+
+
+def test_rows_share_conditions_and_reward_but_for_what_makes_them_other_springs(rows):
+    first = rows[0].metrics["environment"]
+    for row in rows:
+        own = {"equilibrium", "schedule"} if row.name in THESIS else set()
+        own |= {"speed"} if "commanded" in row.name else set()
+        assert {key for key in first if row.metrics["environment"][key] != first[key]} == own
+    assert first["push_newton"] == 150.0
+
+
+def test_a_baseline_earns_the_reward_of_the_policy_it_is_held_against():
+    weights = {"alive": 1.0, "speed": 0.0}
+    given = {"reward_weights": weights, "episode_seconds": 1.0}
+    alone = settings_from(**given)
+    (found,) = [each for each in comparison.contenders("schedule", given) if each.name == "constant"]
+    returns = comparison.run_row(*found, episodes=2, seed=3).returns
+    assert np.array_equal(returns, record(constant(alone), alone, name="", episodes=2, seed=3).returns)
+    plain = settings_from(**(given | {"reward_weights": {}}))
+    assert not np.array_equal(returns, record(constant(plain), plain, name="", episodes=2, seed=3).returns)
+
+
+def test_a_row_is_what_evaluate_would_find(rows):
+    policy, settings = prepare("schedule", SHORT)
+    assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3).returns)
+
+
+def test_untrained_is_where_the_policys_own_training_starts():
+    found = {each.name: each for each in comparison.contenders("pretrained", {"episode_seconds": 1.0})}
+    assert found["untrained"].settings.action_mode == found["pretrained"].settings.action_mode == "absolute"
+    own = found["untrained"]
+    returns = comparison.run_row(*own, episodes=1).returns
+    middle = [np.sqrt(np.prod(getattr(own.settings, f"{joint}_stiffness_range"))) for joint in ("ankle", "toe")]
+    held = record(constant(own.settings, middle), own.settings, name="", episodes=1)
+    assert returns[0] == pytest.approx(held.returns[0], rel=1e-6)
+
+
+def test_a_trained_policy_is_held_against_its_open_loop_copy():
+    own, copy, *_ = comparison.contenders("pretrained", {"episode_seconds": 1.0})
+    assert copy.name == "frozen:pretrained"
+    assert copy.settings == dataclasses.replace(own.settings, action_mode="absolute")
+
+
+def test_interval_is_that_of_a_normal_mean_and_covers_it_as_often_as_said():
+    random = np.random.default_rng(1)
+    low, high = intervals.mean_interval(random.normal(5.0, 2.0, 400))
+    assert high - low == pytest.approx(2 * 1.96 * 2.0 / np.sqrt(400), rel=0.1)
+    covered = 0
+    for _ in range(200):
+        low, high = intervals.mean_interval(random.normal(5.0, 2.0, 50))
+        covered += low <= 5.0 <= high
+    assert 0.88 < covered / 200 < 0.99
+    assert intervals.mean_interval(np.full(7, 3.0)) == intervals.mean_interval(np.array([3.0])) == (3.0, 3.0)
+
+
+def row_of(name, returns, fell=(), speed=1.2):
+    """A row of given returns, all joints equally far off, in which the episodes `fell` fell."""
+    metrics = {
+        "falls": len(fell),
+        "episodes": len(returns),
+        "speed_m_s": {"mean": 1.2},
+        "environment": {"speed": speed},
+        "joints": {joint: {"rmse_deg": 2.0} for joint in quantities.COMPARED_JOINTS},
+    }
+    fallen = np.isin(np.arange(len(returns)), fell)
+    return comparison.Row(name=name, metrics=metrics, returns=np.array(returns, float), fell=fallen)
+
+
+def test_intervals_of_shares_are_wilsons():
+    # Newcombe 1998, Statistics in Medicine 17, 857: 81 of 263, 0 of 20, 1 of 29.
+    for count, total, low, high in ((81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)):
+        assert intervals.share_interval(count, total) == pytest.approx((low, high), abs=1e-4)
+
+
+def test_falls_of_paired_rows_are_told_apart_by_the_episodes_that_differ():
+    fell = np.arange(20) < 10
+    assert intervals.paired_p(fell, fell) == 1.0
+    assert intervals.paired_p(np.zeros(20, bool), fell) == pytest.approx(2 * 0.5**10)
+    assert intervals.paired_p(fell, np.zeros(20, bool)) == pytest.approx(2 * 0.5**10)
+    assert intervals.paired_p(fell, ~fell) == 1.0
+
+
+def test_table_and_verdict_say_what_the_policy_is_ahead_of_and_what_not():
+    noise = np.array([0.0, 1.0, -1.0, 0.5] * 5)
+    ours = row_of("ours", 10 + noise)
+    rows = [
+        ours,
+        row_of("worse", 8 + noise[::-1], fell=range(12)),
+        row_of("alike", 10 + noise[::-1], fell=[3]),
+        row_of("elsewhere", 1 + noise, speed=1.4),
+    ]
+    head, rule, *body = comparison.comparison_table(rows).splitlines()
+    assert head.count("|") == rule.count("|") == body[0].count("|")
+    assert body[0].startswith("| `ours` | 0 of 20 [0, 16 %] |  | 10.1 |  | 1.200 |")
+    assert body[1].startswith("| `worse` | 12 of 20 [39, 78 %] | 0.00049 | 8.1 | 2.0 [")
+    assert "| – |" in body[3]
+    assert comparison.verdict(rows) == (
+        "ours earns more than 1 of 2 rows (interval above 0); not more than alike. It falls less often than 1 of 3 "
+        "(p < 0.05); not less than alike, elsewhere."
+    )
+
+
+def test_best_constant_is_at_least_as_good_as_the_ends_of_the_range():
+    settings = BipedSettings(episode_seconds=0.6, ankle_stiffness_range=(20, 800), toe_stiffness_range=(20, 40))
+    told = []
+    pair, tried = best_constant(settings, grid=(2, 2), refinements=1, episodes=2, seed=5, progress=told.append)
+    returns = tried[pair]
+    assert sum(told) == 2 * 2 + 9
+    assert returns.mean() == max(each.mean() for each in tried.values())
+    assert len(returns) == 2 and 20 <= pair[0] <= 800 and 20 <= pair[1] <= 40
+    for other in ((20.0, 20.0), (800.0, 40.0)):
+        assert returns.mean() >= record(constant(settings, other), settings, name="", episodes=2, seed=5).returns.mean()
+    again = record(constant(settings, pair), settings, name="", episodes=2, seed=5).returns
+    assert np.array_equal(returns, again)
+
+
+def test_seeds_table_has_the_spread_over_policies(rows):
+    lines = seeds_table([rows[0], rows[4]]).splitlines()
+    cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
+    one, other = (row.metrics["stiffness_Nm_rad"]["ankle"]["push_off"] for row in (rows[0], rows[4]))
+    mean, sd = (one + other) / 2, abs(one - other) / np.sqrt(2)
+    assert cells["ankle K push-off N·m/rad"] == [f"{one:.0f}", f"{other:.0f}", f"{mean:.0f} ± {sd:.0f}"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["compare", "nobody"], "no policy 'nobody'"),
+        (["compare", "schedule", "--episodes", "0"], "episodes must be"),
+        (["compare", "schedule", "--constant", "-1", "30"], "two positive stiffnesses"),
+        (["seeds"], "one policy or more"),
+        (["best-constant", "--policy", "untrained", "--mass", "-1"], "mass must be"),
+    ],
+)
+def test_bad_input_is_one_line_exit_code_2_and_nothing_written(words, said, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert study_main(words) == 2
+    told = capsys.readouterr()
+    assert said in told.err and told.err.count("\n") == 1 and not told.out
+    assert not list(tmp_path.iterdir())
+
+
+def test_studies_run_as_a_command_and_leave_their_numbers(tmp_path):
+    words = ["seeds", "schedule", "--episodes", "1", "--seconds", "4.5"]
+    command = [sys.executable, "-c", "from springfoot.cli.main import main; main()", "study", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert "| falls | 0 | 0.0 ± – |" in done.stdout
+    assert "1 episodes × 4.5 s, seeds 0–0, no pushes." in done.stdout
+    with (tmp_path / "runs" / "seeds-1" / "seeds.csv").open(encoding="utf-8", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["policy"] == "schedule" and row["falls"] == "0"
+    assert f"| speed m/s | {float(row['speed_m_s_mean']):.3f} |" in done.stdout
