@@ -57,7 +57,6 @@ STUDIES = {
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
     "slope-tuning": ("searches.slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
-    "thesis": ("thesis_page.Thesis", "How do the thesis's figures and claims stand against people?"),
 }
 """Name of each study on the command line -> its class, imported when it is asked, and its question."""
 

@@ -4,13 +4,11 @@ from springfoot.errors import SpringfootError
 
 from .body.body import GRAVITY, Body
 from .body.leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
-from .bout import Bout, plan_bout
 from .people.cycle import PERCENT
 from .people.human import HumanGait, human_gait
 from .people.own_data import OwnGait, read_gait
 from .plan.kinetics import foot_force, ground_reaction, planned_moments, projection_table
 from .plan.plan import WalkPlan, plan_walk
-from .preview import preview_com
 from .springs.identification import PhaseSpring, identify
 from .springs.perturbation import PushedSpring, identify_pushed
 from .springs.stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
@@ -19,7 +17,6 @@ __all__ = [
     "GRAVITY",
     "PERCENT",
     "Body",
-    "Bout",
     "FootLoad",
     "HumanGait",
     "LegMotion",
@@ -36,10 +33,8 @@ __all__ = [
     "identify_pushed",
     "inverse_dynamics",
     "leg_motion",
-    "plan_bout",
     "plan_walk",
     "planned_moments",
-    "preview_com",
     "projection_moments",
     "projection_table",
     "read_gait",

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli")
+ROOMS = ("gait", "envs", "agents", "evaluation", "studies")
 PUBLIC = {f"springfoot.{room}": import_module(f"springfoot.{room}") for room in ROOMS}
 
 

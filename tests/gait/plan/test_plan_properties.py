@@ -8,7 +8,7 @@ import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from springfoot.gait import Body, Bout, SpringfootError, plan_bout, plan_walk
+from springfoot.gait import Body, SpringfootError, plan_walk
 from springfoot.gait.body.body import REFERENCE_HEIGHT
 from springfoot.gait.plan.foot import FLOOR_TOLERANCE
 from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, SLOPE_RANGE, STEP_TIME_RANGE, WalkPlan
@@ -120,20 +120,6 @@ def assert_rebuilt(plan: WalkPlan) -> None:
     np.testing.assert_allclose(com, planned, atol=1e-9)
 
 
-def assert_bout_valid(bout: Bout) -> None:
-    time = np.linspace(0, bout.duration, SAMPLES)
-    rear, front = bout.support(time)
-    zmp = bout.zmp(time)
-    assert np.all(zmp >= rear - 1e-6) and np.all(zmp <= front + 1e-6)
-    ends = np.array([0.0, bout.duration])
-    assert np.abs([bout.com_velocity(ends), bout.com_acceleration(ends)]).max() < 1e-9
-    for side in ("left", "right"):
-        angles = bout.joint_angles(side, time)
-        assert all(np.isfinite(values).all() for values in (*angles.values(), *bout.joint_rates(side, time).values()))
-        assert angles["knee"].min() > 0
-        assert bout.heel_position(side, time)[1].min() > -1.1 * FLOOR_TOLERANCE
-
-
 def plan_or_reason(plan: Callable, *args, **asked):
     try:
         return plan(*args, **asked)
@@ -154,16 +140,6 @@ def test_any_walk_asked_for_is_valid_or_refused_with_a_number(walk):
         assert_valid(plan)
         if asked["clearance"] is not None:
             assert plan.feet.clearance == pytest.approx(asked["clearance"], abs=1e-9)
-
-
-@settings(EXAMPLES, max_examples=20)
-@given(walks(), st.integers(1, 8))
-def test_any_bout_asked_for_is_valid_or_refused_with_a_number(walk, steps):
-    body, speed, asked = walk
-    bout = plan_or_reason(plan_bout, body, speed, steps, **(asked | {"slope": 0.0}))
-    if bout is not None:
-        event("valid")
-        assert_bout_valid(bout)
 
 
 @settings(EXAMPLES, max_examples=8)

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from springfoot.gait import Body, human_gait, plan_bout, plan_walk
+from springfoot.gait import Body, human_gait, plan_walk
 from springfoot.gait.body.rockers import turned
 from springfoot.gait.people.human import human_cop
 from springfoot.gait.plan import fit_feet
@@ -137,25 +137,6 @@ def test_zmp_of_peoples_double_support_is_near_peoples(speed, rms):
         place = 2 * start * plan.step_length + plan.body.foot_length * human_cop(since / human.toe_off)
         moment, load = moment + place * force, load + force
     assert np.sqrt(np.mean((plan.zmp(step) - moment / load) ** 2)) < rms
-
-
-def test_a_bout_rolls_too_and_its_feet_stand_still():
-    bout = plan_bout(Body(), 1.2, 4, double_support=0.13)
-    time = np.linspace(0, bout.duration, 20_000)
-    assert bout.plan.feet.roll > 0.9
-    rear, front = bout.support(time)
-    zmp = bout.zmp(time)
-    assert np.all(zmp >= rear - 1e-6) and np.all(zmp <= front + 1e-6)
-    joint_height = bout.plan.body.toe_joint_height
-    for side in ("left", "right"):
-        rear, front = bout.on_ground(side, time)
-        _, joint = bout.toe_joint_position(side, time)
-        flat_on_toe = np.isfinite(rear) & (rear < front) & (front > bout.toe_joint_position(side, time)[0] + 1e-6)
-        assert np.abs(joint[flat_on_toe] - joint_height).max() < 1e-9
-        rolling = np.isfinite(rear) & (rear == front) & (joint > joint_height + 0.005)
-        assert rolling.any()
-        x, z = bout.ankle_position(side, time)
-        assert np.abs(np.diff([x, z])).max() < (8 * bout.plan.speed + 2) * time[1]  # nothing jumps
 
 
 def test_constants_of_the_whole_roll_are_where_their_fit_ends():
