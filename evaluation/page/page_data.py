@@ -69,7 +69,7 @@ def _legs(gait: Gait, name: str, apart: bool) -> dict[str, Any]:
     if not apart:
         return {}
     return {
-        "legs": [{"mean": shown_numbers(own.mean(name)), "sd": shown_numbers(own.sd(name))} for own in gait.plan.foot],
+        "legs": [{"mean": shown_numbers(own.mean(name)), "sd": shown_numbers(own.sd(name))} for own in gait.feet],
     }
 
 
@@ -176,7 +176,7 @@ def _loops(recording: Recording, gait: Gait, human: HumanGait, apart: bool) -> l
         return {"x": shown_numbers(angle), "y": shown_numbers(moment)}
 
     def loop(joint: str) -> dict[str, Any]:
-        return of(gait.both, joint) | ({"legs": [of(own, joint) for own in gait.plan.foot]} if apart else {})
+        return of(gait.both, joint) | ({"legs": [of(own, joint) for own in gait.feet]} if apart else {})
 
     return [
         {

@@ -75,9 +75,9 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
         length = found[:, -1, 0] - found[:, 0, 0]
         found[..., 0] -= found[:, :1, 0] + length[:, None] * np.linspace(0, 1, MOMENTS)
         strides, times, lengths = [*strides, *found], [*times, *(end - begin)], [*lengths, *length]
-    if not (strides and all(foot.count for foot in gait.plan.foot)):
+    if not (strides and all(foot.count for foot in gait.feet)):
         return _end(recording, told)
-    curves = [foot.mean(column)[:: 100 // (MOMENTS - 1)] for column, _, _ in PANELS.values() for foot in gait.plan.foot]
+    curves = [foot.mean(column)[:: 100 // (MOMENTS - 1)] for column, _, _ in PANELS.values() for foot in gait.feet]
     metrics = gait.metrics
     told |= {
         "seconds": float(np.mean(times)),

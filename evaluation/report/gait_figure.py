@@ -47,7 +47,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
     human = reference_gait(settings)
     legs: Legs = ((gait.both, MODEL),)
     if differ(settings):
-        legs = tuple(zip(gait.plan.foot, (MODEL, OTHER_LEG), strict=True))
+        legs = tuple(zip(gait.feet, (MODEL, OTHER_LEG), strict=True))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(12.5, 10.2), layout="constrained")
         grid = figure.subplots(4, 4)

@@ -63,7 +63,7 @@ def write_report(
 def _write_numbers(folder: Path, recording: Recording, gait: Gait) -> None:
     text = json.dumps(gait.metrics, indent=2, allow_nan=False, ensure_ascii=False)
     (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
-    left, right = gait.plan.foot
+    left, right = gait.feet
     for name, curves in (("gait_cycle", gait.both), ("gait_cycle_left", left), ("gait_cycle_right", right)):
         write_gait_cycle(folder / f"{name}.csv", curves, gait.metrics)
     recording.save(folder / "strides.npz")

@@ -73,7 +73,7 @@ def test_one_number_is_the_same_at_every_station(tmp_path):
     np.testing.assert_allclose(recording.series["stiffness"][0, :, LEFT, 0], stiffness, rtol=1e-6)
 
     gait = measure(recording)
-    write_gait_cycle(tmp_path / "gait_cycle_left.csv", gait.plan.foot[LEFT], gait.metrics)
+    write_gait_cycle(tmp_path / "gait_cycle_left.csv", gait.feet[LEFT], gait.metrics)
     with (tmp_path / "gait_cycle_left.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert int(rows[0]["n"]) >= 2

@@ -238,7 +238,7 @@ def test_cost_of_transport_is_the_positive_work_of_all_joints(gait):
 
 
 def test_feet_and_both_are_consistent(gait):
-    left, right = gait.plan.foot
+    left, right = gait.feet
     assert left.count + right.count == gait.both.count == gait.metrics["strides"]["count"]
     for name in GAIT_CYCLE_COLUMNS:
         pooled = (left.mean(name) * left.count + right.mean(name) * right.count) / gait.both.count

@@ -90,7 +90,7 @@ def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
     with kept_figures() as figures:
         save_gait_figure(tmp_path / "gait.png", recording, gait)
     knee = next(ax for ax in figures["gait.png"].axes if ax.get_title(loc="left") == "Knee angle")
-    for leg in gait.plan.foot:
+    for leg in gait.feet:
         assert has_line(knee, PERCENT, leg.mean("knee_flexion_deg"))
     save_animation(tmp_path / "walk.gif", recording)
     with Image.open(tmp_path / "walk.gif") as clip:

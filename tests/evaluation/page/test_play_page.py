@@ -53,8 +53,8 @@ def test_a_walk_is_its_mean_stride():
     assert told["falls"] == 0 and told["speed"] == gait.metrics["speed_m_s"]["mean"]
     assert told["length"] / told["seconds"] == pytest.approx(told["speed"], rel=0.02)
     column = {name: PLAY_COLUMNS.index(name) for name in PLAY_COLUMNS}
-    assert walk[:, column["Knee angle"]] == pytest.approx(gait.plan.foot[0].mean("knee_flexion_deg")[::2])
-    assert walk[:, column["Knee angle"] + 1] == pytest.approx(gait.plan.foot[1].mean("knee_flexion_deg")[::2])
+    assert walk[:, column["Knee angle"]] == pytest.approx(gait.feet[0].mean("knee_flexion_deg")[::2])
+    assert walk[:, column["Knee angle"] + 1] == pytest.approx(gait.feet[1].mean("knee_flexion_deg")[::2])
     assert np.degrees(walk[:, column["angle"] + 1]) == pytest.approx(walk[:, column["Knee angle"]], abs=1e-3)
     up = walk[:-1, column["up"] : column["up"] + 2]
     assert up.sum(axis=1).mean() == pytest.approx(1.0, abs=0.02)

@@ -146,9 +146,9 @@ def test_feet_of_other_kinds_are_told_drawn_and_measured_apart(tmp_path):
     assert (left["one_piece"], right["one_piece"]) == (False, True) and (left["orthosis"], right["orthosis"]) == (0, 1)
     knee = next(panel for panel in policy["panels"] if panel["title"] == "Knee angle")
     for side, leg in enumerate(knee["legs"]):
-        assert leg["mean"] == pytest.approx(gait.plan.foot[side].mean("knee_flexion_deg"), rel=1e-3, abs=1e-3)
+        assert leg["mean"] == pytest.approx(gait.feet[side].mean("knee_flexion_deg"), rel=1e-3, abs=1e-3)
     assert policy["loops"][0]["legs"][1]["x"] == pytest.approx(
-        gait.plan.foot[1].mean("ankle_dorsiflexion_deg"), rel=1e-3, abs=1e-3
+        gait.feet[1].mean("ankle_dorsiflexion_deg"), rel=1e-3, abs=1e-3
     )
     rows = {row[0]: row for row in data["legs"][0]}
     assert rows["stance"][2:] == ([f"{leg['stance_percent']:.1f}" for leg in gait.metrics["per_leg"].values()])

@@ -33,7 +33,7 @@ def test_its_means_are_the_mean_curves(walk, tmp_path):
     assert tuple(rows[0]) == (*STRIDE_KEYS, *GAIT_CYCLE_COLUMNS)
     count = gait.metrics["strides"]["count"]
     assert count > 5 and len(rows) == 101 * count
-    for side, curves in zip(("left", "right"), gait.plan.foot, strict=True):
+    for side, curves in zip(("left", "right"), gait.feet, strict=True):
         knee = [float(row["knee_flexion_deg"]) for row in rows if row["side"] == side and row["percent"] == "40"]
         assert len(knee) == curves.count
         assert np.mean(knee) == pytest.approx(curves.mean("knee_flexion_deg")[40], rel=1e-5)

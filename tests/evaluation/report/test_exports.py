@@ -136,9 +136,9 @@ def test_the_model_file_steps_the_same_bits_as_the_environment(given, tmp_path):
     random = np.random.default_rng(0)
     for _ in range(60):
         stiffness = random.uniform(50, 400, (2, 4))
-        simulation.control[0] = np.stack([stiffness, stiffness * random.uniform(-0.2, 0.3, (2, 4))], -1)
-        data.ctrl[:] = simulation.control[0].ravel()
-        simulation.advance()
+        control = np.stack([stiffness, stiffness * random.uniform(-0.2, 0.3, (2, 4))], -1)
+        data.ctrl[:] = control.ravel()
+        simulation.advance(control[None])
         mujoco.mj_step(model, data, nstep=round(TICK / model.opt.timestep))
     after = simulation.data(0)
     assert np.array_equal(data.qpos, after.qpos) and np.array_equal(data.qvel, after.qvel)

@@ -193,7 +193,7 @@ WALKS = {
 @pytest.mark.parametrize(("name", "settings"), WALKS.values(), ids=WALKS)
 def test_what_walks_here_can_be_walked_after(tmp_path, name, settings):
     gait = measure(record(*prepare(name, {"episode_seconds": 8.0} | settings), name=name, episodes=1))
-    for side, curves in enumerate(gait.plan.foot):
+    for side, curves in enumerate(gait.feet):
         assert curves.count
         path = tmp_path / f"{side}.csv"
         write_gait_cycle(path, curves, gait.metrics)
