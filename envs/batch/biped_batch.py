@@ -6,6 +6,7 @@ array depends on environment i alone, by the same operations for any N: a batch 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,8 +36,8 @@ from ..task.observation import SensorNoise
 from ..task.pushes import Pushes
 from ..task.reward import Task
 from .exact_state import ExactState
-from .step_kernels import begin_step, begin_window, end_step, end_window, next_window
-from .step_result import StepResult, Tick, held_control, room
+from .step_kernels import Rows, Tables, begin_step, begin_window, end_step, end_window, next_window
+from .step_result import StepResult, Tick, empty_outcome, held_control
 
 
 class Biped(ExactState):
@@ -107,9 +108,18 @@ class Biped(ExactState):
         self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
         self._no_reason, self._steps = np.broadcast_to(0, num_envs), self._task.rows["steps"]
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
-        self._rows = self.subjects.rows, self._task.rows, forces
-        curves = self._springs.rest, self._springs.schedule, self._legs.table, incline
-        self._tables = *(each.table for each in curves), self._springs.feet, self._task.table
+        self._control = np.zeros((num_envs, len(SIDES), len(JOINTS), 2))
+        self._rows = tuple(Rows(self.subjects.rows, self._task.rows, forces, self._control))
+        self._tables = tuple(
+            Tables(
+                rest=self._springs.rest.table,
+                schedule=self._springs.schedule.table,
+                legs=self._legs.table.table,
+                incline=incline.table,
+                feet=self._springs.feet,
+                reference=self._task.table,
+            )
+        )
         self._physics = tuple(self._simulation.arrays)
         self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
         self._simulation.measure()
@@ -229,70 +239,104 @@ class Biped(ExactState):
         Environments where the mask `active` (N,) is False stay as they are; their reward is 0.
         Raises `SpringfootError` for actions of another shape, and for NaN or infinity.
         """
+        step = self._decode(actions, active)
+        self._before_step(step)
+        for window in range(self.windows_per_step - 1):
+            self._simulate(step)
+            self._next_window(step, window)
+        self._simulate(step)
+        return self._judge(step)
+
+    def _decode(self, actions: NDArray, active: NDArray | None) -> "_Step":
+        """Begin a step: the environments that run, and the factors that their actions make of the stiffness."""
         running, ids = self._everyone, None
         if active is not None and not active.all():
             running, ids = active, np.flatnonzero(active)
-        rows, physics, tables, springs = self._rows, self._physics, self._tables, self._springs
-        factor = springs.factor(self._decode(actions, running))
-        walking, fixed = running, self._nobody
-        if self._standing is not None:
-            walking, fixed = self._standing.switch(self._simulation.arrays, self._steps * self.dt, running)
-        if self.subjects.advance(self._steps, self._random, walking):
-            self._legs.follow()
-        if self.settings.push_newton:
-            self._simulation.push(self._pushes.force(self._steps, self._random, running))
-        begin_step(rows, physics, tables, springs.options, factor, walking, fixed)
-        for window in range(self.windows_per_step - 1):
-            tick = self._roll(running, walking, ids)
-            if tick is None:
-                next_window(rows, physics, tables, springs.options, window, walking)
-                self._after_window(tick)
-            else:  # whoever listens sees the control of the window that ended
-                end_window(rows, physics, window, walking)
-                self._after_window(tick)
-                begin_window(rows, physics, tables, springs.options, walking)
-        tick = self._roll(running, walking, ids)
-        observation, reward, terminated, truncated, values = outcome = room(self.num_envs)
-        ended = end_step(rows, physics, tables, self._task.options, walking, running, outcome)
-        self._after_window(tick)
-        if self.settings.sensor_noise:
-            seen = np.flatnonzero(running)
-            self._noise.draw(seen, [self._random[index] for index in seen])
-        return StepResult(
-            observation=self._noise.on(observation),
-            reward=reward,
-            terminated=terminated,
-            truncated=truncated,
-            values=values,
-            termination=self._task.reasons(self._simulation.now, terminated) if ended else self._no_reason,
-        )
-
-    def _decode(self, actions: NDArray, running: NDArray) -> NDArray:
-        """The actions that take effect, in [-1, 1]; an environment that is not `running` keeps its last one."""
         action = real_numbers("actions", actions)
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
         taken = self._decisions.take(action, running)
         if taken is None:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
-        return taken
+        return _Step(running, ids, self._springs.factor(taken), running, self._nobody)
 
-    def _roll(self, running: NDArray, walking: NDArray, ids: NDArray | None) -> dict[str, NDArray] | None:
-        """Run the physics of one control window; returns what a `Tick` tells of its beginning, if someone listens."""
+    def _before_step(self, step: "_Step") -> None:
+        """Let bodies set off or stop, change speeds, push, set the stiffness and begin the first window."""
         if self._standing is not None:
-            standing = running & ~walking
-            self._standing.drive(self._simulation.arrays, standing)
-            self._springs.hold(self._simulation.arrays, standing)
-        if self.on_tick is None:
-            self._simulation.advance(ids)
-            return None
-        begin = {"phase": self._legs.phase.copy(), "active": running.copy()} | held_control(self._simulation.control)
-        self._simulation.advance_watched(ids)
-        return begin
+            time = self._steps * self.dt
+            step.walking, step.fixed = self._standing.switch(self._simulation.arrays, time, step.running)
+        if self.subjects.advance(self._steps, self._random, step.walking):
+            self._legs.follow()
+        if self.settings.push_newton:
+            self._simulation.push(self._pushes.force(self._steps, self._random, step.running))
+        options = self._springs.options
+        begin_step(self._rows, self._physics, self._tables, options, step.factor, step.walking, step.fixed)
 
-    def _after_window(self, tick: dict[str, NDArray] | None) -> None:
-        """Lay the ground of the next footfalls, and tell of the window if someone listens."""
+    def _simulate(self, step: "_Step") -> None:
+        """Run the physics of one control window with the control that the springs, the legs and the stance set."""
+        if self._standing is not None:
+            standing = step.running & ~step.walking
+            bodies = self._simulation.arrays.bodies
+            self._standing.drive(bodies, self._control, standing)
+            self._springs.hold(bodies, self._control, standing)
+        watched = self.on_tick is not None
+        if watched:
+            step.window_start = {"phase": self._legs.phase.copy(), "active": step.running.copy()}
+            step.window_start |= held_control(self._control)
+        self._simulation.advance(self._control, step.ids, watched=watched)
+
+    def _next_window(self, step: "_Step", window: int) -> None:
+        """End control window number `window` of the step and begin the next."""
+        options = self._springs.options
+        if step.window_start is None:
+            next_window(self._rows, self._physics, self._tables, options, window, step.walking)
+            self._after_window(step)
+        else:  # report the window with the control that produced it
+            end_window(self._rows, self._physics, window, step.walking)
+            self._after_window(step)
+            begin_window(self._rows, self._physics, self._tables, options, step.walking)
+
+    def _after_window(self, step: "_Step") -> None:
+        """Lay the ground of the next footfalls, and report the window to a listener."""
         self._ground.advance(self._simulation.now, self._legs.phase, self._random)
-        if self.on_tick is not None and tick is not None:
+        if self.on_tick is not None and step.window_start is not None:
             com = self._task.planned_com(self._simulation.arrays.bodies)
-            self.on_tick(Tick(measurement=self.measurement, work=self._simulation.work, com_reference=com, **tick))
+            work = self._simulation.work
+            self.on_tick(Tick(measurement=self.measurement, work=work, com_reference=com, **step.window_start))
+
+    def _judge(self, step: "_Step") -> StepResult:
+        """End the last window: reward, observation, termination."""
+        outcome = empty_outcome(self.num_envs)
+        filled = tuple(outcome)
+        task = self._task.options
+        ended = end_step(self._rows, self._physics, self._tables, task, step.walking, step.running, filled)
+        self._after_window(step)
+        if self.settings.sensor_noise:
+            seen = np.flatnonzero(step.running)
+            self._noise.draw(seen, [self._random[index] for index in seen])
+        return StepResult(
+            observation=self._noise.on(outcome.observation),
+            reward=outcome.reward,
+            terminated=outcome.terminated,
+            truncated=outcome.truncated,
+            values=outcome.values,
+            termination=self._task.reasons(self._simulation.now, outcome.terminated) if ended else self._no_reason,
+        )
+
+
+@dataclass(slots=True)
+class _Step:
+    """One step of the batch on its way."""
+
+    running: NDArray
+    """(N,) environments that take the step."""
+    ids: NDArray | None
+    """Their indices, None for all."""
+    factor: NDArray
+    """(N, 4) factors of the actions on the stiffness [-]."""
+    walking: NDArray
+    """(N,) environments whose springs and phase move; the others stand or do not run."""
+    fixed: NDArray
+    """(N,) those of them that take the fixed stiffness."""
+    window_start: dict[str, NDArray] | None = None
+    """The fields of a `Tick` that are known as a window begins, where someone listens."""

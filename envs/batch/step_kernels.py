@@ -1,47 +1,84 @@
-"""What a step does between two calls of the physics: one compiled call each.
+"""The compiled calls of a step between two calls of the physics.
 
     begin_step -> physics -> (next_window -> physics ->) end_step
 
-`begin_step` sets the stiffness and begins the first control window; `next_window` measures what came of one window and
-begins the next; `end_step` measures, judges and observes. What each part does stands in the file of its idea. Where
-someone listens to each window, `end_window` and `begin_window` are two calls.
+`begin_step` sets the stiffness and begins the first control window; `next_window` measures one window and begins the
+next; `end_step` measures, judges and observes. Each part stands in the file of its idea. Where a listener wants each
+window, `end_window` and `begin_window` are two calls.
+
+Arrays travel as plain tuples and get their names inside: numba looks up a plain tuple's type in C, a named one's in
+Python, which costs more than the kernels of one body (`python -m benchmarks.named_tuples`).
 """
 
+from typing import NamedTuple
+
 import numpy as np
+
+from springfoot.arrays import NDArray
 
 from ..control.foot_springs import move, stiffen
 from ..control.legs import advance, drive
 from ..physics.kernel import kernel
 from ..physics.measurement import measure_bodies
+from ..physics.simulation import Physics
 from ..task.episode_end import average
 from ..task.observation import observe
 from ..task.reward import ALIVE, judge, total
-from .step_result import report
+from .step_result import Outcome, report
+
+
+class Rows(NamedTuple):
+    """The arrays that are kept of each environment."""
+
+    controls: NDArray
+    """(N,) of `CONTROL_ROW`."""
+    tasks: NDArray
+    """(N,) of `TASK_ROW`."""
+    forces: NDArray
+    """(W, N, side, contact, 2) contact forces in the step's W windows [N]."""
+    control: NDArray
+    """(N, side, joint, 2) K [N m/rad] and K theta_eq [N m] of the present window, for the simulation."""
+
+
+class Tables(NamedTuple):
+    """The curves over the stride, each of a `PhaseTable`."""
+
+    rest: NDArray
+    """(R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], and torques beside the springs [N m]."""
+    schedule: NDArray
+    """(R, SAMPLES, 2, 2) fixed stiffness of ankle and toe [N m/rad]."""
+    legs: NDArray
+    """(R, SAMPLES, 2, 7) of `leg_curves`."""
+    incline: NDArray
+    """(1, SAMPLES, 2, 4) of `slope_table`."""
+    feet: tuple[NDArray, NDArray]
+    """`FootLines`."""
+    reference: NDArray
+    """(R, SAMPLES, 2, C) of `REFERENCE`."""
 
 
 @kernel
 def begin_window(rows, physics, tables, springs, walking) -> None:
     """Begin a control window; arguments as of `begin_step`."""
-    controls, _, _ = rows
-    bodies, state, _, _ = physics
-    rest, _, legs, incline, feet, _ = tables
-    move(controls, bodies, state, rest, incline, feet, springs, walking)
-    drive(controls, bodies, state, legs, incline)
+    rows, physics, tables = Rows(*rows), Physics(*physics), Tables(*tables)
+    bodies = physics.bodies
+    move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
+    drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
 
 
 @kernel
 def end_window(rows, physics, window, walking) -> None:
     """End control window number `window` of the step; else as of `begin_step`."""
-    controls, _, forces = rows
-    bodies, state, sensors, warnings = physics
-    measure_bodies(bodies, state, sensors, warnings)
-    advance(controls, bodies, walking)
+    rows, physics = Rows(*rows), Physics(*physics)
+    bodies = physics.bodies
+    measure_bodies(bodies, physics.state, physics.sensors, physics.warnings)
+    advance(rows.controls, bodies, walking)
     for i in range(len(bodies)):
         force = bodies[i].measured.force
         for side in range(2):
             for contact in range(3):
                 for axis in range(2):
-                    forces[window, i, side, contact, axis] = force[side, contact, axis]
+                    rows.forces[window, i, side, contact, axis] = force[side, contact, axis]
 
 
 @kernel
@@ -49,24 +86,21 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
     """Set the stiffness and begin the first control window.
 
     Args:
-        rows: what is kept of each environment, plain tuples being quicker to hand over than named ones: (N,) of
-            `CONTROL_ROW`; (N,) of `TASK_ROW`; (W, N, side, contact, 2) contact forces in the step's W windows [N].
+        rows: `Rows`, as a plain tuple.
         physics: `Physics` of the simulation, as a plain tuple.
-        tables: curves over the stride, each of a `PhaseTable`: rest angles (R, SAMPLES, 2, 2) [rad] and fixed stiffness
-            (R, SAMPLES, 2, 2) [N m/rad] of ankle and toe; `leg_curves` (R, SAMPLES, 2, 7); `slope_table`
-            (1, SAMPLES, 2, 4); `FootLines` as a plain tuple; `REFERENCE` (R, SAMPLES, 2, C).
+        tables: `Tables`, as a plain tuple.
         springs: (1,) of `SPRING_OPTIONS`.
-        factor: (N, 4) what the actions make of the stiffness [-].
+        factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool, environments whose springs and phase move.
         fixed: (N,) bool, those of them that take the fixed stiffness.
     """
-    stiffen(rows[0], physics[0], tables[1], springs, factor, walking, fixed)
+    stiffen(Rows(*rows).controls, Physics(*physics).bodies, Tables(*tables).schedule, springs, factor, walking, fixed)
     begin_window(rows, physics, tables, springs, walking)
 
 
 @kernel
 def next_window(rows, physics, tables, springs, window, walking) -> None:
-    """`end_window` and `begin_window`."""
+    """End window number `window` and begin the next; arguments as of `begin_step`."""
     end_window(rows, physics, window, walking)
     begin_window(rows, physics, tables, springs, walking)
 
@@ -80,27 +114,26 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
         task: (1,) of `TASK_OPTIONS`.
         walking: (N,) bool, environments whose phase moves.
         running: (N,) bool, environments that took the step; the others get no reward.
-        outcome: the arrays of a `StepResult` but its reasons, in order, which are filled.
+        outcome: `Outcome`, as a plain tuple, which is filled.
 
     Returns whether an episode is terminated.
     """
-    controls, tasks, forces = rows
-    bodies, reference = physics[0], tables[5]
-    observation, reward, terminated, truncated, values = outcome
+    controls, tasks, forces, _ = rows
+    bodies, reference, outcome = Physics(*physics).bodies, Tables(*tables).reference, Outcome(*outcome)
     end_window(rows, physics, len(forces) - 1, walking)
     terms, any_terminated = np.empty((len(running), len(task[0].weights))), False
     judge(tasks, controls, bodies, reference, task, forces, terms)
-    total(terms, task, reward)
+    total(terms, task, outcome.reward)
     average(tasks, forces, running)
     for i in range(len(running)):
-        terminated[i] = running[i] and terms[i, ALIVE] == 0.0
-        truncated[i] = running[i] and not terminated[i] and tasks[i].steps >= task[0].most_steps
-        any_terminated = any_terminated or terminated[i]
+        outcome.terminated[i] = running[i] and terms[i, ALIVE] == 0.0
+        outcome.truncated[i] = running[i] and not outcome.terminated[i] and tasks[i].steps >= task[0].most_steps
+        any_terminated = any_terminated or outcome.terminated[i]
         if not running[i]:
-            reward[i] = 0.0
+            outcome.reward[i] = 0.0
         decision = controls[i].decision
         for k in range(4):
             decision.last_action[k] = decision.action[k]
-    observe(tasks, controls, bodies, reference, observation)
-    report(tasks, controls, bodies, terms, task, values)
+    observe(tasks, controls, bodies, reference, outcome.observation)
+    report(tasks, controls, bodies, terms, task, outcome.values)
     return any_terminated

@@ -1,11 +1,13 @@
 """What one step of the batch returns, and what an evaluation records of each of its control windows."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from springfoot.arrays import NDArray
 
+from ..control.foot_springs import muscle_stiffness
 from ..physics.energy import WindowWork
 from ..physics.kernel import part
 from ..physics.measurement import Measurement
@@ -42,9 +44,10 @@ INFO = (
 )
 """The names of the numbers of `REPORT`, in order.
 
-Of each action: `stiffness/` [N m/rad], `torque/` [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/`
-and `work/equilibrium/` [J] of the step; `controlled/`, 1 where the action counts and 0 where it is read as 0. Of each
-reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1). `time` [s], `speed` [m/s].
+Of each action: `stiffness/` [N m/rad], muscles and a device in their place together, `torque/` [N m] and
+`equilibrium/` [rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J] of the step; `controlled/`, 1
+where the action counts and 0 where it is read as 0. Of each reward term: `reward/`, unweighted. Of each leg: `phase/`
+[0, 1). `time` [s], `speed` [m/s].
 """
 
 
@@ -69,8 +72,7 @@ def report(rows, controls, bodies, terms, options, values) -> None:
         for side in range(2):
             row.phase[side] = controls[i].legs.phase[side]
             for joint in range(2):
-                muscles = springs.acts[side, joint] * springs.stiffness[side, joint]
-                row.stiffness[side, joint] = muscles + springs.device[side, joint]
+                row.stiffness[side, joint] = muscle_stiffness(springs, side, joint) + springs.device[side, joint]
                 row.torque[side, joint] = m.torque[side, ANKLE + joint]
                 row.equilibrium[side, joint] = springs.equilibrium[side, joint]
                 row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]
@@ -126,20 +128,33 @@ class Tick:
 
 
 def held_control(control: NDArray) -> dict[str, NDArray]:
-    """What a `Tick` tells of `control` (N, side, joint, 2), of K and K theta_eq; theta_eq is 0 where there is no K."""
+    """Return `stiffness` and `equilibrium` of a `Tick` from `control` (N, side, joint, 2), K and K theta_eq.
+
+    The rest angle is 0 where there is no K.
+    """
     stiffness, drive = np.moveaxis(control, -1, 0)
     rest = np.divide(drive, stiffness, out=np.zeros_like(drive), where=stiffness > 0.0)
     return {"stiffness": stiffness.copy(), "equilibrium": rest}
 
 
-def room(num: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Room for what a step of `num` environments returns: observation, reward, terminated, truncated, values."""
-    return (
-        np.empty((num, len(OBSERVATION)), np.float32),
-        np.empty(num),
-        np.empty(num, bool),
-        np.empty(num, bool),
-        np.empty((num, len(INFO))),
+class Outcome(NamedTuple):
+    """The arrays of a `StepResult` that a kernel fills."""
+
+    observation: NDArray
+    reward: NDArray
+    terminated: NDArray
+    truncated: NDArray
+    values: NDArray
+
+
+def empty_outcome(num: int) -> Outcome:
+    """Return arrays for the outcome of a step of `num` environments, not yet filled."""
+    return Outcome(
+        observation=np.empty((num, len(OBSERVATION)), np.float32),
+        reward=np.empty(num),
+        terminated=np.empty(num, bool),
+        truncated=np.empty(num, bool),
+        values=np.empty((num, len(INFO))),
     )
 
 

@@ -15,9 +15,7 @@ from springfoot.gait.body.body import Body
 
 from ..physics.foot import Feet
 from ..physics.kernel import kernel, part
-from ..physics.measurement import plant_of
 from ..physics.model import ANKLE
-from ..physics.simulation import Physics
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.feet import feet_of
 from ..settings.settings import BipedSettings
@@ -135,9 +133,19 @@ def _swings(row, force, side):
 
 
 @part
+def muscle_stiffness(springs, side, joint) -> float:
+    """Return K of the muscles at one joint as it acts [N m/rad], 0 while they are slack or a device is in their place.
+
+    `springs` is of `SPRING_STATE`. The reward charges this K; with the device's it is the K of the control and `info`.
+    """
+    return springs.acts[side, joint] * springs.stiffness[side, joint]
+
+
+@part
 def _control(row, control, feet, theta, side, joint):
     """Put K and K theta_eq of one joint at the angle `theta`, muscles and device together, into the control."""
-    own, muscles = row.springs, row.springs.acts[side, joint] * row.springs.stiffness[side, joint]
+    own = row.springs
+    muscles = muscle_stiffness(own, side, joint)
     stiffness, drive = device(row, feet, theta, side, joint)
     own.device[side, joint] = stiffness
     if stiffness > 0.0:
@@ -147,7 +155,7 @@ def _control(row, control, feet, theta, side, joint):
 
 
 @part
-def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
+def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
     """Begin a control window: K and K theta_eq of ankles and toes go into the control.
 
     K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases or the foot's own. Moving the
@@ -157,7 +165,7 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        state: (N, numbers) MuJoCo's, whose `control` is filled.
+        control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
         rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; behind them, if so asked,
             torques that act beside the springs, whatever their K [N m]: as shifts of the rest angle by torque / K.
         incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.legs.slope_table`).
@@ -170,7 +178,7 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
     level = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
         own, foot, subject = rows[i].springs, rows[i].feet, rows[i].subject
-        angle, control = bodies[i].measured.angle, plant_of(state, i).control
+        angle = bodies[i].measured.angle
         if walking[i] and own.delay > 0:
             _arrive(own, angle)
         for side in range(2):
@@ -195,14 +203,14 @@ def move(rows, bodies, state, rest, incline, feet, options, walking) -> None:
                     if not own.fresh:
                         own.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
                         own.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
-                _control(rows[i], control, feet, theta, side, joint)
+                _control(rows[i], control[i], feet, theta, side, joint)
         if walking[i]:
             own.fresh = 0
 
 
 @kernel
-def _hold(rows, bodies, state, feet, held):
-    """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in the control of `state` (N, numbers).
+def _hold(rows, bodies, control, feet, held):
+    """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in `control` (N, side, joint, 2).
 
     They act without delay, and the work of both changes is counted as that of `stiffen` and `move`. A device, and a
     rest angle that is the foot's own, stay. `rows` (N,) of `CONTROL_ROW`, `bodies` (N,) of `BODY_ROW`, `feet` a
@@ -212,10 +220,9 @@ def _hold(rows, bodies, state, feet, held):
         if not held[i]:
             continue
         own, foot, angle = rows[i].springs, rows[i].feet, bodies[i].measured.angle
-        control = plant_of(state, i).control
         for side in range(2):
             for joint in range(2):
-                k, drive = control[side, ANKLE + joint, 0], control[side, ANKLE + joint, 1]
+                k, drive = control[i, side, ANKLE + joint, 0], control[i, side, ANKLE + joint, 1]
                 rest = foot.rest[side, joint] if foot.rests[side, joint] else drive / k
                 k = k if foot.muscles[side, joint] else 0.0
                 theta, before = angle[side, ANKLE + joint], own.acts[side, joint] * own.stiffness[side, joint]
@@ -226,7 +233,7 @@ def _hold(rows, bodies, state, feet, held):
                 if not own.fresh:
                     own.work_stiffness[side, joint] += 0.5 * (k - before) * old * old
                     own.work_equilibrium[side, joint] += 0.5 * k * (new * new - old * old)
-                _control(rows[i], control, feet, theta, side, joint)
+                _control(rows[i], control[i], feet, theta, side, joint)
         own.fresh = 0
 
 
@@ -288,6 +295,9 @@ class FootSprings:
         """
         return np.exp(action) if self._residual else self._factor**action
 
-    def hold(self, physics: Physics, held: NDArray) -> None:
-        """Take over, for the bodies `held` (N,), the K and K theta_eq that stand in the control."""
-        _hold(self._subjects.rows, physics.bodies, physics.state, self.feet, held)
+    def hold(self, bodies: NDArray, control: NDArray, held: NDArray) -> None:
+        """Take over the K and K theta_eq in `control` (N, side, joint, 2) for the bodies `held` (N,).
+
+        `bodies` is (N,) of `BODY_ROW`.
+        """
+        _hold(self._subjects.rows, bodies, control, self.feet, held)

@@ -17,7 +17,6 @@ from springfoot.arrays import NDArray
 from springfoot.gait.body.body import GRAVITY, REFERENCE_MASS
 
 from ..physics.kernel import kernel, part
-from ..physics.measurement import plant_of
 from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..physics.timing import CONTROL_WINDOW
 from .leg_constants import LegConstants, SlopeConstants
@@ -90,19 +89,19 @@ def _too_fast(m, row):
 
 
 @part
-def drive(rows, bodies, state, table, incline) -> None:
+def drive(rows, bodies, control, table, incline) -> None:
     """Begin a control window: stiffness [N m/rad] and drive torque [N m] of hips and knees go into the control.
 
     Args:
         rows: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        state: (N, numbers) MuJoCo's, whose `control` is filled.
+        control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
         table: (R, SAMPLES, 2, 7) of `leg_curves`, of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) of `slope_table`.
     """
     curves, inclined, level = np.empty((2, table.shape[-1])), np.empty(4), np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
-        subject, legs, m, control = rows[i].subject, rows[i].legs, bodies[i].measured, plant_of(state, i).control
+        subject, legs, m = rows[i].subject, rows[i].legs, bodies[i].measured
         gain, torque = legs.gains, subject.scale.torque
         for side in range(2):
             read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
@@ -115,13 +114,15 @@ def drive(rows, bodies, state, table, incline) -> None:
             ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
             aim = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
             own = stance * on_trunk + (1.0 - stance) * hip * aim
-            control[side, HIP, 0], control[side, HIP, 1] = hip, torque * curves[side, 3] + own
-            control[side, KNEE, 0], control[side, KNEE, 1] = knee, torque * curves[side, 4]
+            control[i, side, HIP, 0] = hip
+            control[i, side, HIP, 1] = torque * curves[side, 3] + own
+            control[i, side, KNEE, 0] = knee
+            control[i, side, KNEE, 1] = torque * curves[side, 4]
             if subject.slope != 0.0:  # moves the targets of hips, knees and trunk
                 read(incline, level, legs.phase[side], inclined)
                 lean = stance * gain.trunk_stiffness * inclined[3]
-                control[side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
-                control[side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
+                control[i, side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
+                control[i, side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
 
 
 @part

@@ -22,7 +22,7 @@ from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
 
 from ..physics.kernel import kernel, part
-from ..physics.measurement import Measurement, plant_of
+from ..physics.measurement import Measurement
 from ..physics.model import ANKLE, HIP, KNEE
 from ..physics.simulation import Physics
 from ..physics.timing import CONTROL_WINDOW
@@ -118,19 +118,19 @@ def _draw(body, m):
 
 
 @kernel
-def _drive(rows, bodies, state, standing):
+def _drive(rows, bodies, control, standing):
     """Stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) go into the control.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `held` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        state: (N, numbers) MuJoCo's, whose `control` is filled.
+        control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
         standing: (N,) bool.
     """
     for i in range(len(rows)):
         if not standing[i]:
             continue
-        body, m, control = rows[i].held, bodies[i].measured, plant_of(state, i).control
+        body, m = rows[i].held, bodies[i].measured
         if body.mode == STOPPED:
             _draw(body, m)
         ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - body.place
@@ -143,8 +143,8 @@ def _drive(rows, bodies, state, standing):
                     rest -= BALANCE * ahead / body.length
                 if joint == HIP:
                     rest += TRUNK_FREE * m.base[2] - trunk / k - front * body.draw
-                control[side, joint, 0] = k * body.torque
-                control[side, joint, 1] = k * body.torque * rest
+                control[i, side, joint, 0] = k * body.torque
+                control[i, side, joint, 1] = k * body.torque * rest
 
 
 class Standing:
@@ -218,9 +218,12 @@ class Standing:
         held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]
         held["place"][ids] = STOP_COM * held["length"][ids]
 
-    def drive(self, physics: Physics, standing: NDArray) -> None:
-        """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into the control."""
-        _drive(self._subjects.rows, physics.bodies, physics.state, standing)
+    def drive(self, bodies: NDArray, control: NDArray, standing: NDArray) -> None:
+        """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into `control` (N, side, joint, 2).
+
+        `bodies` is (N,) of `BODY_ROW`.
+        """
+        _drive(self._subjects.rows, bodies, control, standing)
 
 
 def steady_walk(settings: BipedSettings) -> tuple[float, float]:

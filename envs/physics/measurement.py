@@ -34,7 +34,7 @@ PLANT = np.dtype(
         ("qpos", float, DEGREES),  # of base (x, z, pitch) and joints [m, rad]
         ("qvel", float, DEGREES),  # [m/s, rad/s]
         ("qacc_warmstart", float, DEGREES),
-        ("control", float, (len(SIDES), len(JOINTS), 2)),  # as `envs.physics.simulation.Simulation.control`
+        ("control", float, (len(SIDES), len(JOINTS), 2)),  # as for `envs.physics.simulation.Simulation.advance`
     ]
 )
 """How a row of MuJoCo's state begins."""
@@ -227,7 +227,7 @@ def _average(sensors, force):
 
 @part
 def plant_of(state, i) -> Any:
-    """The beginning of row `i` of MuJoCo's state (N, numbers), of `PLANT`; what is written to it is the state."""
+    """Return the beginning of row `i` of MuJoCo's state (N, numbers), of `PLANT`."""
     return state[i, :_PLANT_NUMBERS].view(PLANT)[0]
 
 

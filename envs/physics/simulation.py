@@ -1,8 +1,8 @@
 """N bodies walking side by side on `mujoco.batch.Batch`: the only owner of MuJoCo data and the only reader of sensors.
 
-One call of `advance` is one control window of 10 ms: it holds `control`, runs the physics steps and returns a
-`Measurement`. Kinematics are computed here from joint positions at the window's end (MuJoCo's derived fields lag one
-physics step); contact forces are the mean over the window's physics steps, so that no heel strike is missed.
+One call of `advance` is one control window of 10 ms: it holds the control and runs the physics steps. The kernel
+`measure_bodies` then fills a `Measurement`: kinematics from joint positions at the window's end, as MuJoCo's derived
+fields lag one physics step, and the mean contact forces of the window's steps, so that no heel strike is missed.
 """
 
 from collections.abc import Sequence
@@ -86,8 +86,7 @@ class Simulation:
             self._batch.set_models(self.models)
         state = self._batch.state
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
-        self.control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
-        """(N, side, joint, 2) K [N m/rad] and K theta_eq plus any feed-forward torque [N m]; changed in place."""
+        self._control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
         self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
         bodies = np.zeros(num, BODY_ROW)
@@ -100,7 +99,7 @@ class Simulation:
         self.now = Measurement.of(bodies["measured"])
         """The last measurement; its arrays change in place."""
         self._record = {"sensordata": sensors.reshape(num, self._substeps, self.model.nsensordata)}
-        self._held = np.full(self.control.shape, np.nan)  # in the last window that was watched
+        self._held = np.full(self._control.shape, np.nan)  # in the last window that was watched
         self.kept = {"body": bodies, "mujoco": state, "warnings": self._batch.warning, "held": self._held}
         """All that changes, by name; arrays with N rows."""
         self.work: WindowWork
@@ -158,27 +157,35 @@ class Simulation:
         """Let a horizontal force (N,), forward positive [N], act on the CoM of the trunk until the next call."""
         self._push[:, 0] = force
 
-    def advance(self, ids: NDArray | None = None) -> None:
-        """Run one control window with `control` held; the kernel `measure_bodies` then tells what came of it.
+    def advance(self, control: NDArray, ids: NDArray | None = None, *, watched: bool = False) -> None:
+        """Run one control window with `control` held; nothing else writes the control of the joints.
 
-        Only simulations `ids` run (all if None); the others stay as they are, contact forces included.
+        Args:
+            control: (N, side, joint, 2) K [N m/rad], and K theta_eq plus any feed-forward torque [N m].
+            ids: (K,) the simulations that run, all if None. The others stay as they are, contact forces included.
+            watched: whether `work` then holds the work of the physics steps, 0 for those not in `ids`; the same bits.
         """
-        self._roll(ids, self._record)
+        self._control[:] = control
+        if watched:
+            self._roll_watched(ids)
+        else:
+            self._roll(ids, self._record)
 
-    def advance_watched(self, ids: NDArray | None = None) -> None:
-        """As `advance`, the same bits; `work` then holds what the physics steps did, 0 for those not in `ids`."""
+    def _roll_watched(self, ids: NDArray | None) -> None:
+        """Run the physics steps of a window and sum their work."""
         shape = self.num, self._substeps, self.model.nv
         steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), *(np.zeros(shape) for _ in RECORDED))
-        angle = self._qpos[:, 3:].reshape(self.control.shape[:3]).copy()
+        angle = self._qpos[:, 3:].reshape(self._control.shape[:3]).copy()
         self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))
-        state, push = (self._qpos, self._qvel), self._push[:, 0].copy()
+        state = self._qpos, self._qvel
+        push = self._push[:, 0].copy()
         timestep = self.model.opt.timestep
         held = self._held.copy()
         if ids is not None:
             still = np.setdiff1d(np.arange(self.num), ids)
             held[still], steps.before[still], push[still] = np.nan, 0.0, 0.0
-        self.work = window_work(self._parts, steps, self.control, held, angle, push, state, timestep)
-        self._held[:] = self.control
+        self.work = window_work(self._parts, steps, self._control, held, angle, push, state, timestep)
+        self._held[:] = self._control
 
     def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
         """Run the physics steps of a window and record what `out` names: for those still, sensors stay, else 0."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
+from ..control.foot_springs import muscle_stiffness
 from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
@@ -126,7 +127,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave people's range: vertical beyond 1.2
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
-    [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K scaled to 1.70 m and 63 kg; `effort`, positive power of hips, knees,
+    [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of the muscles that act (a slack joint and a device in their place cost
+    nothing), scaled to 1.70 m and 63 kg; `effort`, positive power of hips, knees,
     ankles and toes at the step's end over body weight times commanded speed: the cost of transport of that moment.
 
     Args:
@@ -155,7 +157,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
             pose_error += 0.5 * _pose_error(scale, m.base[2], m.angle[side], people)
             force_distance += _force_distance(scale, forces, i, side, people)
             for joint in range(2):
-                k = control.springs.stiffness[side, joint] / scale.stiffness_unit[joint]
+                k = muscle_stiffness(control.springs, side, joint) / scale.stiffness_unit[joint]
                 stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
         for k in range(4):
             stiffness_rate += ((control.decision.action[k] - control.decision.last_action[k]) / share) ** 2

@@ -16,8 +16,8 @@ LEGS = (len(SIDES), len(JOINTS))
 
 
 def advance(simulation: Simulation, stiffness: NDArray, drive: NDArray, ids: NDArray | None = None) -> Measurement:
-    simulation.control[..., 0], simulation.control[..., 1] = stiffness, drive
-    simulation.advance(ids)
+    control = np.stack(np.broadcast_arrays(np.zeros((simulation.num, *LEGS)), stiffness, drive)[1:], -1)
+    simulation.advance(control, ids)
     return measured(simulation)
 
 

@@ -28,15 +28,21 @@ def standing(slope_deg: float, friction: float = FRICTION) -> Simulation:
     base[0, :2] = 2.0, Body().leg_length
     simulation.lay(np.arange(1), np.array([slope]), np.zeros((1, len(SIDES))))
     simulation.reset(np.arange(1), base, np.zeros((1, 3)), angle, rate)
-    simulation.control[..., 0], simulation.control[..., 1] = 3000.0, 3000.0 * angle
     for _ in range(100):
-        simulation.advance()
+        simulation.advance(stiff_posture(slope))
     return simulation
 
 
-def window(simulation: Simulation) -> Measurement:
-    """One control window."""
-    simulation.advance()
+def stiff_posture(slope: float) -> np.ndarray:
+    """Return the control of stiff springs around straight legs with flat feet."""
+    rest = np.zeros((1, len(SIDES), 4))
+    rest[..., ANKLE] = slope
+    return np.stack([np.full_like(rest, 3000.0), 3000.0 * rest], -1)
+
+
+def window(simulation: Simulation, slope_deg: float) -> Measurement:
+    """Run one control window in that posture and measure it."""
+    simulation.advance(stiff_posture(np.radians(slope_deg)))
     measure_bodies(*simulation.arrays)
     return simulation.now
 
@@ -44,7 +50,7 @@ def window(simulation: Simulation) -> Measurement:
 @pytest.mark.parametrize("slope_deg", [-5.0, 0.0, 5.0])
 def test_a_body_at_rest_on_a_slope_is_carried_straight_up_and_heights_are_above_the_ground(slope_deg):
     simulation = standing(slope_deg)
-    m = window(simulation)
+    m = window(simulation, slope_deg)
     forward, up = m.force[0].sum(axis=(0, 1))
     assert up == pytest.approx(Body().mass * GRAVITY, rel=5e-3)
     assert abs(forward) < 0.02 * up  # at right angles to the slope it would be 0.087
@@ -66,7 +72,7 @@ def test_feet_slide_when_pushed_harder_than_mu_times_the_normal_force_and_no_soo
         simulation.push(np.array([share * grip]))
         grips = []
         for _ in range(30):
-            m = window(simulation)
+            m = window(simulation, slope_deg)
             force = m.force[0].sum(axis=(0, 1))
             assert abs(force @ along) <= friction * (force @ normal) * (1 + 1e-9)
             grips.append(-(force @ along) / max(force @ normal, 1.0) / friction)
