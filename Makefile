@@ -24,9 +24,9 @@ help:
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
-	@echo "make feet     docs/feet.md from committed people and policies; goes on after a stop; FULL=1: searches, trains"
+	@echo "make feet     what feet are worth, from committed people and policies; goes on after a stop; FULL=1: searches, trains"
 	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
-	@echo "make predict  docs/prediction.md's walk from nothing: plan, leg constants, policy; goes on after a stop"
+	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
 install: $(VENV)/installed
@@ -69,7 +69,7 @@ test-wheel: install
 	springfoot --help; springfoot study --help; \
 	springfoot evaluate pretrained 2>&1 | grep -F "pip install 'springfoot[evaluate]'"; \
 	add "[evaluate]"; \
-	springfoot evaluate pretrained --episodes 1; springfoot study criteria --quick; \
+	springfoot evaluate pretrained --episodes 1; springfoot study compare schedule --quick; \
 	springfoot export pretrained --to numpy --out pretrained.npz; \
 	springfoot train --out runs/walk 2>&1 | grep -F "pip install 'springfoot[train]'"; \
 	add "[train]"; \
@@ -112,12 +112,12 @@ FEET := $(BIN)/springfoot study
 feet: install
 	@set -ex; \
 	if [ -n "$(FULL)" ]; then $(FEET) adapt-all; cp runs/feet/adapted.json envs/control/adapted.json; fi; \
-	$(FEET) prosthesis $(if $(FULL),--train) --keep runs/feet/prosthesis.json --page docs/feet.md; \
-	$(FEET) orthosis --keep runs/feet/orthosis.json --page docs/feet.md
+	$(FEET) prosthesis $(if $(FULL),--train) --keep runs/feet/prosthesis.json; \
+	$(FEET) orthosis --keep runs/feet/orthosis.json
 
 # Each stage is kept in runs/predict: after a stop the same command goes on.
 predict: install
-	$(BIN)/springfoot study predict --page docs/prediction.md
+	$(BIN)/springfoot study predict
 
 bench: install
 	$(BIN)/python -m benchmarks.bench

@@ -30,7 +30,7 @@ from springfoot.agents.training.returns import evaluate_returns
 from springfoot.command_line import exit_code
 from springfoot.envs import Biped, BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.files.markdown import table, write_section
+from springfoot.files.markdown import table
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples" / "learners"
@@ -84,8 +84,6 @@ class Flags:
     """Where `make test-learners` makes the virtual environments, and where policies and results are kept."""
     only: tuple[str, ...] = ()
     """Examples to run, by file name without .py; all unless given."""
-    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """A page whose section LEARNERS gets the table."""
 
 
 def main() -> int:
@@ -96,8 +94,6 @@ def main() -> int:
     text = table(HEAD, [row_of(learner, result) for learner, result in zip(learners, results, strict=True)])
     (flags.folder / "table.md").write_text(f"{text}\n", encoding="utf-8")
     print(f"{text}\n\n{sum(result['seconds'] for result in results) / 60:.0f} minutes in all")
-    if flags.page is not None:
-        write_section(flags.page, "LEARNERS", f"{text}\n\nMade by `python -m benchmarks.learners --page {flags.page}`.")
     failed = [learner.name for learner, result in zip(learners, results, strict=True) if not result["passed"]]
     if failed:
         print(f"failed: {', '.join(failed)}", file=sys.stderr)

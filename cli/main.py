@@ -25,17 +25,12 @@ HELP = """usage: springfoot {train,evaluate,live,export,study} ...
 Each takes --help; springfoot --version says which this is."""
 
 STUDIES = {
-    "compare": ("walks.comparison.Compare", "Does a policy walk better than every baseline?"),
-    "best-constant": ("constant_search.BestConstant", "Which constant stiffness earns most?"),
-    "best-factor": ("constant_search.BestFactor", "Which factor on the tuned schedule earns most?"),
-    "seeds": ("walks.seeds.Seeds", "How far apart are several policies, as one training from several seeds?"),
+    "compare": (
+        "walks.comparison.Compare",
+        "How do policies walk beside each other, beside springs that learn nothing, and elsewhere?",
+    ),
     "bodies": ("walks.bodies.Bodies", "Does a policy walk with any body at any speed?"),
-    "criteria": ("criteria_met.CriteriaMet", "Which criteria of a human-like walk does a policy meet?"),
-    "front": ("front.Front", "Which criteria has no policy together, and by how much are they missed?"),
-    "mix": ("policy_mixing.Mix", "Which weighted mean of related policies meets most criteria? (searches)"),
-    "conditions": ("walks.conditions.Conditions", "How does a policy walk elsewhere, and how do other springs?"),
     "ablations": ("walks.ablations.Ablations", "What does each part of the training contribute? (trains)"),
-    "stiffness-cost": ("stiffness_cost.StiffnessCost", "What does a cost on stiffness take and give? (trains)"),
     "agreement": ("springs.agreement.SeedAgreement", "Do the springs of several policies agree over the stride?"),
     "any-stiffness": ("springs.any_stiffness.AnyStiffness", "Does a gait walk with any other stiffness?"),
     "identify": (
@@ -147,7 +142,7 @@ def study_help() -> str:
     lines = (f"  {name:<{width}}  {question}" for name, (_, question) in STUDIES.items())
     return "\n".join(
         [
-            "usage: springfoot study NAME [--quick] [--out FOLDER] [--page FILE] ...",
+            "usage: springfoot study NAME [--quick] [--out FOLDER] ...",
             "",
             *lines,
             "",

@@ -123,7 +123,7 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     print(f"\n{multi_seed.training_table(record)}\n")
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
     print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
-    print(f"Next:    springfoot study seeds {_word(out)}/seed-*")
+    print(f"Next:    springfoot study compare {_word(out)}/seed-* --no-springs")
     folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
     if begun := [folder for folder in folders if (folder / RUN).is_file()]:
         print(f"Or:      {_likewise('springfoot train --resume', begun)}")

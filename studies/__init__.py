@@ -7,7 +7,6 @@ from springfoot.extras import naming_extras
 
 if TYPE_CHECKING:
     from .base.study import Answer, Study, WalkingStudy
-    from .constant_search import best_constant
     from .springs.agreement import agreements
     from .springs.any_stiffness import any_stiffness, mean_springs, rebuilt
     from .springs.push_experiment import identified
@@ -20,7 +19,6 @@ __all__ = [
     "WalkingStudy",
     "agreements",
     "any_stiffness",
-    "best_constant",
     "contenders",
     "draw_pairs",
     "identified",
@@ -35,7 +33,6 @@ _MODULE = {
     "WalkingStudy": "base.study",
     "agreements": "springs.agreement",
     "any_stiffness": "springs.any_stiffness",
-    "best_constant": "constant_search",
     "contenders": "walks.comparison",
     "draw_pairs": "walks.bodies",
     "identified": "springs.push_experiment",

@@ -30,8 +30,7 @@ PolicyFunction = Callable[[NDArray], NDArray]
 """Observations (N, D) -> actions (N, 4) in [-1, 1]."""
 
 CONSTANT_STIFFNESS = (300.0, 40.0)
-"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg: round numbers that walk, not the best ones, which
-`springfoot study best-constant` finds."""
+"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg: round numbers that walk, not the best ones."""
 
 _SIN, _COS, _SPEED = (
     [entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos", "command_speed")

@@ -217,19 +217,3 @@ WORKS_LIKE_PEOPLE = (
 )
 """Human-like in energy: work of each leg's joints in a stride; people's from their mean power at 1.2 m/s."""
 HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE, *WORKS_LIKE_PEOPLE)
-
-FOLLOWS_THE_PLAN = (
-    Criterion(name="CoM x off by", path=("com", "x_rmse_m"), high=0.02, unit=" m", pattern=".4f"),
-    Criterion(name="CoM z off by", path=("com", "z_rmse_m"), high=0.006, unit=" m", pattern=".4f"),
-    _r("CoM z r", ("com", "z_r"), 0.9),
-    _r("forward speed r", ("com", "vx_r"), 0.9),
-    Criterion(name="CoM rise", path=("com", "rise_m"), low=0.025, high=0.045, unit=" m", pattern=".3f"),
-    Criterion(
-        name="CoP off in single support", path=("zmp", "cop_rmse_single_support_m"), high=0.02, unit=" m", pattern=".4f"
-    ),
-    Criterion(name="CoP off", path=("zmp", "cop_rmse_m"), high=0.04, unit=" m", pattern=".4f"),
-    _r("CoP r", ("zmp", "r"), 0.95),
-    Criterion(name="contact travel", path=("contact_travel_m",), high=0.01, unit=" m", pattern=".4f"),
-    Criterion(name="toe clearance", path=("toe_clearance_m",), low=0.01, unit=" m", pattern=".3f"),
-)
-"""Its CoM against the ZMP plan, and feet that neither slide nor stub."""

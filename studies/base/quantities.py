@@ -55,7 +55,7 @@ OF_A_WALK = (
         for phase in ("loading", "mid_stance", "push_off", "swing")
     ),
 )
-"""What `seeds` shows, and the CSV files of the studies that walk whole policies hold."""
+"""The numbers of a walk that `compare` tabulates over several policies, and that CSV files of walks hold."""
 
 
 def walks_csv(rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:

@@ -17,24 +17,23 @@ from tqdm import tqdm
 from springfoot.envs.physics.simulation import MOST_THREADS
 from springfoot.envs.settings.checks import LONGEST_EPISODE
 from springfoot.errors import MOST_COUNT, SpringfootError, require_count, require_number
-from springfoot.files.markdown import write_section
 from springfoot.files.writing import whole_folder
 
 OnProgress = Callable[[float], object]
 """Called with how much more is done: simulated seconds, or what `Study.UNIT` names."""
+REPORT = "report.md"
+"""The file of a study's folder that holds its text."""
 QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What a study found."""
+    """The answer of a study."""
 
     text: str
-    """Markdown that the command prints."""
+    """Markdown that the command prints and keeps as `REPORT`; pictures in it are named files."""
     files: Mapping[str, str | Callable[[Path], object]] = field(default_factory=dict)
     """Name of a file in the study's folder -> its text, or a function that writes it at a path."""
-    sections: Mapping[str, str] = field(default_factory=dict)
-    """Name of a section of a page -> its markdown."""
     failed: bool = False
     """Whether a part of the study failed; the exit code is then 1."""
 
@@ -47,15 +46,11 @@ class Study:
     """See that it runs, in a minute at most: tiny counts in place of what is flagged; its figures then mean nothing."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/STUDY-N)")] = None
     """New folder for its CSV files and pictures."""
-    page: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
-    """Also write its tables into this page, between the markers of its sections, and its pictures beside it."""
     command: tyro.conf.Suppress[tyro.conf.Fixed[str]] = ""
-    """The command line that runs it; pages and files name it beside what it found."""
+    """The command line that runs it; its report names it."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {}
     """Name of a flag -> its value with `--quick`."""
-    PAGED: ClassVar[bool] = True
-    """Whether it has a section for a page."""
     UNIT: ClassVar[str] = "s"
     """What its progress counts."""
 
@@ -71,49 +66,36 @@ class Study:
         """Do the study and return its answer; call `progress` on the way."""
         raise NotImplementedError
 
-    def write_page(self, page: Path, answer: Answer) -> None:
-        """Write the answer's sections, each with the command that made it."""
-        for name, text in answer.sections.items():
-            write_section(page, name, f"{text}\n\nMade by `{without_places(self.command)}`.")
-
     def run(self, name: str) -> int:
-        """Do the study, print its answer, write its files and its page; `name` is that of its command.
+        """Do the study, print its answer and write its files; `name` is that of its command.
 
         Returns the exit code: 0, or 1 where a part of the study failed. Raises `SpringfootError`, with nothing written,
-        for a bad flag, an `out` that exists, and a page in a folder that does not.
+        for a bad flag and for an `out` that exists.
         """
         study = replace(self, **self.QUICK) if self.quick else self
         study.check()
         if study.out is not None and study.out.exists():
             raise SpringfootError(f"{study.out} exists already: out must be a new folder")
-        if study.page is not None and not study.PAGED:
-            raise SpringfootError(f"page: {name} has no section to write")
-        if study.page is not None and not study.page.parent.is_dir():
-            raise SpringfootError(f"there is no folder {study.page.parent} for the page {study.page.name}")
         with whole_folder(study.out, Path("runs", name)) as (folder, out):
             with tqdm(
                 total=study.total, desc=name, unit=study.UNIT, unit_scale=True, leave=False, disable=None, delay=0.5
             ) as bar:
                 answer = study.ask(bar.update)
             if study.quick and study.QUICK:
-                sections = {section: f"{QUICK_NOTE}\n\n{text}" for section, text in answer.sections.items()}
-                answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}", sections=sections)
+                answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}")
             print(answer.text)
-            for file, content in answer.files.items():
+            made = f"\n\nMade by `{without_places(self.command)}`." if self.command else ""
+            files = {REPORT: f"{answer.text}{made}\n", **answer.files}
+            for file, content in files.items():
                 _write(folder / file, content)
-        if study.page is not None:
-            study.write_page(study.page, answer)
-            for file, content in answer.files.items():
-                if file.endswith((".html", ".png")):
-                    _write(study.page.parent / file, content)
-        print(f"\nResults: {out} ({', '.join(answer.files)})")
+        print(f"\nResults: {out} ({', '.join(files)})")
         return 1 if answer.failed else 0
 
 
 def without_places(command: str) -> str:
-    """A command without the folder, the page and the files it writes to, which are somebody's own."""
+    """Return a command without the folder and the files that it writes to."""
     words = shlex.split(command)
-    for flag in ("--out", "--page", "--keep", "--feet"):
+    for flag in ("--out", "--keep", "--feet"):
         if flag in words:
             place = words.index(flag)
             del words[place : place + 2]

@@ -99,7 +99,6 @@ class Adapt(Study):
     QUICK: ClassVar[Mapping[str, Any]] = {
         **{"generations": 2, "population": 4, "searches": (1,), "episodes": 1, "seconds": 6.0}
     }
-    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:

@@ -35,7 +35,6 @@ class AdaptAll(Study):
     """Only so many of them, from the first; all unless given."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {"first": 1}
-    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:

@@ -1,6 +1,6 @@
 """Which spring beside the right ankle helps a weak calf, and which a drop foot?
 
-    springfoot study orthosis --page docs/feet.md
+    springfoot study orthosis
 
 Nobody adapts here: legs and both feet's stiffness are those of sound feet (`pretrained`), so that all that changes is
 the muscle and the spring. The stiffness of an orthosis is in N m/deg, as Waterval et al. (2019) measured them. A weak
@@ -110,7 +110,7 @@ class Orthosis(WalkingStudy):
             "ADAPTED": people_text(elsewhere._adapted(kept, progress), elsewhere.what_ran, self.push_newton),
         }
         text = {name: told for name, told in text.items() if told}
-        return Answer(text="\n\n".join(text.values()), files=files, sections=text)
+        return Answer(text="\n\n".join(text.values()), files=files)
 
     def _weak(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
         rows: list[dict[str, Any]] = []

@@ -1,7 +1,7 @@
 """What is a foot worth to the person who wears it on the right: rigid, a passive spring, adaptive, intact?
 
-    springfoot study prosthesis --page docs/feet.md
-    springfoot study prosthesis --train --page docs/feet.md
+    springfoot study prosthesis
+    springfoot study prosthesis --train
 
 The feet and the people who have adapted to them are the committed ones of `springfoot study adapt`, two independent
 searches of each kind at the same budget: of the passive foot stiffness and rest angles too, of the adaptive one its
@@ -113,7 +113,7 @@ class Prosthesis(TrainingStudy):
             "prosthesis.png": partial(draw, rows=rows),
         }
         files = {name: content for name, content in files.items() if content}
-        return Answer(text="\n\n".join(text.values()), files=files, sections=text, failed=failed)
+        return Answer(text="\n\n".join(text.values()), files=files, failed=failed)
 
     def _how(self, row: Mapping[str, Any]) -> dict[str, Any]:
         """How the episodes of a row are recorded."""

@@ -1,6 +1,6 @@
 """What independent searches for leg constants found, how each result walks, and what their prices trade.
 
-springfoot study leg-sets --page docs/results.md
+springfoot study leg-sets
 """
 
 from collections.abc import Iterator, Mapping
@@ -103,7 +103,7 @@ class LegSets(WalkingStudy):
         columns = ["set", "falls", "falls_pushed", "misses", "untuned_falls_percent", *(each.column for each in WALKED)]
         files = {"leg_sets.csv": csv_text(columns, numbers), "leg_sets.png": partial(_draw, front=front)}
         picture = "![Misses of a set against falls of springs that nobody tuned](leg_sets.png)"
-        return Answer(text=text, files=files, sections={"LEG-SETS": f"{picture}\n\n{text}"})
+        return Answer(text=f"{picture}\n\n{text}", files=files)
 
     def _walk(self, name: str, given: Mapping[str, Any], legs: LegConstants, progress: OnProgress) -> dict[str, Any]:
         policy, settings = prepare(name, {"episode_seconds": self.seconds, **given})

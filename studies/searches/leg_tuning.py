@@ -100,7 +100,6 @@ class LegTuning(Study):
     """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2, "refinements": 0}
-    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " steps"
 
     def check(self) -> None:

@@ -156,7 +156,6 @@ class PlanTuning(Study):
     """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4}
-    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:

@@ -39,8 +39,6 @@ from .prediction_table import people_numbers, plan_numbers, prediction_table, wa
 
 FOUND = "found.json"
 """In the folder, the plan's style and the leg constants: a `plan_file` of the settings."""
-SECTION = "PREDICTION"
-"""Of a page."""
 STAGE_PUSH = 100.0
 """Size of the pushes of the third and fourth stage, of the training and of the second half of the evaluation [N];
 chosen."""
@@ -181,7 +179,7 @@ class Predict(WalkingStudy):
         stage("policy", lambda: self._train(settings, policy))
         text = stage("evaluation", lambda: self._evaluated(found, digest, policy, settings))
         spent = table(["stage", *took], [["seconds, this time", *(f"{each:.0f}" for each in took.values())]])
-        return Answer(text=f"{text}\n\n{spent}", files={"prediction.md": f"{text}\n"}, sections={SECTION: text})
+        return Answer(text=f"{text}\n\n{spent}")
 
     def _train(self, settings: BipedSettings, out: Path) -> None:
         """Train what is left of the training in `out`."""

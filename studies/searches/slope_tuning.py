@@ -126,7 +126,6 @@ class SlopeTuning(Study):
     """File of constants to begin with and to write."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4, "walks": 1, "seconds": 3.0}
-    PAGED: ClassVar[bool] = False
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:

@@ -1,6 +1,6 @@
 """Do seeds agree? The springs of several policies over the stride, and which criteria of a human-like walk each misses.
 
-    springfoot study agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --page docs/results.md
+    springfoot study agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2
 
 Stiffness alone is not identified (`springfoot.studies.springs.any_stiffness`), so K stands beside the equilibrium and
 the torque. K of a joint is judged where that joint carries load, by its coefficient of variation (SD / mean) over the
@@ -35,8 +35,6 @@ from springfoot.gait.people.cycle import PERCENT
 from ..base.quantities import OPEN_LOOP, falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
-SECTION = "AGREEMENT"
-"""Of the results page."""
 LOADED = 0.1
 """A joint carries load where its moment is beyond this share of its largest."""
 MOST = 0.15
@@ -241,7 +239,7 @@ class SeedAgreement(WalkingStudy):
         walks = walks_csv([({"policy": gait.metrics["policy"]}, gait.metrics) for each in walked for gait in each])
         draw = partial(save_figure, found=found)
         files = {"agreement.csv": curves_csv(found), "policies.csv": walks, "agreement.png": draw}
-        return Answer(text=text, files=files, sections={SECTION: text})
+        return Answer(text=text, files=files)
 
     def _walk(self, name: str, progress: OnProgress) -> Gait:
         policy, settings = prepare(name, {"episode_seconds": self.seconds}, self.seed, self.threads)

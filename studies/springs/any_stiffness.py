@@ -1,7 +1,7 @@
 """Is the stiffness of a gait identified? The same gait walked with any other stiffness, its equilibrium rebuilt.
 
     springfoot study any-stiffness schedule
-    springfoot study any-stiffness pretrained --episodes 100 --page docs/results.md
+    springfoot study any-stiffness pretrained --episodes 100
 
 A recorded gait has a mean angle, velocity and torque of ankle and toe at each phase of the leg controller. For any
 K(phase) > 0, theta_eq = theta + beta dtheta/dt + tau/K gives back that torque. Each such pair of K and theta_eq is a
@@ -38,8 +38,6 @@ from springfoot.gait.springs.stiffness import SPRINGS, Segment, StiffnessSchedul
 from ..base.quantities import falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
-SECTION = "ANY-K"
-"""Of the results page."""
 PHASE_SEGMENTS = 200
 """Of a rebuilt schedule: half a percent of a stride each, less than the control window in which theta_eq is held."""
 STARTS = np.arange(PHASE_SEGMENTS) / PHASE_SEGMENTS
@@ -266,4 +264,4 @@ class AnyStiffness(WalkingStudy):
         files = {
             f"{name.replace(':', '-')}.json": json.dumps(each.to_json()) + "\n" for name, each in schedules.items()
         }
-        return Answer(text=text, files={"stiffness.csv": _numbers(rows)} | files, sections={SECTION: text})
+        return Answer(text=text, files={"stiffness.csv": _numbers(rows)} | files)

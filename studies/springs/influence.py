@@ -46,7 +46,7 @@ from .stiffness_responses import (
 )
 from .stiffness_steps import CELLS, DURATIONS, PHASES, SPRINGS, paired_walks
 
-SECTION, FIGURE = "INFLUENCE", "influence.png"
+FIGURE = "influence.png"
 BODIES = {"1.55 m, 50 kg": (1.55, 50.0), "1.90 m, 95 kg": (1.90, 95.0)}
 """Height [m] and mass [kg] of other bodies; their speed is Froude-equal to the policy's own."""
 INFLUENCE_CONDITIONS = (
@@ -132,7 +132,8 @@ class Influence(Study):
             policy, settings, change = self._under(condition)
             how = {"strides": self.strides, "threads": self.threads, "progress": progress}
             responses[condition] = response(paired_walks(policy, settings, change, seeds, **how), change)
-        text = f"{headline(self, responses)}\n\n{tables(self, responses)}"
+        picture = f"![Stiffness, torque, CoM acceleration and movement]({FIGURE})"
+        text = f"{picture}\n\n{headline(self, responses)}\n\n{tables(self, responses)}"
         return Answer(
             text=text,
             files={
@@ -140,7 +141,6 @@ class Influence(Study):
                 "influence_links.csv": csv_text(LINKS_HEAD, link_rows(responses)),
                 FIGURE: partial(save_influence_figure, responses=responses),
             },
-            sections={SECTION: f"![Stiffness, torque, CoM acceleration and movement]({FIGURE})\n\n{text}"},
         )
 
 

@@ -1,8 +1,8 @@
 """Do pushes find a policy's springs, and are they springs at all? Ankle and toe, beside the K that was applied.
 
     springfoot study identify
-    springfoot study identify schedule frozen:pretrained pretrained --page docs/results.md
-    springfoot study identify schedule frozen:pretrained --repeats 200 --page docs/results.md
+    springfoot study identify schedule frozen:pretrained pretrained
+    springfoot study identify schedule frozen:pretrained --repeats 200
 
 `frozen:POLICY` is a policy's mean K over the phase, played open loop (`springfoot.evaluation.recording.open_loop`).
 """
@@ -28,8 +28,6 @@ from springfoot.gait.springs.stiffness import SPRINGS
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .push_experiment import Row, identified, prepare_pushed, samples
 
-SECTION, COVERAGE_SECTION = "IDENTIFICATION", "IDENTIFICATION-COVERAGE"
-"""Of the results page."""
 UNDISTURBED_EPISODES = 8
 """Episodes without pushes, whose springs stand beside."""
 REPEAT_EPISODES, REPEAT_SECONDS = 28, 6.0
@@ -213,12 +211,11 @@ class Identify(WalkingStudy):
         """Push every policy."""
         experiments = [self._push(name, progress) for name in self.policies]
         if self.repeats:
-            sections = {COVERAGE_SECTION: f"{coverage_table(experiments)}\n\n{self._repeats_ran} {self._pushes}"}
+            text = f"{coverage_table(experiments)}\n\n{self._repeats_ran} {self._pushes}"
         else:
             parts = [f"{sentence(each)}\n\n{springs_table(each)}" for each in experiments]
-            sections = {SECTION: "\n\n".join([*parts, f"{self._ran} {self._pushes}"])}
-        text = "\n\n".join(sections.values())
-        return Answer(text=text, files={"springs.csv": springs_csv(experiments)}, sections=sections)
+            text = "\n\n".join([*parts, f"{self._ran} {self._pushes}"])
+        return Answer(text=text, files={"springs.csv": springs_csv(experiments)})
 
     @property
     def _ran(self) -> str:

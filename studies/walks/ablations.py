@@ -1,6 +1,6 @@
 """Ablations: what each part of preset `walk` contributes, trained without it, and each input of the fixed walk.
 
-    springfoot study ablations --seeds 3 --constant 363 79.5 --page docs/results.md
+    springfoot study ablations --seeds 3 --constant 363 79.5
 
 Every row differs from the preset in its flags and in nothing else. A seed that is finished is not trained again, nor
 measured again, so the command may be stopped, begun anew with more rows or seeds, and run with `--no-train` to write
@@ -234,7 +234,7 @@ class Ablations(TrainingStudy):
     only: tuple[str, ...] = ()
     """Rows to train, all of them unless given."""
     constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
-    """Best fixed spring [N m/rad], as `springfoot study best-constant` finds it."""
+    """A fixed spring [N m/rad] to hold the trained policies against."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
 
@@ -269,6 +269,5 @@ class Ablations(TrainingStudy):
         heads = {"SPRINGS": "spring", "ABLATIONS": "training", "INPUTS": "fixed schedule"}
         ran = f"{how.sentence} Mean ± SD over training seeds."
         texts = {name: rows_table(each, heads[name], people=name == "SPRINGS") for name, each in tables.items()}
-        sections = {name: text if name == "INPUTS" else f"{text}\n\n{ran}" for name, text in texts.items()}
         text = "\n\n".join([*texts.values(), ran])
-        return Answer(text=text, files={"ablations.csv": _numbers(tables)}, sections=sections, failed=failed)
+        return Answer(text=text, files={"ablations.csv": _numbers(tables)}, failed=failed)

@@ -190,7 +190,7 @@ class Bodies(Study):
         )
         numbers = [csv_text(list(rows[0]), (list(row.values()) for row in rows)) for rows in walks]
         files = dict(zip([PAIRS, PAIRS_OPEN_LOOP], numbers, strict=False))
-        return Answer(text=text, files={**files}, sections={"BODIES": text})
+        return Answer(text=text, files={**files})
 
 
 def _ranges(settings: BipedSettings) -> str:

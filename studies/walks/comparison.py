@@ -1,9 +1,11 @@
-"""A policy held against springs that need no learning, on the same seeds, hence starts and pushes.
+"""Policies held against each other, against springs that need no learning, and against themselves elsewhere.
 
-    springfoot study compare --constant 363 79.5 --factor 1.07 --page docs/results.md
+    springfoot study compare pretrained --constant 363 79.5 --factor 1.07
+    springfoot study compare runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --no-springs --pushes 0
+    springfoot study compare pretrained --no-springs --pushes 0 --world
 
-Every row walks in the policy's environment, earns its reward and is measured as by `evaluate.py`. Returns are compared
-episode by episode (paired bootstrap), falls by McNemar's test.
+Each policy walks in its own environment, springs in the first policy's; all rows have the same seeds and are measured
+as by `evaluate.py`. Returns are compared episode by episode (paired bootstrap), falls by McNemar's test.
 """
 
 from collections.abc import Sequence
@@ -15,22 +17,41 @@ import tyro
 from springfoot.agents.policies.baselines import PolicyFunction, and_copy, own_settings
 from springfoot.arrays import NDArray
 from springfoot.envs.settings.settings import BipedSettings, settings_to_json
+from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
-from springfoot.files.markdown import table, text_of
+from springfoot.files.markdown import plus_minus, table, text_of
+from springfoot.gait.people.scores import mean_sd
 
-from ..base.flags import SettingsFlags, given, optional_flags
+from ..base.flags import SettingsFlags, given
 from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval
-from ..base.quantities import rmse_text, walks_csv
+from ..base.quantities import OF_A_WALK, OPEN_LOOP, falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
-PUSHED = BipedSettings(push_newton=150.0)
-"""Pushes [N] of `best-constant` unless flagged otherwise."""
 PUSHES = (150.0, 200.0)
 """Pushes [N] of `compare`."""
+WORLD: tuple[dict[str, Any], ...] = (
+    {},
+    {"push_newton": 150.0},
+    {"slope_deg": 5.0},
+    {"slope_deg": -5.0},
+    {"unevenness_m": 0.01},
+    {"friction": 0.5},
+    {"stiffness_delay_s": 0.02},
+    {"start": "standing", "stop_at": 12.0},
+    {"leg_ratio": 0.94},
+    {"leg_ratio": 1.06},
+    {"foot_ratio": 0.93},
+    {"foot_ratio": 1.07},
+    {"carried_ratio": 0.159},
+    {"carried_ratio": 0.317},
+)
+"""Conditions of `--world`. Proportions are ± 2 SD of adults; loads are 10 and 20 kg for 63 kg."""
 QUASI_SPEED = 1.35
 """Commanded speed [m/s] at which people's quasi-stiffness, which is not tuned, walks about 1.2 m/s."""
+COMPARABLE = ("speed", "reward_weights")
+"""Settings in which rows must be alike for their returns to be compared."""
 SIGNIFICANT = 0.05
 """Below this p, McNemar's, one row falls less often than another."""
 INTERVALS = (
@@ -38,10 +59,6 @@ INTERVALS = (
     "paired; falls: Wilson's, and p of McNemar's exact test against the first row."
 )
 """How they are made."""
-SECTION = "COMPARE"
-"""Of the results page."""
-
-PushedFlags = optional_flags("PushedFlags", BipedSettings, PUSHED)
 
 
 class Contender(NamedTuple):
@@ -71,8 +88,11 @@ class Row:
         return mean_interval(self.returns)
 
     def difference(self, first: "Row") -> tuple[float, float, float] | None:
-        """Mean return of `first` less this row's, and its interval; None where another speed was commanded."""
-        if self.metrics["environment"]["speed"] != first.metrics["environment"]["speed"]:
+        """Return the mean return of `first` less this row's, and its interval.
+
+        None where another speed was commanded, or another reward was earned.
+        """
+        if any(self.metrics["environment"].get(name) != first.metrics["environment"].get(name) for name in COMPARABLE):
             return None
         differences = first.returns - self.returns
         return float(differences.mean()), *mean_interval(differences)
@@ -93,16 +113,33 @@ def contenders(
     seed: int = 0,
     threads: int = 2,
 ) -> list[Contender]:
-    """The policy `name`, and what it has to beat, in its own environment and reward.
+    """Return the policy `name`, its open-loop copy, and the springs that it has to beat, in its own environment.
 
-    Its own mean K played open loop; what its training starts from; the tuned schedule, and its best `factor`; the best
-    `constant` (ankle, toe) [N m/rad] and the default one; people's quasi-stiffness as it is, and commanded
-    `QUASI_SPEED`; the thesis's lines, completed and as printed; random actions. `given` are environment settings that
-    differ from the evaluation's standard conditions and the policy's own. Each row pays for changing its own action.
+    `given` are environment settings that differ from the evaluation's standard conditions and the policy's own.
     """
-    policy, settings = prepare(name, given, seed)
-    found = [Contender(name, policy, settings)]
-    found += [Contender(copy, *prepare(copy, given, seed, threads)) for copy in and_copy(name)[1:]]
+    return with_copy(name, given, seed, threads) + springs_beside(name, given, constant, factor, seed)
+
+
+def with_copy(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> list[Contender]:
+    """Return the policy `name` and, where it has one, its mean K played open loop."""
+    return [Contender(each, *prepare(each, given, seed, threads)) for each in and_copy(name)]
+
+
+def springs_beside(
+    name: str,
+    given: dict[str, Any],
+    constant: tuple[float, float] | None = None,
+    factor: float | None = None,
+    seed: int = 0,
+) -> list[Contender]:
+    """Return the springs that need no learning, in the environment and reward of the policy `name`.
+
+    They are the start of its training; the tuned schedule, and a `factor` on it; a `constant` (ankle, toe) [N m/rad]
+    and the default one; people's quasi-stiffness as it is, and commanded `QUASI_SPEED`; the thesis's lines, completed
+    and as printed; random actions. Each row pays for changing its own action.
+    """
+    _, settings = prepare(name, given, seed)
+    found = []
     for each in rivals(constant, factor):
         own = settings_to_json(settings) | own_settings(each, settings)
         found.append(Contender(each, *prepare(each, own, seed)))
@@ -141,9 +178,13 @@ def comparison_table(rows: Sequence[Row]) -> str:
 def verdict(rows: Sequence[Row]) -> str:
     """Which rows the first one is ahead of, in return and in falls, and which not."""
     first, *others = rows
-    told = {row.name: row.difference(first) for row in others}
-    behind = [name for name, difference in told.items() if difference is not None and difference[1] <= 0.0]
-    known = sum(difference is not None for difference in told.values())
+    differences = [row.difference(first) for row in others]
+    behind = [
+        row.name
+        for row, difference in zip(others, differences, strict=True)
+        if difference is not None and difference[1] <= 0.0
+    ]
+    known = sum(difference is not None for difference in differences)
     fewer = [
         row.name for row in others if paired_p(first.fell, row.fell) < SIGNIFICANT and first.fell.sum() < row.fell.sum()
     ]
@@ -155,42 +196,122 @@ def verdict(rows: Sequence[Row]) -> str:
     )
 
 
+def spread_table(rows: Sequence[Row]) -> str:
+    """Return markdown: numbers down, policies across, and their mean ± SD over the policies (n - 1)."""
+    lines = []
+    for each in OF_A_WALK:
+        values = [each.of(row.metrics) for row in rows]
+        spread = mean_sd([] if None in values else values)
+        mean = plus_minus(spread, ".1f" if each.pattern == "d" else each.pattern, alone=False)
+        lines.append([each.label, *(text_of(value, each.pattern) for value in values), mean])
+    return table(["", *(f"`{row.name}`" for row in rows), "mean ± SD"], lines)
+
+
+def elsewhere_table(name: str, rows: Sequence[tuple[str, Sequence[Row]]]) -> str:
+    """Return markdown: a line for each of the conditions, with the policy `name` and, if it has one, its copy."""
+    lines = []
+    for words, (own, *copies) in rows:
+        m = own.metrics
+        peaks = " / ".join(text_of(m["grf"][f"vertical_peak{peak}_bw"], ".2f") for peak in (1, 2))
+        largest = text_of(m["grf"]["vertical_max_bw"], ".2f")
+        walked = [cell for copy in copies for cell in _walked(copy.metrics)]
+        lines.append([words or "(none)", *_walked(m), peaks, largest, *walked])
+    columns = ["falls", "speed m/s", "RMSE thigh / knee / ankle °"]
+    beside = [f"{OPEN_LOOP}: {column}" for column in columns] * (len(rows[0][1]) - 1)
+    return table([f"`{name}` with", *columns, "peaks 1 / 2 BW", "largest 10 ms BW", *beside], lines)
+
+
+def _walked(m: dict[str, Any]) -> list[str]:
+    rest = "" if m["came_to_rest"] is None else f", {m['came_to_rest']} at rest"
+    return [falls_text(m) + rest, text_of(m["speed_m_s"]["mean"], ".3f"), rmse_text(m)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Compare(WalkingStudy):
-    """Hold a policy against springs that need no learning, under pushes: falls, returns, speed, joint angles."""
+    """Hold policies against each other, against springs that need no learning, and against themselves elsewhere.
 
-    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
-    """Any policy of evaluate.py; all rows walk in its environment and earn its reward."""
+    Each policy walks in its own environment, springs in the first policy's, all on the same seeds. A trained policy
+    has its open-loop copy beside it. Several policies, such as one training from several seeds, get their mean and
+    spread.
+    """
+
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("pretrained",)
+    """Any policies of evaluate.py: run folders, files, names."""
+    springs: bool = True
+    """Also walk springs that need no learning."""
     constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
-    """The best constant stiffness [N m/rad], as best-constant finds it."""
+    """A constant stiffness [N m/rad] among them, beside the default one."""
     factor: Annotated[float | None, tyro.conf.arg(metavar="FLOAT")] = None
-    """The best factor on the schedule, as best-factor finds it."""
+    """A factor on the schedule among them."""
     pushes: tuple[float, ...] = PUSHES
     """Sizes of the pushes [N], a table each."""
+    world: bool = False
+    """Also walk every policy on slopes, uneven and slippery ground, with delays, loads and other proportions."""
     episodes: int = 100
     """Episodes of each row."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
     """What to walk in; a trained policy brings its own settings, standard conditions aside."""
 
-    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,)}
+    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,), "world": False}
+
+    def check(self) -> None:
+        """Refuse an empty list of policies as well."""
+        super().check()
+        if not self.policies:
+            raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
+        require_count("pushes", len(self.pushes))
 
     @property
     def total(self) -> float:
         """Simulated time [s], without falls."""
-        rows = len(and_copy(self.policy)) + len(rivals(self.constant, self.factor)) + 1  # one commanded faster
-        return len(self.pushes) * rows * self.episodes * self.seconds
+        names = sum(len(and_copy(name)) for name in self.policies)
+        springs = self.springs * (len({*rivals(self.constant, self.factor)} - {*self.policies}) + 1)  # one faster
+        rows = len(self.pushes) * (names + springs) + self.world * len(WORLD) * names
+        return rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every row under every push."""
-        parts, lines = [], []
+        """Walk every row under every push, then elsewhere."""
+        parts = []
+        lines = []
         for push in self.pushes:
-            conditions = {"episode_seconds": self.seconds} | given(self.environment) | {"push_newton": push}
-            found = contenders(self.policy, conditions, self.constant, self.factor, self.seed, self.threads)
+            conditions = self._conditions | {"push_newton": push}
+            found = [row for name in self.policies for row in with_copy(name, conditions, self.seed, self.threads)]
+            if self.springs:
+                springs = springs_beside(self.policies[0], conditions, self.constant, self.factor, self.seed)
+                found += [each for each in springs if each.name not in self.policies]
             rows = [run_row(*each, **self.how, progress=progress) for each in found]
             parts += [f"**{what_ran(self, rows[0])}**", comparison_table(rows), verdict(rows)]
+            if len(self.policies) > 1:
+                parts.append(spread_table([row for row in rows if row.name in self.policies]))
             lines += [(_ends(push, row, rows[0]), row.metrics) for row in rows]
-        text = "\n\n".join([*parts, INTERVALS])
-        return Answer(text=text, files={"compare.csv": walks_csv(lines)}, sections={SECTION: text})
+        parts.append(INTERVALS)
+        files = {"compare.csv": walks_csv(lines)}
+        if self.world:
+            walked = {name: self._elsewhere(name, progress) for name in self.policies}
+            parts += [elsewhere_table(name, rows) for name, rows in walked.items()]
+            parts.append(f"{self.what_ran} of each row.")
+            files["world.csv"] = walks_csv(
+                [
+                    ({"policy": row.name, "conditions": words}, row.metrics)
+                    for rows in walked.values()
+                    for words, beside in rows
+                    for row in beside
+                ]
+            )
+        return Answer(text="\n\n".join(parts), files=files)
+
+    @property
+    def _conditions(self) -> dict[str, Any]:
+        return {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)
+
+    def _elsewhere(self, name: str, progress: OnProgress) -> list[tuple[str, list["Row"]]]:
+        """Walk a policy and its copy under each of `WORLD`: the conditions in words, and the rows."""
+        found = []
+        for conditions in WORLD:
+            beside = with_copy(name, self._conditions | conditions, self.seed, self.threads)
+            words = ", ".join(f"{key} {value}" for key, value in conditions.items())
+            found.append((words, [run_row(*each, **self.how, progress=progress) for each in beside]))
+        return found
 
 
 def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
@@ -205,11 +326,6 @@ def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
         **dict(zip(("return_low", "return_high"), row.interval, strict=True)),
         **dict(zip(("ahead", "ahead_low", "ahead_high"), difference, strict=True)),
     }
-
-
-def pushed(seconds: float, environment: Any) -> dict[str, Any]:
-    """Environment settings: the pushes of `PUSHED`, episodes of `seconds`, and what was flagged."""
-    return {"push_newton": PUSHED.push_newton, "episode_seconds": seconds} | given(environment)
 
 
 def what_ran(study: WalkingStudy, row: Row) -> str:

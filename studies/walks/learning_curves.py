@@ -1,6 +1,6 @@
 """How fast a walk is learned: curves of one training from several seeds, and whether each came to walk.
 
-springfoot study learning-curves runs/seed-0 runs/seed-1 runs/seed-2 --page docs/learning.md
+springfoot study learning-curves runs/seed-0 runs/seed-1 runs/seed-2
 """
 
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ class LearningCurves(WalkingStudy):
             "policies.csv": walks_csv(walks),
             "learning.png": partial(save_curves, runs=runs),
         }
-        return Answer(text=text, files=files, sections={"LEARNING": text})
+        return Answer(text=text, files=files)
 
 
 def _read(folder: Path) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """A page to play with: walks recorded over stiffness, speed and feet, between which its sliders blend.
 
-springfoot study play --page docs/play.md
+springfoot study play
 """
 
 from collections.abc import Iterator, Mapping
@@ -105,7 +105,7 @@ class Play(WalkingStudy):
             f"{words}\n\n{table(['right foot', *(f'{speed:g} m/s' for speed in self.speed)], rows)}\n\n"
             f"Of {falls.shape[-1]} pairs of factors: never fell / always fell."
         )
-        return Answer(text=text, files={PAGE_NAME: page.text}, sections={"PLAY": text})
+        return Answer(text=text, files={PAGE_NAME: page.text})
 
     def _walks(self, foot: str, speed: float, progress: OnProgress) -> Iterator[Recording]:
         """A recording of each pair of factors, the ankle's changing fastest; as many side by side as a batch takes."""

@@ -48,7 +48,7 @@ def test_each_seed_is_the_training_it_would_be_alone_and_the_report_has_their_sp
     assert record["spread"]["return_mean"]["mean"] == pytest.approx(sum(returns) / 2)
     assert record["spread"]["return_mean"]["sd"] == pytest.approx(abs(returns[0] - returns[1]) / 2**0.5)
     assert f"| 4 | finished | 1,024 | {record['seeds'][1]['seconds']:.0f} | {returns[1]:.1f} |" in out
-    assert f"springfoot study seeds {tmp_path / 'several'}/seed-*" in out
+    assert f"springfoot study compare {tmp_path / 'several'}/seed-* --no-springs" in out
 
 
 @pytest.mark.parametrize(

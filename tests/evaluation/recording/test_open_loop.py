@@ -1,6 +1,5 @@
 """What of a policy follows the phase alone: its open-loop copy, the share that is feedback, and the copy's name."""
 
-import csv
 import dataclasses
 from functools import cache
 from typing import Any
@@ -20,10 +19,9 @@ from springfoot.evaluation.recording.open_loop import MEAN_KNOTS, decided, feedb
 from springfoot.evaluation.recording.policies import policy_label, prepare
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
-from springfoot.studies.criteria_met import CRITERIA
 from springfoot.studies.springs.agreement import criteria_table
 from springfoot.studies.walks.bodies import pairs_table
-from springfoot.studies.walks.conditions import conditions_table
+from springfoot.studies.walks.comparison import Row, elsewhere_table
 
 PUSHED = {"push_newton": 150.0, "push_interval": 2.0, "episode_seconds": 5.0}
 
@@ -190,10 +188,10 @@ def test_a_copy_that_cannot_be_is_one_line_exit_code_2_and_nothing_written(name,
         prepare(name, {})
     assert str(error.value) == said
     monkeypatch.chdir(tmp_path)
-    assert evaluate_main([name]) == study_main(["criteria", name]) == study_main(["bodies", name]) == 2
+    assert evaluate_main([name]) == study_main(["compare", name]) == study_main(["bodies", name]) == 2
     assert capsys.readouterr().err.splitlines() == [
         f"{program}: error: {said}"
-        for program in ("evaluate.py", "springfoot study criteria", "springfoot study bodies")
+        for program in ("evaluate.py", "springfoot study compare", "springfoot study bodies")
     ]
     assert not list(tmp_path.iterdir())
 
@@ -216,27 +214,21 @@ def test_evaluate_names_the_command_of_the_copy_and_walks_it(tmp_path, monkeypat
     assert (tmp_path / "runs" / "eval-frozen-pretrained-1" / "metrics.json").is_file()
 
 
-def test_criteria_have_a_column_for_the_copy_and_the_file_a_row(tmp_path, capsys):
-    assert study_main(["criteria", "pretrained", "--quick", "--out", str(tmp_path / "new")]) == 0
-    out = capsys.readouterr().out
-    assert "|  | criterion | `pretrained` | open loop |  | criterion | `pretrained` | open loop |" in out
-    assert (
-        "Open loop: `frozen:pretrained`, the policy's mean K over the stride at the same θ_eq, without feedback." in out
-    )
-    with (tmp_path / "new" / "criteria.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert {row["policy"] for row in rows} == {"pretrained", "frozen-pretrained"} and len(rows) == 2 * len(CRITERIA)
+def row_of(name: str) -> Row:
+    recording = walked(name)
+    fell = recording.fall_reason != ""
+    return Row(name=name, metrics=measure(recording).metrics, returns=recording.returns, fell=fell)
 
 
 def test_tables_have_the_copy_beside_and_none_where_there_is_none():
-    own, copy = (measure(walked(name)).metrics for name in ("pretrained", "frozen:pretrained"))
-    head, _, line = conditions_table("flags", [("", (own, copy))]).splitlines()
+    own, copy = (row_of(name) for name in ("pretrained", "frozen:pretrained"))
+    head, _, line = elsewhere_table("pretrained", [("", (own, copy))]).splitlines()
     assert head.count("|") == line.count("|") and "| open loop: falls | open loop: speed m/s |" in head
-    assert f"| 0 of 4 | {copy['speed_m_s']['mean']:.3f} |" in line
-    assert "open loop" not in conditions_table("flags", [("", (own,))])
-    *_, falls, angles = criteria_table(["a", "b"], [own, copy], [copy, None]).splitlines()
+    assert f"| 0 of 4 | {copy.metrics['speed_m_s']['mean']:.3f} |" in line
+    assert "open loop" not in elsewhere_table("pretrained", [("", (own,))])
+    *_, falls, angles = criteria_table(["a", "b"], [own.metrics, copy.metrics], [copy.metrics, None]).splitlines()
     assert falls == "| open loop: falls |  |  | 0 of 4 | – |" and angles.endswith(" | – |")
-    assert "open loop" not in criteria_table(["a"], [own], [None])
+    assert "open loop" not in criteria_table(["a"], [own.metrics], [None])
 
 
 def test_bodies_have_the_copys_falls_speed_and_angles_beside():

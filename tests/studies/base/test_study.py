@@ -1,22 +1,16 @@
 """What every study does alike: its flags, its folder, its page, and the commands that stand for it."""
 
-import csv
 import dataclasses
 from typing import Any, ClassVar
 
 import pytest
 
-from springfoot.cli.main import STUDIES, main, study_class, study_main
+from springfoot.cli.main import STUDIES, main, study_class
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers.criteria import FOLLOWS_THE_PLAN, HUMAN_LIKE, numbers
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import record
 from springfoot.files.markdown import plus_minus
 from springfoot.files.writing import csv_text, whole_folder
 from springfoot.gait.people.scores import mean_sd
 from springfoot.studies.base.study import QUICK_NOTE, Answer, Study, WalkingStudy
-from springfoot.studies.criteria_met import criteria_table
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -32,33 +26,33 @@ class Counted(WalkingStudy):
             "a/b.png": lambda path: path.write_bytes(b""),
         }
         text = f"{self.episodes} episodes"
-        return Answer(text=text, files=files, sections={"COUNTED": text}, failed=self.seed == 1)
+        return Answer(text=text, files=files, failed=self.seed == 1)
 
 
-def test_a_study_prints_writes_its_folder_and_its_section_and_says_its_command(tmp_path, monkeypatch, capsys):
+def test_a_study_prints_its_answer_and_writes_its_report_and_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    study = Counted(page=tmp_path / "page.md", command="springfoot study counted")
+    study = Counted(command="springfoot study counted --out there")
     assert (study.run("counted"), dataclasses.replace(study, seed=1).run("counted")) == (0, 1)
-    assert capsys.readouterr().out.startswith("20 episodes\n\nResults: runs/counted-1 (counted.csv, a/b.png)\n")
+    said = capsys.readouterr().out
+    assert said.startswith("20 episodes\n\nResults: runs/counted-1 (report.md, counted.csv, a/b.png)\n")
     assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["counted-1", "counted-2"]
     assert (tmp_path / "runs" / "counted-1" / "counted.csv").read_text() == "episodes\n20\n"
-    assert (tmp_path / "a" / "b.png").exists()  # beside the page, which shows it
-    made = "<!-- COUNTED BEGIN -->\n20 episodes\n\nMade by `springfoot study counted`.\n<!-- COUNTED END -->\n"
-    assert (tmp_path / "page.md").read_text() == made
+    assert (tmp_path / "runs" / "counted-1" / "a" / "b.png").exists()  # beside the report, which shows it
+    report = "20 episodes\n\nMade by `springfoot study counted`.\n"
+    assert (tmp_path / "runs" / "counted-1" / "report.md").read_text() == report
 
 
 def test_quick_takes_its_own_counts_and_says_that_figures_mean_nothing(tmp_path, capsys):
-    study = Counted(quick=True, episodes=500, out=tmp_path / "new", page=tmp_path / "page.md")
+    study = Counted(quick=True, episodes=500, out=tmp_path / "new")
     assert study.run("counted") == 0
     assert capsys.readouterr().out.startswith(f"{QUICK_NOTE}\n\n2 episodes\n")
-    assert QUICK_NOTE in (tmp_path / "page.md").read_text()
+    assert QUICK_NOTE in (tmp_path / "new" / "report.md").read_text()
 
 
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
         ({"out": "old"}, "old exists already: out must be a new folder"),
-        ({"page": "none/page.md"}, "no folder .*none for the page page.md"),
         ({"episodes": 0}, "episodes must be"),
         ({"seconds": 0.0}, "seconds must be"),
         ({"seed": -1}, "seed must be"),
@@ -86,15 +80,15 @@ def test_a_folder_is_there_whole_or_not_at_all(tmp_path):
 def test_every_study_has_the_shared_flags_and_quick_sets_flags_it_has(name):
     study = study_class(name)
     fields = {field.name for field in dataclasses.fields(study)}
-    assert issubclass(study, Study) and {"quick", "out", "page"} <= fields
-    assert set(study.QUICK) <= fields and (study.QUICK or name == "thesis")
+    assert issubclass(study, Study) and {"quick", "out"} <= fields
+    assert set(study.QUICK) <= fields and study.QUICK
 
 
 def test_unknown_commands_and_studies_are_one_line_that_names_those_there_are(capsys):
     assert (main(["walk"]), main(["study", "walk"])) == (2, 2)
     first, second = capsys.readouterr().err.splitlines()
     assert first == "springfoot: error: no command 'walk'; there are train, evaluate, live, export and study"
-    assert second.startswith("springfoot study: error: no study 'walk'; there are compare, best-constant, ")
+    assert second.startswith("springfoot study: error: no study 'walk'; there are compare, bodies, ")
 
 
 def test_a_spread_stands_one_way():
@@ -105,28 +99,3 @@ def test_a_spread_stands_one_way():
 
 def test_a_csv_file_holds_six_digits_and_nothing_for_what_is_missing():
     assert csv_text(["a", "b"], [[1, 2 / 3], [None, float("nan")], ["x,y", True]]) == 'a,b\n1,0.666667\n,\n"x,y",True\n'
-
-
-def test_the_criteria_table_has_every_criterion_once_and_in_bold_what_is_missed():
-    policy, settings = prepare("constant:250,30", {"episode_seconds": 6.0})
-    metrics = measure(record(policy, settings, name="springs", episodes=1)).metrics
-    head, _, *lines = criteria_table({"`springs`": metrics}).splitlines()
-    assert head == "|  | criterion | `springs` |  | criterion | `springs` |"
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
-    names = [row[0] for row in cells] + [row[3] for row in cells]
-    criteria, values = (*HUMAN_LIKE, *FOLLOWS_THE_PLAN), numbers(metrics)
-    assert [name for name in names if name] == [each.label or each.name for each in criteria]
-    bold = [row[0] for row in cells if "**" in row[2]] + [row[3] for row in cells if "**" in row[5]]
-    missed = [each.label or each.name for each in criteria if not each.holds(values)]
-    assert bold == missed and 0 < len(missed) < len(criteria)
-
-
-def test_a_condition_is_what_evaluate_finds_with_the_same_flags(tmp_path, capsys):
-    words = ["--rows", "springs", "--episodes", "1", "--seconds", "5", "--out", str(tmp_path / "new")]
-    assert study_main(["conditions", *words]) == 0
-    policy, settings = prepare("schedule", {"episode_seconds": 5.0, "feedforward": "plan"})
-    alone = measure(record(policy, settings, name="", episodes=1)).metrics
-    with (tmp_path / "new" / "conditions.csv").open(encoding="utf-8", newline="") as file:
-        (row,) = [row for row in csv.DictReader(file) if row["flags"] == "--feedforward plan"]
-    assert float(row["speed_m_s_mean"]) == pytest.approx(alone["speed_m_s"]["mean"], rel=1e-5)
-    assert f"| `schedule --feedforward plan` | 0 of 1 | {alone['speed_m_s']['mean']:.3f} |" in capsys.readouterr().out

@@ -6,16 +6,14 @@ from springfoot.studies.base.flags import SettingsFlags
 from springfoot.studies.springs.any_stiffness import AnyStiffness
 from springfoot.studies.springs.influence import Influence
 from springfoot.studies.walks.comparison import Compare
-from springfoot.studies.walks.conditions import Conditions
-from springfoot.studies.walks.seeds import Seeds
 
 SHORT = {"episodes": 2, "seconds": 0.4}
 USUAL = SettingsFlags()
 STUDIES = [
-    Seeds(policies=("schedule", "constant"), environment=USUAL, **SHORT),
-    Conditions(rows="springs", **SHORT),
-    Conditions(policy="schedule", rows="world", long=False, **SHORT),
-    Compare(policy="schedule", pushes=(50.0, 60.0), factor=1.1, constant=(300.0, 40.0), environment=USUAL, **SHORT),
+    Compare(policies=("schedule", "constant"), springs=False, world=True, environment=USUAL, **SHORT),
+    Compare(
+        pushes=(50.0, 60.0), factor=1.1, constant=(300.0, 40.0), policies=("schedule",), environment=USUAL, **SHORT
+    ),
 ]
 
 

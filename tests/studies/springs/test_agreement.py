@@ -40,7 +40,7 @@ def test_one_policy_or_one_that_walks_not_is_refused():
 
 def test_the_command_prints_both_tables_and_writes_picture_and_curves(capsys, tmp_path):
     words = ["schedule", "constant:250,30", "--episodes", "1", "--seconds", "6", "--threads", "1"]
-    words += ["--out", str(tmp_path / "a"), "--page", str(tmp_path / "results.md")]
+    words += ["--out", str(tmp_path / "a")]
     with kept_figures() as figures:
         assert study_main(["agreement", *words]) == 0
     out = capsys.readouterr().out
@@ -49,11 +49,11 @@ def test_the_command_prints_both_tables_and_writes_picture_and_curves(capsys, tm
     for column, count in enumerate(missed):  # in bold what the row `missed` counts
         assert sum("**" in row[column] for row in limits) == int(count.strip(" |")) > 0
     tables, results = out.strip().rsplit("\n\n", 1)
-    assert tables in (tmp_path / "results.md").read_text()
-    assert results == f"Results: {tmp_path / 'a'} (agreement.csv, policies.csv, agreement.png)"
-    written = (tmp_path / "results.md").read_text()
-    assert f"Made by `springfoot study agreement {shlex.join(words[:-4])}`." in written and str(tmp_path) not in written
-    assert (tmp_path / "agreement.png").exists()
+    assert results == f"Results: {tmp_path / 'a'} (report.md, agreement.csv, policies.csv, agreement.png)"
+    written = (tmp_path / "a" / "report.md").read_text()
+    assert tables in written
+    assert f"Made by `springfoot study agreement {shlex.join(words[:-2])}`." in written and str(tmp_path) not in written
+    assert (tmp_path / "a" / "agreement.png").exists()
     header, *rows = (tmp_path / "a" / "agreement.csv").read_text().splitlines()
     column = header.split(",").index("ankle_stiffness_Nm_per_rad")
     values = np.array([row.split(",") for row in rows], float)

@@ -70,14 +70,10 @@ def test_a_flat_stiffness_walks_the_same_gait_without_work_of_its_own(walked):
 
 def test_the_command_writes_table_and_schedules(capsys, tmp_path):
     words = ["schedule", "--stiffness", "times:0.9", "--episodes", "1", "--seconds", "5", "--threads", "1"]
-    page = tmp_path / "results.md"
-    page.write_text("# Results\n\n<!-- ANY-K BEGIN -->\nold\n<!-- ANY-K END -->\n\nMore.\n")
-    words += ["--page", str(page), "--out", str(tmp_path / "springs")]
+    words += ["--out", str(tmp_path / "springs")]
     assert study_main(["any-stiffness", *words]) == 0
     assert "| `times:0.9` | 0 of 1 |" in capsys.readouterr().out
-    text = page.read_text()
-    assert text.startswith("# Results\n\n<!-- ANY-K BEGIN -->\n| K |") and text.endswith("END -->\n\nMore.\n")
-    assert "old" not in text
+    assert (tmp_path / "springs" / "report.md").read_text().startswith("| K |")
     numbers = (tmp_path / "springs" / "stiffness.csv").read_text().splitlines()
     assert numbers[0].startswith("stiffness,condition,work_by_stiffness_J_kg,") and len(numbers) == 1 + 2 * 3
     _, settings = prepare(

@@ -82,18 +82,16 @@ def test_scrambled_torque_makes_no_spring():
 
 
 def test_the_command_writes_table_and_numbers_and_the_same_seeds_the_same(capsys, tmp_path):
-    page, numbers = tmp_path / "results.md", []
-    page.write_text("# Results\n\n<!-- IDENTIFICATION BEGIN -->\nold\n<!-- IDENTIFICATION END -->\n", encoding="utf-8")
+    numbers = []
     for threads in ("1", "2"):
         out = tmp_path / threads
-        words = ["schedule", "--quick", "--threads", threads, "--page", str(page), "--out", str(out)]
+        words = ["schedule", "--quick", "--threads", threads, "--out", str(out)]
         assert study_main(["identify", *words]) == 0
         numbers.append((out / "springs.csv").read_bytes())
     assert numbers[0] == numbers[1] and numbers[0].count(b"\n") == 1 + 2 * 10
     late_stance = leg_constants("planned", "people").ankle_schedule[2]
     assert f"| ankle | 30–44 | {late_stance:.1f} | " in capsys.readouterr().out
-    text = page.read_text(encoding="utf-8")
-    assert "old" not in text and "`schedule`: ankle a spring in " in text
+    assert "`schedule`: ankle a spring in " in (tmp_path / "1" / "report.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -54,25 +54,24 @@ class Stop(BaseCallback):
         return self.n_calls < 3
 
 
-def test_what_is_finished_is_kept_what_is_not_is_gone_on_with_and_the_page_is_made_of_it(monkeypatch, capsys, tmp_path):
+def test_resume_keeps_finished_trainings(monkeypatch, capsys, tmp_path):
     quick = TrainingConfig(
         num_envs=8, update_steps=512, eval_interval=512, eval_episodes=2, environment=BipedSettings(episode_seconds=0.5)
     )
     monkeypatch.setitem(ablations.PRESETS, "walk", quick)
-    runs, page = tmp_path / "runs", tmp_path / "page.md"
+    runs = tmp_path / "runs"
     [(config, folder, _)] = ablations.jobs(runs, ["25hz"], 1, 512)
     assert train(config, folder, callbacks=[Stop()])["status"] == "interrupted"
     words = ["--runs", runs, "--seeds", 1, "--only", "25hz", "--timesteps", 512, *SHORT]
-    assert main(*words, "--page", page, "--out", tmp_path / "one") == 0
+    assert main(*words, "--out", tmp_path / "one") == 0
     done = json.loads((folder / RUN).read_text())
     assert done["status"] == "finished" and done["timesteps"] == 256  # as long a walk, in steps twice as long
-    written = page.read_text().replace("/one", ""), (tmp_path / "one" / "ablations.csv").read_bytes()
+    written = (tmp_path / "one" / "report.md").read_text(), (tmp_path / "one" / "ablations.csv").read_bytes()
     assert "K decided at 25 Hz" in written[0] and "thesis lines" in written[0]
     assert written[1].startswith(b"table,row,seed,undisturbed_falls,pushed_falls,")
 
-    page.unlink()
-    assert main(*words, "--page", page, "--out", tmp_path / "two") == 0
-    again = page.read_text().replace("/two", ""), (tmp_path / "two" / "ablations.csv").read_bytes()
+    assert main(*words, "--out", tmp_path / "two") == 0
+    again = (tmp_path / "two" / "report.md").read_text(), (tmp_path / "two" / "ablations.csv").read_bytes()
     assert again == written
     assert json.loads((folder / RUN).read_text()) == done
     capsys.readouterr()

@@ -10,13 +10,13 @@ import pytest
 
 from springfoot.agents.policies.baselines import BASELINES, constant
 from springfoot.cli.main import study_main
-from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.envs.settings.settings import settings_from
+from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
 from springfoot.studies.base import intervals, quantities
-from springfoot.studies.constant_search import best_constant
+from springfoot.studies.base.flags import SettingsFlags
 from springfoot.studies.walks import comparison
-from springfoot.studies.walks.seeds import seeds_table
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
 THESIS = {"thesis", "thesis_printed"}
@@ -30,7 +30,7 @@ def rows():
 
 def test_every_spring_that_needs_no_learning_is_a_row(rows):
     names = [row.name for row in rows]
-    assert names[:4] == ["schedule", "untrained", "schedule", "schedule:1.2"]  # its own open-loop copy
+    assert names[:4] == ["schedule", "untrained", "schedule", "schedule:1.2"]  # as a policy, and among the springs
     assert set(BASELINES) < set(names) and "quasi_stiffness, commanded 1.35 m/s" in names
     stiffness = {row.name: row.metrics["stiffness_Nm_rad"] for row in rows}
     assert stiffness["constant:200,30"]["ankle"]["mid_stance"] == pytest.approx(200.0)
@@ -139,22 +139,8 @@ def test_table_and_verdict_say_what_the_policy_is_ahead_of_and_what_not():
     )
 
 
-def test_best_constant_is_at_least_as_good_as_the_ends_of_the_range():
-    settings = BipedSettings(episode_seconds=0.6, ankle_stiffness_range=(20, 800), toe_stiffness_range=(20, 40))
-    told = []
-    pair, tried = best_constant(settings, grid=(2, 2), refinements=1, episodes=2, seed=5, progress=told.append)
-    returns = tried[pair]
-    assert sum(told) == 2 * 2 + 9
-    assert returns.mean() == max(each.mean() for each in tried.values())
-    assert len(returns) == 2 and 20 <= pair[0] <= 800 and 20 <= pair[1] <= 40
-    for other in ((20.0, 20.0), (800.0, 40.0)):
-        assert returns.mean() >= record(constant(settings, other), settings, name="", episodes=2, seed=5).returns.mean()
-    again = record(constant(settings, pair), settings, name="", episodes=2, seed=5).returns
-    assert np.array_equal(returns, again)
-
-
-def test_seeds_table_has_the_spread_over_policies(rows):
-    lines = seeds_table([rows[0], rows[4]]).splitlines()
+def test_spread_table_has_mean_and_sd_over_policies(rows):
+    lines = comparison.spread_table([rows[0], rows[4]]).splitlines()
     cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines}
     one, other = (row.metrics["stiffness_Nm_rad"]["ankle"]["push_off"] for row in (rows[0], rows[4]))
     mean, sd = (one + other) / 2, abs(one - other) / np.sqrt(2)
@@ -167,8 +153,8 @@ def test_seeds_table_has_the_spread_over_policies(rows):
         (["compare", "nobody"], "no policy 'nobody'"),
         (["compare", "schedule", "--episodes", "0"], "episodes must be"),
         (["compare", "schedule", "--constant", "-1", "30"], "two positive stiffnesses"),
-        (["seeds"], "one policy or more"),
-        (["best-constant", "--policy", "untrained", "--mass", "-1"], "mass must be"),
+        (["compare", "untrained", "--mass", "-1"], "mass must be"),
+        (["compare", "untrained", "--pushes"], "pushes must be"),
     ],
 )
 def test_bad_input_is_one_line_exit_code_2_and_nothing_written(words, said, monkeypatch, capsys, tmp_path):
@@ -180,12 +166,26 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_written(words, said, monk
 
 
 def test_studies_run_as_a_command_and_leave_their_numbers(tmp_path):
-    words = ["seeds", "schedule", "--episodes", "1", "--seconds", "4.5"]
+    words = ["compare", "schedule", "constant", "--no-springs", "--pushes", "0", "--episodes", "1", "--seconds", "4.5"]
     command = [sys.executable, "-c", "from springfoot.cli.main import main; main()", "study", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
-    assert "| falls | 0 | 0.0 ± – |" in done.stdout
+    assert "| falls | 0 | 0 | 0.0 ± 0.0 |" in done.stdout
     assert "1 episodes × 4.5 s, seeds 0–0, no pushes." in done.stdout
-    with (tmp_path / "runs" / "seeds-1" / "seeds.csv").open(encoding="utf-8", newline="") as file:
-        (row,) = csv.DictReader(file)
-    assert row["policy"] == "schedule" and row["falls"] == "0"
-    assert f"| speed m/s | {float(row['speed_m_s_mean']):.3f} |" in done.stdout
+    with (tmp_path / "runs" / "compare-1" / "compare.csv").open(encoding="utf-8", newline="") as file:
+        first, second = csv.DictReader(file)
+    assert first["policy"] == "schedule" and second["policy"] == "constant" and first["falls"] == "0"
+    speeds = [float(row["speed_m_s_mean"]) for row in (first, second)]
+    assert f"| speed m/s | {speeds[0]:.3f} | {speeds[1]:.3f} |" in done.stdout
+
+
+def test_elsewhere_every_condition_is_a_row_of_what_evaluate_would_find(monkeypatch):
+    monkeypatch.setattr(comparison, "WORLD", ({}, {"slope_deg": 5.0}))
+    how = {"springs": False, "pushes": (0.0,), "world": True, "episodes": 1, "seconds": 4.5}
+    study = comparison.Compare(policies=("schedule",), environment=SettingsFlags(), **how)
+    files = study.ask(lambda seconds: None).files
+    lines = list(csv.DictReader(files["world.csv"].splitlines()))
+    assert [line["conditions"] for line in lines] == ["", "slope_deg 5.0"]
+    policy, settings = prepare("schedule", {"slope_deg": 5.0, "episode_seconds": 4.5})
+    uphill = measure(record(policy, settings, name="", episodes=1)).metrics
+    assert float(lines[1]["speed_m_s_mean"]) == pytest.approx(uphill["speed_m_s"]["mean"], rel=1e-5)
+    assert lines[0] != lines[1]
