@@ -70,12 +70,11 @@ test-wheel: install
 	springfoot evaluate pretrained 2>&1 | grep -F "pip install 'springfoot[evaluate]'"; \
 	add "[evaluate]"; \
 	springfoot evaluate pretrained --episodes 1; springfoot study compare schedule --quick; \
-	springfoot export pretrained --to numpy --out pretrained.npz; \
 	springfoot train --out runs/walk 2>&1 | grep -F "pip install 'springfoot[train]'"; \
 	add "[train]"; \
 	springfoot train --timesteps 20000 --out runs/walk; springfoot evaluate runs/walk --episodes 1; ls runs/*; \
-	springfoot export runs/walk --to torch --out walk.pt2; add "[onnx]"; \
-	springfoot export runs/walk --to onnx --out walk.onnx; springfoot evaluate walk.onnx --episodes 1
+	add "[onnx]"; \
+	springfoot export runs/walk --out walk.onnx; springfoot evaluate walk.onnx --episodes 1
 
 # The unpacked source distribution passes its own tests, in an environment that it makes itself. Not $(MAKE): with
 # --dry-run, which a test gives, that line would run.

@@ -249,7 +249,7 @@ def _onnx(folder: Path) -> tuple[bytes, ...]:
         from springfoot.agents.policies.export import export_policy
     except ImportError:
         return ()
-    export_policy(read_policy("pretrained"), folder / "walk.onnx", "onnx")
+    export_policy(read_policy("pretrained"), folder / "walk.onnx")
     return ((folder / "walk.onnx").read_bytes(),)
 
 

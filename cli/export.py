@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
@@ -16,17 +16,15 @@ from springfoot.errors import SpringfootError
 
 @dataclass(frozen=True, kw_only=True)
 class ExportFlags:
-    """Write a policy as a file that runs without springfoot: raw observation in, action and stiffness out.
+    """Write a policy as an ONNX file that runs without springfoot: raw observation in, action and stiffness out.
 
     Beside FILE appears its contract, FILE.json: names, units, order and bounds of what goes in and comes out.
     """
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
     """A .safetensors file, a run folder (its best policy), or pretrained."""
-    to: Annotated[Literal["onnx", "torch", "numpy"], tyro.conf.arg(metavar="onnx|torch|numpy", help_behavior_hint="")]
-    """For onnxruntime and its like; for torch.export.load; for NumPy alone, with the player play_STEM.py beside it."""
     out: Annotated[Path, tyro.conf.arg(metavar="FILE", help_behavior_hint="")]
-    """New file, which ends in .onnx, .pt2 (torch) or .npz (numpy)."""
+    """New file, which ends in .onnx; any ONNX runtime reads it."""
 
 
 def export_main(arguments: Sequence[str] | None = None, program: str = "springfoot export") -> int:
@@ -44,12 +42,11 @@ def run_export(flags: ExportFlags) -> None:
     from springfoot.agents.policies.policy import read_policy
 
     end_in_order()
-    planned_files(flags.out, flags.to)  # raises before the policy is read
+    planned_files(flags.out)  # raises before the policy is read
     if not has_feedback(flags.policy) or flags.policy.endswith(".onnx") or is_function(flags.policy):
         raise SpringfootError(
             f"{flags.policy} has no weights to export: give a .safetensors file, a run folder or pretrained"
         )
-    files = export_policy(read_policy(flags.policy), flags.out, flags.to)
+    files = export_policy(read_policy(flags.policy), flags.out)
     print(f"Results: {', '.join(map(str, files))}")
-    if flags.to == "onnx":
-        print(f"Next:    springfoot evaluate {shlex.quote(str(flags.out))}")
+    print(f"Next:    springfoot evaluate {shlex.quote(str(flags.out))}")

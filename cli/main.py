@@ -19,7 +19,7 @@ HELP = """usage: springfoot {train,evaluate,live,export,study} ...
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
   springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
-  springfoot export POLICY          write it as a file that runs without springfoot: ONNX, torch or NumPy
+  springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
 
 Each takes --help; springfoot --version says which this is."""

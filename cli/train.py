@@ -104,10 +104,7 @@ def run_training(flags: TrainFlags) -> int:
     if best:
         falls = f"{best['falls']} of {best['episodes']} episodes fell"
         print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
-    print(
-        f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard;\n"
-        "learning_curve.png, gallery.png)"
-    )
+    print(f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard)")
     print(f"Next:    springfoot evaluate {_word(folder)}")
     if interrupted:
         print(f"Or:      springfoot train --resume {_word(folder)}")

@@ -17,8 +17,7 @@ from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.errors import SpringfootError, require_number
 
 from .fingerprint import fingerprint
-from .numpy_player import ACTIVATIONS
-from .policy import VARIANCE_FLOOR, Output, Policy
+from .policy import ACTIVATIONS, VARIANCE_FLOOR, Output, Policy
 
 TORCH_NAMES = {"tanh": "Tanh", "relu": "ReLU", "leaky_relu": "LeakyReLU", "elu": "ELU", "silu": "SiLU"}
 """Class of `torch.nn` that each of `ACTIVATIONS` is, with its default arguments."""

@@ -1,90 +1,227 @@
-"""Exported policies: one file that runs without springfoot, and its contract; normalisation and scaling inside."""
+"""Export of policies: one ONNX file that runs without springfoot, and its contract in JSON.
+
+The contract names what goes in and what comes out, with units, order and bounds; its numbers, `scale_of`, stand in the
+graph as well. Nothing in either tells where or when it was made.
+"""
 
 import json
-from importlib import resources
-from io import BytesIO
+from collections.abc import Sequence
+from importlib.metadata import version
+from math import e
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from springfoot.arrays import NDArray
+from springfoot.envs.control.equilibrium import foot_curves
+from springfoot.envs.control.foot_rows import controlled_joints
+from springfoot.envs.control.foot_springs import stiffness_of
+from springfoot.envs.control.phase_table import SAMPLES
+from springfoot.envs.control.reference_walk import ReferenceWalk, rows, walks_of_legs
+from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.envs.task.observation import OBSERVATION
 from springfoot.errors import SpringfootError
-from springfoot.extras import EXTRA_OF
 from springfoot.files.writing import require_new_files, write_new
+from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
 
-from .contract import Scale, contract_of, scale_of
-from .foreign import contract_path
+from .foreign import CONTRACT_KEY, contract_path
 from .policy import Policy
 
-FORMATS = {"onnx": ".onnx", "torch": ".pt2", "numpy": ".npz"}
-"""Formats, and how their files' names end."""
+SUFFIX = ".onnx"
+"""Ending of an exported policy's name."""
 
 
-def export_policy(policy: Policy, out: str | Path, to: str) -> list[Path]:
-    """Write a policy for use without springfoot; returns the new files.
+def export_policy(policy: Policy, out: str | Path) -> list[Path]:
+    """Write a policy as an ONNX file for use without springfoot; return the new files.
 
     Args:
         policy: of this version (`read_policy`).
-        out: new file, ending as `FORMATS` says. Beside it appear its contract, OUT.json, and for `numpy` the player
-            play_STEM.py.
-        to: `onnx` (any ONNX runtime), `torch` (`torch.export.load`) or `numpy` (an .npz without objects).
+        out: new file, ending in .onnx. Beside it appears its contract, OUT.json.
 
-    Each takes the raw observation (N, D) and returns the action (N, 4) and the stiffness it sets (`Scale`); onnx and
-    torch in float32, a trained policy's actions within 1e-5 of its own, numpy in float64. Raises `SpringfootError`,
-    with nothing written, for another format or ending, for files that exist, and without the package that it needs.
+    The graph takes the raw observation (N, D) and returns the action (N, 4) and the stiffness it sets (`Scale`) in
+    float32, the actions within 1e-5 of the policy's own. Raises `SpringfootError`, with nothing written, for another
+    ending, for files that exist, and without the package onnx.
     """
-    files = planned_files(out, to)
-    scale, contract = scale_of(policy.settings), json.dumps(contract_of(policy), indent=1, allow_nan=False) + "\n"
+    files = planned_files(out)
+    scale = scale_of(policy.settings)
+    contract = json.dumps(contract_of(policy), indent=1, allow_nan=False) + "\n"
     try:
-        content = {"onnx": _onnx, "torch": _torch, "numpy": _numpy}[to](policy, scale, contract)
+        content = onnx_bytes(policy, scale, contract)
     except ModuleNotFoundError as error:
-        extra = EXTRA_OF.get(error.name or "", to)
-        raise SpringfootError(f"to {to} needs the package {error.name}: pip install 'springfoot[{extra}]'") from None
-    player = [(resources.files("springfoot.agents.policies") / "numpy_player.py").read_bytes()] if to == "numpy" else []
-    write_new(dict(zip(files, [content, contract.encode(), *player], strict=True)))
+        raise SpringfootError(f"an export needs the package {error.name}: pip install 'springfoot[onnx]'") from None
+    write_new(dict(zip(files, [content, contract.encode()], strict=True)))
     return files
 
 
-def planned_files(out: str | Path, to: str) -> list[Path]:
-    """The files of an export: policy, contract, for `numpy` the player; `SpringfootError` if one exists already."""
+def planned_files(out: str | Path) -> list[Path]:
+    """Return the files of an export, policy and contract; raise `SpringfootError` if one exists already."""
     out = Path(out)
-    if to not in FORMATS:
-        raise SpringfootError(f"to must be one of {', '.join(FORMATS)}, got {to!r}")
-    if out.suffix != FORMATS[to]:
-        raise SpringfootError(f"out must end in {FORMATS[to]} for {to}, got {out}")
+    if out.suffix != SUFFIX:
+        raise SpringfootError(f"out must end in {SUFFIX}, got {out}")
     files = [out, contract_path(out)]
-    if to == "numpy":
-        files.append(out.with_name(f"play_{out.stem}.py"))
     require_new_files(files)
     return files
 
 
-def _onnx(policy: Policy, scale: Scale, contract: str) -> bytes:
-    from .onnx_graph import onnx_bytes
-
-    return onnx_bytes(policy, scale, contract)
-
-
-def _torch(policy: Policy, scale: Scale, contract: str) -> bytes:
-    from .torch_program import torch_bytes
-
-    return torch_bytes(policy, scale)
+CONTRACT_VERSION = 1
+"""Version of the contract's layout."""
+SCHEDULE_STEP = SAMPLES // 100
+"""Samples of a stride between two values of a schedule in the contract: one percent."""
+PACKAGES = ("springfoot", "mujoco", "numpy")
 
 
-def _numpy(policy: Policy, scale: Scale, contract: str) -> bytes:
-    arrays: dict[str, Any] = {
-        "mean": policy.observation_mean,
-        "deviation": policy.observation_deviation,
-        "clip": np.array(np.inf if policy.observation_clip is None else policy.observation_clip),
-        "activation": np.array(policy.activation),
-        "output": np.array(policy.output),
-        "layer_sizes": np.array(policy.layer_sizes),
-        "joints": np.array(scale.joints),
-        "middle": scale.middle,
-        "factor": scale.factor,
+class Scale(NamedTuple):
+    """What an exported policy returns besides its actions: middle x factor^action, of the actions that count.
+
+    In absolute mode that is `stiffness` [N m/rad] of the body of 1.70 m and 63 kg; in residual mode, where an action
+    says how many times the schedule, `stiffness_factor` [-].
+    """
+
+    name: str
+    """Name of that output."""
+    unit: str
+    """Its unit."""
+    joints: list[int]
+    """Indices of the actions that count: not those of a joint that `stiffness_joints` leaves out, nor of a device."""
+    middle: NDArray
+    """(joints,) its value at action 0."""
+    factor: NDArray
+    """(joints,) how many times that it is at action 1."""
+
+
+def scale_of(settings: BipedSettings) -> Scale:
+    """What the actions of a policy with these settings set."""
+    joints = np.flatnonzero(controlled_joints(settings)).tolist()
+    if settings.action_mode == "residual":
+        return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
+    middle, stiffest = (np.tile(stiffness_of(np.full(2, a), settings, Body()), 2)[joints] for a in (0.0, 1.0))
+    return Scale("stiffness", "N m/rad", joints, middle, stiffest / middle)
+
+
+def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
+    """Return float32 numbers whose sum is `value` to twice their precision.
+
+    float32 alone is too coarse: an observation's mean can be 1,000 times its standard deviation.
+    """
+    whole = value.astype(np.float32)
+    return whole, (value - whole).astype(np.float32)
+
+
+def contract_of(policy: Policy) -> dict[str, Any]:
+    """The contract of a policy, as plain JSON values; docs/policies.md explains each of them."""
+    settings, scale, header = policy.settings, scale_of(policy.settings), policy.header
+    bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
+    contract = {
+        "contract_version": CONTRACT_VERSION,
+        "observation": {
+            "shape": ["N", len(OBSERVATION)],
+            "dtype": "float32",
+            "values": "finite, as the environment gives them: SI divided by the unit, within low and high; "
+            "g is gravity, l the leg length of the body (hip to floor when standing)",
+            "entries": [
+                {"name": entry.name, "unit": entry.unit, "low": entry.low, "high": entry.high, "meaning": entry.meaning}
+                for entry in OBSERVATION
+            ],
+        },
+        "action": {
+            "shape": ["N", len(ACTIONS)],
+            "unit": "1",
+            "entries": [{"name": name, "low": -1.0, "high": 1.0} for name in ACTIONS],
+        },
+        scale.name: {
+            "shape": ["N", len(scale.joints)],
+            "unit": scale.unit,
+            "entries": [
+                {"name": ACTIONS[joint], "low": round(float(low), 9), "high": round(float(high), 9)}
+                for joint, low, high in bounds
+            ],
+        },
+        "body": {
+            "height_m": REFERENCE_HEIGHT,
+            "mass_kg": REFERENCE_MASS,
+            "scaling": "another body's stiffness is this one times (mass + load) / mass_kg x height / height_m",
+        },
+        "step_seconds": settings.step_seconds,
+        "network": header["network"],
+        "settings": header["settings"],
+        "fingerprint": header["fingerprint"],
+        "versions": {name: version(name) for name in PACKAGES},
     }
+    return contract if settings.action_mode == "absolute" else contract | {"schedule": _schedule(settings)}
+
+
+def _schedule(settings: BipedSettings) -> dict[str, Any]:
+    """What a residual action multiplies, at each percent of the leg's stride, by speed; of the body of the contract.
+
+    `right` is the right leg's, where a person has adapted to a foot; the rest is then the left leg's.
+    """
+    left, right = walks_of_legs(settings)
+    found = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
+    return found | {"right": _curves(settings, right)} if right else found
+
+
+def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str, list[list[float]]]:
+    unit = body_of(settings).stiffness_scale
+    curves = [foot_curves(settings, constants, walk)[1][::SCHEDULE_STEP] / unit for constants, walk in rows(walks)]
+    table = np.round(np.stack(curves), 6)
+    return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}
+
+
+OPSET, IR_VERSION = 17, 8
+"""What the file asks of its reader, no newer than needed: onnxruntime has it since 1.12 (2022)."""
+OPERATORS = {"tanh": "Tanh", "relu": "Relu", "leaky_relu": "LeakyRelu", "elu": "Elu"}
+"""Operator of each activation that has one of its own, by default with the slopes of ours."""
+
+
+def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
+    """Return the file: input `observation` (N, D), outputs `action` (N, 4) and that of `scale`.
+
+    `contract` stands in its metadata.
+    """
+    import onnx  # an extra of its own
+    from onnx import helper, numpy_helper
+
+    nodes: list[Any] = []
+    constants: list[Any] = []
+
+    def constant(value: ArrayLike, dtype: type = np.float32) -> str:
+        constants.append(numpy_helper.from_array(np.array(value, dtype, order="C"), f"constant_{len(constants)}"))
+        return constants[-1].name
+
+    def node(operator: str, *inputs: str, name: str = "", **attributes: Any) -> str:
+        nodes.append(helper.make_node(operator, inputs, [name or f"{operator}_{len(nodes)}"], **attributes))
+        return nodes[-1].output[0]
+
+    def clip(x: str, limit: float, name: str = "") -> str:
+        return node("Clip", x, constant(-limit), constant(limit), name=name)
+
+    mean, rest = two_floats(policy.observation_mean)
+    x = node("Sub", node("Sub", "observation", constant(mean)), constant(rest))
+    x = node("Div", x, constant(policy.observation_deviation))
+    if policy.observation_clip is not None:
+        x = clip(x, policy.observation_clip)
     for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
-        arrays |= {f"weight_{layer}": weight, f"bias_{layer}": bias}
-    file = BytesIO()
-    np.savez(file, **arrays)
-    return file.getvalue()
+        if layer:
+            x = (
+                node("Mul", x, node("Sigmoid", x))
+                if policy.activation == "silu"
+                else node(OPERATORS[policy.activation], x)
+            )
+        x = node("Gemm", x, constant(weight), constant(bias), transB=1)
+    action = node("Tanh", x, name="action") if policy.output == "tanh" else clip(x, 1.0, "action")
+    power = node("Pow", constant(scale.factor), node("Gather", action, constant(scale.joints, np.int64), axis=1))
+    node("Mul", constant(scale.middle), power, name=scale.name)
+
+    def value(name: str, width: int) -> Any:
+        return helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, ["N", width])
+
+    outputs = [value("action", policy.layer_sizes[-1]), value(scale.name, len(scale.joints))]
+    graph = helper.make_graph(nodes, "springfoot", [value("observation", policy.layer_sizes[0])], outputs, constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    model.producer_name = "springfoot"
+    helper.set_model_props(model, {CONTRACT_KEY: contract})
+    onnx.checker.check_model(model, full_check=True)
+    return model.SerializeToString()

@@ -21,7 +21,6 @@ from springfoot.files.tensor_file import read_tensors, write_tensors
 from .fingerprint import fingerprint, require_same
 from .foreign import ForeignPolicy, function_policy, is_function, observation_rows, onnx_policy
 from .number_bounds import LARGEST_WEIGHT, require_bounded
-from .numpy_player import ACTIVATIONS
 
 FORMAT_VERSION = 1
 """Version of the file layout; a reader refuses any other."""
@@ -33,6 +32,14 @@ VARIANCE_FLOOR = 1e-8
 """Added to each observation's variance before the root, as in stable-baselines3's VecNormalize."""
 
 
+ACTIVATIONS = {
+    "tanh": np.tanh,
+    "relu": lambda x: np.maximum(x, 0.0),
+    "leaky_relu": lambda x: np.where(x > 0.0, x, 0.01 * x),
+    "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+    "silu": lambda x: 0.5 * x * (1.0 + np.tanh(0.5 * x)),
+}
+"""What stands between the layers of a network, by name."""
 Output = Literal["clip", "tanh"]
 """What makes an action in [-1, 1] of the last layer's output, as PPO does (clip) or SAC (tanh)."""
 

@@ -28,7 +28,6 @@ from .learning_state import learning_state, restore_learning
 from .ppo import Learner
 from .progress import Progress
 from .returns import evaluate_returns
-from .run_pictures import Gallery, draw_run
 from .run_record import best_of, cut_events, event_sizes, same_source, write_record
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 from .stopping import Stopping
@@ -69,7 +68,7 @@ class Session(BaseCallback):
         self._first, self._seconds_before = (found[0]["timesteps"], found[0]["seconds"]) if found else (0, 0.0)
         self._trained, self._kept, self._policy = self._first, found, None
         self._best = found[1][BEST_FILE].tobytes() if found and BEST_FILE in found[1] else b""
-        self._onlookers, self._gallery = callbacks, Gallery(out, self._first, config.timesteps)
+        self._onlookers = callbacks
         self._sums: dict[str, np.ndarray] = {}
         self._ended: list[dict[str, Any]] = []
         self._whole = True
@@ -78,7 +77,6 @@ class Session(BaseCallback):
         """Train until the configured timesteps are done or a signal stops it; return the record."""
         with no_word_of_writers():
             self._learn()
-        draw_run(self._out, self._record, self._evaluation, EVALUATION_SEED)
         return self._record
 
     def _learn(self) -> None:
@@ -141,7 +139,6 @@ class Session(BaseCallback):
         learning = {name: values for name, values in arrays.items() if name != BEST_FILE}
         restore_learning(self.learner, self._environments, header["learning"], learning)
         cut_events(self._out, header["events"])
-        self._gallery.forget(self._first)
         return header["learning"]["logged"]
 
     @property
@@ -205,7 +202,6 @@ class Session(BaseCallback):
         if self._best:
             arrays[BEST_FILE] = np.frombuffer(self._best, np.uint8)
         self._kept, self._policy = (header, arrays), self.learner.policy(self._fingerprint)
-        self._gallery.keep(self._trained, lambda: self.learner.policy(self._fingerprint))
 
     def _evaluate(self) -> None:
         """Evaluate the policy on the fixed seeds, keep it if it is the best so far, and save."""

@@ -1,9 +1,9 @@
 """A training run, new or resumed: a folder that holds its policies, its state and its results.
 
 `best.safetensors` and `last.safetensors` are policies, `state-N.safetensors` the checkpoint after N timesteps,
-`run.json` holds what is needed to repeat the run, and its results; beside them are TensorBoard's event files and
-pictures (`agents.training.run_pictures`). Each file is written whole or not at all. A checkpoint has all that decides
-what comes after it, and all other files are made again from it when the run is resumed.
+`run.json` holds what is needed to repeat the run, and its results; beside them are TensorBoard's event files. Each file
+is written whole or not at all. A checkpoint has all that decides what comes after it, and all other files are made
+again from it when the run is resumed.
 """
 
 import dataclasses
@@ -20,7 +20,6 @@ from ..policies.policy import BEST, LAST, RUN
 from .callbacks import Onlooker
 from .checkpoint import Checkpoint, newest_checkpoint
 from .config import TrainingConfig, config_from_json, config_to_json
-from .run_pictures import GALLERY, pictures_of
 from .run_record import read_record, runs_within
 from .session import BEST_FILE, Session
 
@@ -69,8 +68,7 @@ def resume(
         several = f"; its runs are {within}" if within else ""
         raise SpringfootError(f"{out} holds no run to continue: no {RUN} in it{several}")
     with owned(out):
-        for folder in (out, out / GALLERY):
-            remove_temporary(folder)
+        remove_temporary(out)
         record = read_record(out)
         found = newest_checkpoint(out)
         if found is None and record.get("timesteps"):
@@ -102,10 +100,4 @@ def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:
     told = all(record.get(name) == value for name, value in header["record"].items())
     evaluated = [entry["timesteps"] for entry in record["evaluations"]][-1:] == [header["timesteps"]]
     best = (out / BEST).is_file() and (out / BEST).read_bytes() == arrays[BEST_FILE].tobytes()
-    return (
-        told
-        and evaluated
-        and best
-        and all((out / name).is_file() for name in (LAST, *pictures_of(out)))
-        and record.get("status") == "finished"
-    )
+    return told and evaluated and best and (out / LAST).is_file() and record.get("status") == "finished"

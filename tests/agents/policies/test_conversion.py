@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_mlp, policy_from_sb3, read_policy, save_policy
 from springfoot.agents.policies.conversion import TORCH_NAMES
-from springfoot.agents.policies.numpy_player import ACTIVATIONS
+from springfoot.agents.policies.policy import ACTIVATIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.errors import SpringfootError

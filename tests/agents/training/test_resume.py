@@ -136,9 +136,7 @@ def test_no_checkpoint_that_is_whole_is_no_run_to_continue(half):
     assert checkpoints(half) == before
 
 
-@pytest.mark.parametrize(
-    "lost", ["best.safetensors", "last.safetensors", "run.json", "learning_curve.png", "gallery.png"]
-)
+@pytest.mark.parametrize("lost", ["best.safetensors", "last.safetensors", "run.json"])
 def test_what_disagrees_with_the_last_checkpoint_is_made_again(whole, tmp_path, lost):
     folder = shutil.copytree(whole, tmp_path / "run")
     with pytest.raises(SpringfootError, match=r"has done its 2,560 timesteps"):
@@ -148,21 +146,11 @@ def test_what_disagrees_with_the_last_checkpoint_is_made_again(whole, tmp_path, 
         (folder / lost).write_text(json.dumps(record | {"evaluations": record["evaluations"][:-1]}))
     else:
         (folder / lost).unlink()
-    for left in (".run.json.abcd1234", ".gallery.png.abcd1234", "gallery/.0.safetensors.abcd1234"):
+    for left in (".run.json.abcd1234", ".last.safetensors.abcd1234"):
         (folder / left).touch()
     assert resume(folder)["status"] == "finished"
     assert differences(whole, folder) == []
     assert (folder / lost).is_file() and not list(folder.rglob(".*"))
-
-
-def test_a_damaged_policy_of_the_gallery_is_left_out_of_the_picture(whole, tmp_path, capsys):
-    folder = shutil.copytree(whole, tmp_path / "run")
-    (folder / "gallery.png").unlink()
-    (folder / "gallery" / "0.safetensors").write_bytes(b"damaged")
-    (folder / "gallery" / "mine.safetensors").touch()
-    assert resume(folder)["status"] == "finished"
-    assert "gallery.png is without 0.safetensors: " in capsys.readouterr().err
-    assert (folder / "gallery.png").is_file()
 
 
 @pytest.mark.parametrize("evaluation", [{}, {"timesteps": "x"}])

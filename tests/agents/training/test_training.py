@@ -161,8 +161,7 @@ def test_a_run_folder_holds_what_it_says(run):
     assert record["best"] == max(record["evaluations"], key=lambda entry: entry["return_mean"])
     assert {"python", "mujoco", "scipy", "torch"} <= set(record["sessions"][0]["versions"])
     names = {path.name for path in folder.iterdir() if not path.name.startswith("events.out.tfevents")}
-    pictures = {"gallery", "gallery.png", "learning_curve.png"}
-    assert names == {"best.safetensors", "last.safetensors", "state-3072.safetensors", "run.json"} | pictures
+    assert names == {"best.safetensors", "last.safetensors", "state-3072.safetensors", "run.json"}
     assert any(path.name.startswith("events.out.tfevents") for path in folder.iterdir())
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tyro
 
-from springfoot.agents.policies.contract import scale_of
+from springfoot.agents.policies.export import scale_of
 from springfoot.cli.evaluate import evaluate_main
 from springfoot.envs import SegmentedFootBiped, SegmentedFootBipedVector
 from springfoot.envs.physics.model import ACTIONS

@@ -1,12 +1,10 @@
-"""What a run shows of itself: learning curve and gallery in its folder, curves and configuration in TensorBoard."""
+"""Onlookers of a training: TensorBoard, and callbacks that may end it but change no bit."""
 
 import dataclasses
 import json
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
-from PIL import Image
 from stable_baselines3.common.callbacks import BaseCallback
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData  # type: ignore[attr-defined]
@@ -14,9 +12,6 @@ from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData  # typ
 from springfoot.agents.policies.policy import read_policy
 from springfoot.agents.training import training
 from springfoot.agents.training.config import TrainingConfig
-from springfoot.agents.training.run_pictures import LEFT_COLOUR, RIGHT_COLOUR, curve_figure, gallery_figure
-from springfoot.agents.training.session import EVALUATION_SEED
-from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.reward import TERMS
@@ -36,50 +31,6 @@ SHORT = TrainingConfig(
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "short"
     return folder, training.train(SHORT, folder)
-
-
-def test_policies_are_kept_at_the_beginning_at_each_quarter_and_at_the_end(run):
-    kept = sorted(int(path.stem) for path in (run[0] / "gallery").iterdir())
-    assert kept == [0, 1024, 2048, 4096]  # the first updates of 512 at or after 0, 25, 50 and 100 % of 4000
-    last = read_policy(run[0] / training.LAST)
-    same = read_policy(run[0] / "gallery" / "4096.safetensors")
-    assert all(np.array_equal(a, b) for a, b in zip(same.weights, last.weights, strict=True))
-
-
-def test_the_gallery_shows_the_first_evaluation_episode_of_each(run):
-    kept = [0, 1024, 2048, 4096]
-    policies = {steps: read_policy(run[0] / "gallery" / f"{steps}.safetensors") for steps in kept}
-    biped = Biped(SHORT.environment, 3)  # the fourth policy walks after the others
-    figure = gallery_figure(policies, 4000, biped, EVALUATION_SEED)
-    assert [ax.get_title(loc="left").partition(":")[0] for ax in figure.axes] == [
-        "after 0 steps (0 %)",
-        "after 1,024 steps (25 %)",
-        "after 2,048 steps (50 %)",
-        "after 4,096 steps (100 %)",
-    ]
-    biped.reset(np.arange(1), [EVALUATION_SEED])
-    hip = biped.measurement.base[0, :2]
-    legs = [line for line in figure.axes[0].lines if to_hex(line.get_color()) in (LEFT_COLOUR, RIGHT_COLOUR)]
-    assert len(legs) == 2
-    for line in legs:
-        points = line.get_xydata()
-        assert np.isnan(points[:, 0]).sum() == 4  # a figure each 0.3 s of the episode of 1 s, apart from each other
-        assert points[0] == pytest.approx(hip)  # as the episode begins
-        assert np.nanmin(points[:, 1]) == pytest.approx(0.0, abs=0.03)  # on the ground
-
-
-def test_the_curve_is_of_the_records_evaluations(run):
-    record = run[1]
-    returns, falls = curve_figure(record).axes
-    steps = [entry["timesteps"] for entry in record["evaluations"]]
-    mean = [entry["return_mean"] for entry in record["evaluations"]]
-    assert len(steps) > 3 and np.array_equal(returns.lines[0].get_xydata(), np.transpose([steps, mean]))
-    share = [100 * entry["falls"] / entry["episodes"] for entry in record["evaluations"]]
-    assert falls.lines[0].get_ydata().tolist() == share
-    assert returns.lines[1].get_xydata().tolist() == [[record["best"]["timesteps"], record["best"]["return_mean"]]]
-    for name in ("learning_curve.png", "gallery.png"):
-        with Image.open(run[0] / name) as picture:
-            assert len(picture.convert("L").getcolors() or []) > 20  # lines and letters, no blank page
 
 
 def test_tensorboard_knows_terms_stiffness_falls_and_configuration(run):
