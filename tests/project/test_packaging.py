@@ -239,6 +239,12 @@ def test_constraints_pin_every_requirement_inside_its_range():
         assert pins[canonicalize_name(requirement.name)] in requirement.specifier, line
 
 
+def test_commit_hooks_run_the_pinned_ruff():
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text()
+    (revision,) = re.findall(r"ruff-pre-commit\n +rev: v(\S+)", hooks)
+    assert f"\nruff=={revision} " in (ROOT / "constraints.txt").read_text()
+
+
 @pytest.mark.parametrize(
     ("room", "absent"),
     [
