@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, a file of tests on one: what its tests share is made once.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: help install walk predict test test-wheel test-sdist test-learners test-kills fuzz extremes check format bench feet clean
+.PHONY: help install walk predict test test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -21,6 +21,7 @@ help:
 	@echo "make test-kills   end 20 trainings several times each, resume them, and compare them with uninterrupted ones"
 	@echo "make fuzz     change files of every kind at random for ten minutes, and read them"
 	@echo "make extremes ten million extreme steps in drawn settings: is all finite, and the memory flat?"
+	@echo "make mutants  60 wrong signs, comparisons and indices: does a test fail? hours; goes on after a stop"
 	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
@@ -126,6 +127,10 @@ fuzz: install
 
 extremes: install
 	$(BIN)/python -m benchmarks.extreme_steps --steps 10000000
+
+# MUTANTS="--count 20 --seed 1": others; --help tells all.
+mutants: install
+	$(BIN)/python -m benchmarks.mutants $(MUTANTS)
 
 # What pyright and import-linter cannot see: the rooms behind an editable install's finder; and the names MuJoCo compiles in
 # (no stubs yet).
