@@ -1,10 +1,11 @@
-"""Returns of a policy on fixed seeds: what training evaluates from time to time, and searches pay by."""
+"""Returns of a policy on fixed seeds, as training evaluates it from time to time."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.walk import walk
 
 
 def evaluate_returns(
@@ -15,15 +16,12 @@ def evaluate_returns(
     Returns: (N,) return [-], length [s], and whether the episode ended in a fall.
     """
     episodes = biped.num_envs
-    returns, seconds, fell = np.zeros(episodes), np.zeros(episodes), np.zeros(episodes, bool)
-    active = np.ones(episodes, bool)
+    returns = np.zeros(episodes)
+    seconds = np.zeros(episodes)
+    fell = np.zeros(episodes, bool)
     biped.reset(np.arange(episodes), [seed + k for k in range(episodes)])
-    observation = biped.observe()
-    while active.any():
-        result = biped.step(policy(observation), active=active)
+    for active, result in walk(biped, policy):
         returns += np.where(active, result.reward, 0.0)
         seconds += np.where(active, biped.dt, 0.0)
         fell |= active & result.terminated
-        active &= ~(result.terminated | result.truncated)
-        observation = result.observation
     return returns, seconds, fell

@@ -4,6 +4,8 @@ It knows no browser and no clock: `live_view` shows it in real time, tests drive
 `Biped`; K is set by its actions, and read back from what acted in the simulation.
 """
 
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from math import ceil, inf, sqrt
 from typing import Any, Literal
@@ -13,6 +15,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
+from springfoot.envs.batch.walk import Walked, walk
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
 from springfoot.envs.control.reference_walk import reference_walk_at, rows, tabulated_speeds
@@ -52,6 +55,8 @@ ELSEWHERE = {
     "slope_range_deg": "the slider slope sets it",
 }
 """Settings that a live walk does not take, and why."""
+ENDLESS = sys.maxsize
+"""Steps of a walk that ends in a fall alone."""
 LYING_SECONDS = 1.0
 """Time for which a fallen body is shown before it walks anew [s]."""
 
@@ -188,10 +193,13 @@ class LiveSession:
             elif changed & {*OFFSETS} or (_offset(asked).any() and "speed" in changed):
                 self._biped = self._make(asked)
                 self._biped.restore(biped.state())
+                self._walk = walk(self._biped, self._action, ENDLESS)
             if "speed" in changed:
                 self._biped.command(np.arange(1), np.array([asked.speed]))
         except SpringfootError:
-            self.wishes, self._biped = before, biped
+            self.wishes = before
+            self._biped = biped
+            self._walk = walk(biped, self._action, ENDLESS)
             raise
 
     def push(self, newton: float) -> None:
@@ -203,7 +211,8 @@ class LiveSession:
         """Begin the walk anew, with the wishes as they are."""
         who = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
         self._biped.reset(np.arange(1), [self._seed], None, who)
-        self._observation, self._steps = self._biped.observe(), 0
+        self._walk: Iterator[Walked] = walk(self._biped, self._action, ENDLESS)
+        self._steps = 0
         self._push_steps = self._lying = 0
         still = np.zeros((len(SIDES), len(SPRINGS)))
         speed = float(self._biped.measurement.com_velocity[0, 0])
@@ -229,9 +238,10 @@ class LiveSession:
         self._biped.push(np.array([force]))
         ticks: list[Tick] = []
         self._biped.on_tick = ticks.append
-        result = self._biped.step(self._action())
-        self._observation, self._steps = result.observation, self._steps + 1
-        last, fell = ticks[-1], str(result.reasons[0])
+        _, result = next(self._walk)
+        self._steps += 1
+        last = ticks[-1]
+        fell = str(result.reasons[0])
         self.frame = Frame(
             time=self._steps * self.dt,
             stiffness=last.stiffness[0][:, FEET],
@@ -252,9 +262,9 @@ class LiveSession:
         place = (load[..., None] * contact).sum(axis=1) / total
         return np.concatenate([place, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
-    def _action(self) -> NDArray:
+    def _action(self, observation: NDArray) -> NDArray:
         """(1, 4) the action of K as it is asked; the policy's own, untouched, where K is left to it."""
-        own = np.asarray(self._policy(self._observation), float).reshape(len(SIDES), len(SPRINGS))
+        own = np.asarray(self._policy(observation), float).reshape(len(SIDES), len(SPRINGS))
         settings, body, wishes = self._settings, self.body, self.wishes
         residual = settings.action_mode == "residual"
         schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(own)

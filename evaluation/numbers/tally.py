@@ -64,6 +64,8 @@ class StrideTally:
     """Foot that makes each step: 0 the left one swings and lands at the step's end, 1 the right one."""
     stride_sides: list[int] = field(default_factory=list)
     """Leg of each stride, 0 left, 1 right."""
+    stride_time: list[float] = field(default_factory=list)
+    """Of each stride [s]."""
     toe_off: list[float] = field(default_factory=list)
     """Of each stride [%]."""
     vertical_max: list[float] = field(default_factory=list)
@@ -86,17 +88,17 @@ def tally_strides(recording: Recording) -> StrideTally:
     for episode, ticks in enumerate(recording.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
         if ticks:
-            _add_episode(tally, series, body, (begin + WARM_UP, end), bool(fell[episode]))
+            add_episode(tally, series, body, (begin + WARM_UP, end), bool(fell[episode]))
             tally.at_rest += not fell[episode] and score.at_rest(
                 series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
             )
     return tally
 
 
-def _add_episode(
-    tally: StrideTally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool
+def add_episode(
+    tally: StrideTally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool = False
 ) -> None:
-    """`steady` is the time [s] the numbers are taken from."""
+    """Add one episode's strides and steps; `steady` is the time [s] from which they are taken."""
     weight = body.mass * GRAVITY
     com = series["com"]
     begin, end = (round(min(time / TICK, len(com))) for time in steady)
@@ -118,6 +120,7 @@ def _add_episode(
         tally.both.add(curves)
         tally.strides_of_falls += fell * len(strides)
         tally.stride_sides += [side] * len(strides)
+        tally.stride_time += list(end - heel_strike)
         tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
         tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, end) / body.mass)
         tally.energy += list(_energies(series["energy"], heel_strike, end) / body.mass)

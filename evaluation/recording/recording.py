@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from springfoot.agents.policies.baselines import PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
+from springfoot.envs.batch.walk import walk
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.reference_walk import reference_walk_at
@@ -22,6 +24,7 @@ from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot import Feet
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.simulation import MjModel
+from springfoot.envs.settings.feet import feet_of
 from springfoot.envs.settings.settings import (
     DRAWN_SETTINGS,
     BipedSettings,
@@ -187,18 +190,10 @@ def record(
         raise SpringfootError(
             f"a recording is of one body at one speed in one world: {', '.join(DRAWN_SETTINGS)} must be None"
         )
-    seeds, other = range(seed, seed + episodes), (model, legs, None)
-    ticks, returns, reason, series = walk_all(policy, settings, {}, seeds, threads, other, progress)
-    return Recording(
-        policy=name,
-        settings=settings,
-        seed=seed,
-        ticks=ticks,
-        returns=returns,
-        fall_reason=reason,
-        **planned_course(reference_walk_at(settings, settings.speed).plan),
-        series=series,
-    )
+    seeds = range(seed, seed + episodes)
+    kept = record_all(policy, settings, seeds, threads=threads, model=model, legs=legs, progress=progress)
+    course = planned_course(reference_walk_at(settings, settings.speed).plan)
+    return Recording(policy=name, settings=settings, seed=seed, **kept.of(slice(None)), **course)
 
 
 def record_each(
@@ -221,76 +216,145 @@ def record_each(
             f"a recording is at one speed: speed_interval must be None, got {settings.speed_interval}"
         )
     columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
-    given, episodes = dict(zip(DRAWN, columns, strict=True)), len(columns[0])
+    given = dict(zip(DRAWN, columns, strict=True))
+    episodes = len(columns[0])
     seeds = range(seed, seed + episodes)
-    ticks, returns, reason, series = walk_all(policy, settings, given, seeds, threads, (None, None, None), progress)
+    kept = record_all(policy, settings, seeds, given=given, threads=threads, progress=progress)
     recordings = []
     for index in range(episodes):
-        own = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
-        alone, row = replace(settings, **own), slice(index, index + 1)
-        recordings.append(
-            Recording(
-                policy=name,
-                settings=alone,
-                seed=seed + index,
-                ticks=ticks[row],
-                returns=returns[row],
-                fall_reason=reason[row],
-                **planned_course(reference_walk_at(alone, alone.speed).plan),
-                series={key: values[row] for key, values in series.items()},
-            )
-        )
+        body = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
+        alone = replace(settings, **body)
+        course = planned_course(reference_walk_at(alone, alone.speed).plan)
+        rows = slice(index, index + 1)
+        recordings.append(Recording(policy=name, settings=alone, seed=seed + index, **kept.of(rows), **course))
     return recordings
 
 
-def walk_all(
+def record_feet(
     policy: PolicyFunction,
     settings: BipedSettings,
-    given: Mapping[str, NDArray],
+    right_feet: Sequence[str | dict[str, Any]],
+    *,
+    name: str,
+    episodes: int = 20,
+    seed: int = 0,
+    threads: int = 2,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> list[Recording]:
+    """As `record`, the same episodes for each of the `right_feet`, settings of feet, side by side; a recording each."""
+    each = [replace(settings, right_foot=foot) for foot in right_feet]
+    feet = [feet_of(own.left_foot, own.right_foot) for own in each for _ in range(episodes)]
+    seeds = [seed + episode for _ in each for episode in range(episodes)]
+    planned = planned_course(reference_walk_at(settings, settings.speed).plan)
+    kept = record_all(policy, settings, seeds, threads=threads, feet=feet, progress=progress)
+    recordings = []
+    for index, own in enumerate(each):
+        rows = slice(index * episodes, (index + 1) * episodes)
+        recordings.append(Recording(policy=name, settings=own, seed=seed, **kept.of(rows), **planned))
+    return recordings
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Episodes:
+    """The ticks, returns, falls and series of E episodes, as in a `Recording`."""
+
+    ticks: NDArray
+    returns: NDArray
+    fall_reason: NDArray
+    series: dict[str, NDArray]
+    length: int
+    """Most ticks of an episode."""
+
+    @classmethod
+    def empty(cls, count: int, length: int) -> "Episodes":
+        """Return room for `count` episodes of at most `length` ticks."""
+        return cls(
+            ticks=np.zeros(count, int),
+            returns=np.zeros(count),
+            fall_reason=np.full(count, "", dtype="U64"),
+            series={REWARD: np.full((count, length, len(TERMS)), np.nan, np.float32)},
+            length=length,
+        )
+
+    def of(self, rows: slice) -> dict[str, Any]:
+        """Return the fields of a `Recording` of some of the episodes."""
+        return {
+            "ticks": self.ticks[rows],
+            "returns": self.returns[rows],
+            "fall_reason": self.fall_reason[rows],
+            "series": {name: values[rows] for name, values in self.series.items()},
+        }
+
+    def episode(self, index: int) -> dict[str, NDArray]:
+        """Return name -> (T, ...) float64 series of one episode, without the samples after its end."""
+        return {name: values[index, : self.ticks[index]].astype(float) for name, values in self.series.items()}
+
+
+def record_walk(
+    biped: Biped,
+    act: PolicyFunction,
+    kept: Episodes,
+    rows: slice = slice(None),
+    steps: int | None = None,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> None:
+    """Walk the episodes `rows` of `kept` in `biped`, which was reset, and keep every tick of them.
+
+    Everything that is measured of a walk is measured of what this keeps. `act` and `steps` as for
+    `springfoot.envs.batch.walk.walk`; `progress` is told the simulated time [s] after every step.
+    """
+    ticks = kept.ticks[rows]
+
+    def keep(tick: Tick) -> None:
+        index = int(ticks.max())
+        for name, take in SERIES.items():
+            value = take(tick)
+            if name not in kept.series:
+                kept.series[name] = np.full((len(kept.ticks), kept.length, *value.shape[1:]), np.nan, np.float32)
+            shown = tick.active.reshape(-1, *[1] * (value.ndim - 1))
+            kept.series[name][rows, index] = np.where(shown, value, np.nan)
+        ticks[:] += tick.active
+
+    biped.on_tick = keep
+    begun = 0
+    for active, result in walk(biped, act, steps):
+        ended = int(ticks.max())
+        kept.series[REWARD][rows, begun:ended][active] = result.values[active, None, _TERMS]
+        kept.returns[rows][active] += result.reward[active]
+        fell = active & result.terminated
+        kept.fall_reason[rows][fell] = result.reasons[fell]
+        progress(float(active.sum()) * biped.dt)
+        begun = ended
+    biped.on_tick = None
+
+
+def record_all(
+    policy: PolicyFunction,
+    settings: BipedSettings,
     seeds: Sequence[int],
-    threads: int,
-    other: tuple[MjModel | None, LegConstants | None, Sequence[Feet] | None],
-    progress: Callable[[float], object],
-) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
-    """Ticks, returns, fall reasons and series of E episodes of `seeds`, as in `Recording`; `given` as in `Biped.reset`;
-    `other` model and leg constants as in `record`, and the feet of each episode."""
-    (model, legs, feet), episodes = other, len(seeds)
-    require_recordable(settings, episodes)
+    *,
+    given: Mapping[str, NDArray] = MappingProxyType({}),
+    threads: int = 2,
+    model: MjModel | None = None,
+    legs: LegConstants | None = None,
+    feet: Sequence[Feet] | None = None,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> Episodes:
+    """Walk one episode for each of E `seeds`, `BATCH` of them side by side.
+
+    `given` as in `Biped.reset`, `model` and `legs` as in `record`, `feet` those of each episode.
+    """
+    require_recordable(settings, len(seeds))
     step = settings.step_seconds
-    length = round(step / TICK) * ceil(round(settings.episode_seconds / step, 6))
-    ticks, returns = np.zeros(episodes, int), np.zeros(episodes)
-    reason = np.full(episodes, "", dtype="U64")
-    series: dict[str, NDArray] = {REWARD: np.full((episodes, length, len(TERMS)), np.nan, np.float32)}
-    for first in range(0, episodes, BATCH):
-        rows = slice(first, min(first + BATCH, episodes))
+    kept = Episodes.empty(len(seeds), round(step / TICK) * ceil(round(settings.episode_seconds / step, 6)))
+    for first in range(0, len(seeds), BATCH):
+        rows = slice(first, min(first + BATCH, len(seeds)))
         count = rows.stop - first
         worn = feet and feet[rows]
         biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs], feet=worn)
         biped.reset(np.arange(count), list(seeds[rows]), None, {k: v[rows] for k, v in given.items()})
-
-        def keep(tick: Tick, rows: slice = rows) -> None:
-            index = int(ticks[rows].max())
-            for key, take in SERIES.items():
-                value = take(tick)
-                if key not in series:
-                    series[key] = np.full((episodes, length, *value.shape[1:]), np.nan, np.float32)
-                series[key][rows, index] = np.where(tick.active.reshape(-1, *[1] * (value.ndim - 1)), value, np.nan)
-            ticks[rows] += tick.active
-
-        biped.on_tick = keep
-        active = np.ones(count, bool)
-        observation = biped.observe()
-        while active.any():
-            begun = int(ticks[rows].max())
-            result = biped.step(policy(observation), active=active)
-            observation = result.observation
-            series[REWARD][rows, begun : int(ticks[rows].max())][active] = result.values[active, None, _TERMS]
-            returns[rows][active] += result.reward[active]
-            fell = active & result.terminated
-            reason[rows][fell] = result.reasons[fell]
-            progress(float(active.sum()) * biped.dt)
-            active &= ~(result.terminated | result.truncated)
-    return ticks, returns, reason, series
+        record_walk(biped, policy, kept, rows, progress=progress)
+    return kept
 
 
 def planned_course(plan: ComPlan) -> dict[str, NDArray]:

@@ -26,8 +26,7 @@ from springfoot.envs.settings.settings import body_of
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording
-from springfoot.evaluation.recording.recording_feet import record_feet
+from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record_feet
 from springfoot.files.writing import csv_text
 
 from ..base.study import Answer, OnProgress, WalkingStudy

@@ -10,13 +10,13 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.physics.model import HIP, KNEE, RIGHT, SIDES, TOE
+from springfoot.envs.physics.model import RIGHT
 from springfoot.envs.settings.settings import BipedSettings
-from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+from springfoot.evaluation.recording.recording import TICK
+from springfoot.gait.people.cycle import PERCENT
 
 from ..searches.leg_cost import FALL_COST, UNEVENNESS
-from ..searches.leg_walks import SETTLED, series, walk
+from ..searches.leg_walks import SETTLED, measured, walk
 from .person_search import Person
 
 LEVEL, PUSHED = 2, 3
@@ -55,51 +55,49 @@ def cost(
     legs, right, feet = [p.sound for p in people], [p.other for p in people], [p.feet for p in people]
     total = np.zeros(len(people))
     seeds = [seed + index % LEVEL for index in range(LEVEL * len(people))]
-    missing, biped, ticks = walk(settings, legs, seeds, threads, foreign=(), right=right, feet=feet)
-    record = series(biped, ticks)
-    for index, lost in enumerate(missing):
+    walked = walk(settings, legs, seeds, threads, foreign=(), right=right, feet=feet)
+    for index, lost in enumerate(walked.missing):
         if lost > 0:
             total[index // LEVEL] += lost * 3 * FALL_COST / LEVEL
         else:
-            missed = misses(record, index, biped, bend, bend_weight)
+            missed = misses(walked.episode(index), walked.biped, bend, bend_weight)
             total[index // LEVEL] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / LEVEL
     pushed = replace(settings, push_newton=push, push_interval=PUSH_INTERVAL)
     seeds = [seed + index % PUSHED for index in range(PUSHED * len(people))]
-    missing = walk(pushed, legs, seeds, threads, foreign=(), watched=False, right=right, feet=feet)[0]
+    missing = walk(pushed, legs, seeds, threads, foreign=(), right=right, feet=feet).missing
     return total + FALL_COST * missing.reshape(len(people), PUSHED).mean(1)
 
 
 def misses(
-    record: dict[str, NDArray], index: int, biped: Biped, bend: float | None = None, bend_weight: float = 1.0
+    series: dict[str, NDArray], biped: Biped, bend: float | None = None, bend_weight: float = 1.0
 ) -> NDArray | None:
-    """What walk `index` misses in strides that begin after `SETTLED`, in tolerances; None if it takes too few."""
-    human, mass, tick = biped.human, biped.body.mass, Biped.tick_dt
-    first = round(SETTLED / tick)
-    com, ankle = record["com"][:, index, 0], record["ankle"][:, index]
+    """Return the distance of one walk from a good one, number by number, in tolerances.
+
+    The numbers are those of an evaluation, of the strides that begin after `SETTLED`; None if they are too few.
+    """
+    tally = measured(series, biped)
+    if tally is None:
+        return None
+    human = biped.human
+    first = round(SETTLED / TICK)
+    sides = np.array(tally.stride_sides)
+    landed = np.array(tally.step_sides)
     off: dict[str, list[float]] = {name: [] for name in TOLERANCE}
-    step_length, stance = [], []
-    for side in range(len(SIDES)):
-        force = record["force"][:, index, side, 1]
-        strides = find_contacts(force, tick, CONTACT_THRESHOLD_BW * mass * GRAVITY).strides(SETTLED)
-        if len(strides) < 2:
-            return None
-        angle = record["angle"][:, index, side]
-        joints = np.column_stack([angle[:, HIP] - record["pitch"][:, index], angle[:, KNEE], angle[:, TOE]])
-        curves = on_percent(joints, strides[:, 0], strides[:, 2], tick).mean(0)
+    step_length = []
+    stance = []
+    for side, curves in enumerate(tally.feet):
         if side == RIGHT and bend is not None:
-            off["bend"].append(bend_weight * max(float(np.ptp(curves[:, 2])) - bend, 0.0))
-        for name, curve in zip(("thigh", "knee"), curves.T, strict=False):
+            toe = np.radians(curves.mean("mtp_dorsiflexion_deg"))
+            off["bend"].append(bend_weight * max(float(np.ptp(toe)) - bend, 0.0))
+        for name in ("thigh", "knee"):
+            curve = np.radians(curves.mean(f"{name}_flexion_deg"))
             off[name].append(float(np.sqrt(np.mean((curve - human.mean(name, PERCENT / 100)) ** 2))))
-        begin, leave, end = np.floor(strides / tick).astype(int).T
-        peaks = [force[a:b].max() / (mass * GRAVITY) for a, b in zip(begin, end, strict=True)]
-        off["force_peak"].append(max(float(np.mean(peaks)) - MOST_PEAK, 0.0))
-        step_length.append(float(np.mean(ankle[begin, side] - ankle[begin, 1 - side])))
-        stance.append(float(np.mean((leave - begin) / (end - begin))))
-    way = com[-1] - com[first]
-    off["speed"] = [way / ((len(com) - 1 - first) * tick) - biped.settings.speed]
+        off["force_peak"].append(max(float(np.mean(np.array(tally.vertical_max)[sides == side])) - MOST_PEAK, 0.0))
+        step_length.append(float(np.mean(np.array(tally.step_length)[landed == side])))
+        stance.append(float(np.mean(np.array(tally.toe_off)[sides == side])) / 100)
+    off["speed"] = [tally.speed[0] - biped.settings.speed]
     for name, (left, right) in (("step_length", step_length), ("stance", stance)):
         off[name] = [2 * (right - left) / max(abs(right + left), 0.1)]
-    work = record["work"][first:, index].reshape(len(com) - first, -1, 2)[..., 0].sum()
-    off["work"] = [max(float(work) / mass / max(way, 0.1) - MOST_WORK, 0.0)]
-    off["pitch"] = [float(np.sqrt(np.mean(record["pitch"][first:, index] ** 2)))]
+    off["work"] = [max(tally.work / biped.body.mass / max(tally.distance, 0.1) - MOST_WORK, 0.0)]
+    off["pitch"] = [float(np.sqrt(np.mean(series["base"][first:, 2] ** 2)))]
     return np.concatenate([np.array(values) / TOLERANCE[name] for name, values in off.items()])

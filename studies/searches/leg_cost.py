@@ -19,14 +19,14 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.reference_walk import FED
 from springfoot.envs.control.standing import SLOW_SPEED
-from springfoot.envs.physics.model import ANKLE, HIP, JOINTS, KNEE, SIDES, TOE
 from springfoot.envs.settings.settings import BipedSettings
-from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
+from springfoot.evaluation.numbers.tally import StrideTally
+from springfoot.evaluation.recording.recording import planned_course
+from springfoot.gait.people.cycle import PERCENT
 from springfoot.gait.people.human import HumanGait
-from springfoot.gait.people.scores import force_features, stride_work, travel
+from springfoot.gait.people.scores import force_features, stride_work
 
-from .leg_walks import FOREIGN, SETTLED, foreign_springs, series, speed_of, walk
+from .leg_walks import FOREIGN, foreign_springs, measured, walk
 from .walk_effort import effort_price
 
 Pays = Literal["likeness", "effort"]
@@ -36,14 +36,23 @@ SCHEDULED, PUSHED, SET_OFF = 2, 3, 4
 """Walks of each candidate with the schedule: undisturbed, pushed, starting to walk."""
 REFINED = ((0.25, 7), (0.75, 8), (0.25, 9))
 """Walks of `all_misses`: stride phase at the start, seed."""
+RADIAN = np.pi / 180
 UNEVENNESS = 0.002
 """Of the ground [m]; on level ground a walk locks to its decisions every 20 ms, and misses jump with the constants."""
 REFINED_SECONDS, REFINED_SETTLED = 10.0, 4.0
 """Their length, and when the strides that are measured begin [s]."""
-CURVES = ("thigh", "knee", "ankle", "toe", "grf_vertical", "grf_forward", "hip_moment", "knee_moment", "ankle_moment")
-"""People's curves that a walk is held against."""
-PLANNED = ("com_x", "com_z", "com_speed")
-"""What of the CoM is held against the plan."""
+CURVES = {
+    "thigh": ("thigh_flexion_deg", RADIAN),
+    "knee": ("knee_flexion_deg", RADIAN),
+    "ankle": ("ankle_dorsiflexion_deg", RADIAN),
+    "toe": ("mtp_dorsiflexion_deg", RADIAN),
+    "grf_vertical": ("grf_vertical_bw", 1.0),
+    "grf_forward": ("grf_forward_bw", 1.0),
+    "hip_moment": ("hip_moment_Nm_per_kg", 1.0),
+    "knee_moment": ("knee_moment_Nm_per_kg", 1.0),
+    "ankle_moment": ("ankle_moment_Nm_per_kg", 1.0),
+}
+"""People's curves that a walk is held against -> the evaluation's curve of the same, and its unit in people's."""
 TOLERANCE = {
     "thigh": np.deg2rad(1.0),
     "knee": np.deg2rad(1.9),
@@ -104,10 +113,10 @@ def cost(
     settings = replace(settings, unevenness_m=UNEVENNESS)
     total = np.zeros(len(candidates))
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
-    missing, biped, ticks = walk(settings, candidates, seeds, threads, ease, springs)
-    records = series(biped, ticks)
+    walked = walk(settings, candidates, seeds, threads, ease, springs)
+    missing = walked.missing
+    speed = walked.speed
     scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
-    speed = speed_of(records)
     for index in range(walks * len(candidates)):
         candidate = index // walks
         if not scheduled[index]:
@@ -115,36 +124,37 @@ def cost(
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
-            paid = _paid(records, index, biped, pays, impact)
+            paid = _paid(walked.episode(index), walked.biped, pays, impact)
             total[candidate] += (FALL_COST if paid is None else paid) / SCHEDULED
     if settings.equilibrium == "planned" and settings.guide == "people":
         lines = replace(settings, **own_settings("thesis", settings))
-        missing, biped, ticks = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
-        speed = speed_of(series(biped, ticks))
-        total += [foreign * _paid_with_foreign(*each, settings) for each in zip(missing, speed, strict=True)]
+        walked = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
+        pairs = zip(walked.missing, walked.speed, strict=True)
+        total += [foreign * _paid_with_foreign(missing, speed, settings) for missing, speed in pairs]
     if settings.speed <= SLOW_SPEED:  # the slowest set alone carries a body off that starts standing
         seeds = [seed + index % SET_OFF for index in range(SET_OFF * len(candidates))]
         standing = replace(settings, start="standing")
-        missing = walk(standing, candidates, seeds, threads, foreign=(), watched=False)[0]
+        missing = walk(standing, candidates, seeds, threads, foreign=()).missing
         total += FALL_COST * missing.reshape(len(candidates), SET_OFF).mean(1)
     if push == 0:
         return total
     pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(pushed_springs)
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
-    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs, watched=False)[0]
+    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs).missing
     missing = missing.reshape(len(candidates), walks)
     fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
     return total + FALL_COST * fallen
 
 
-def _paid(records: dict[str, NDArray], index: int, biped: Biped, pays: Pays, impact: float) -> float | None:
-    """What walk `index` pays; None if it takes too few strides."""
-    missed = misses(records, index, biped, SETTLED)
-    if missed is None:
+def _paid(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -> float | None:
+    """Return the cost of one walk that did not fall; None if it takes too few strides."""
+    tally = measured(series, biped)
+    if tally is None:
         return None
+    missed = misses(tally, biped)
     if pays == "likeness":
         return float(np.linalg.norm(missed))
-    return effort_price(records, index, biped, SETTLED, missed, impact)
+    return effort_price(series, tally, biped, missed, impact)
 
 
 def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:
@@ -158,80 +168,60 @@ def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], thre
     found: list[list[NDArray] | None] = [[] for _ in candidates]
     for start, seed in REFINED:
         own = replace(settings, start=start, unevenness_m=UNEVENNESS)
-        seeds = [seed] * len(candidates)
-        missing, biped, ticks = walk(own, candidates, seeds, threads, foreign=(), seconds=REFINED_SECONDS)
-        records = series(biped, ticks)
+        walked = walk(own, candidates, [seed] * len(candidates), threads, foreign=(), seconds=REFINED_SECONDS)
+        missing = walked.missing
         for index, own_misses in enumerate(found):
-            missed = None if missing[index] > 0 else misses(records, index, biped, REFINED_SETTLED)
-            if missed is None or own_misses is None:
+            fell = missing[index] > 0
+            tally = None if fell else measured(walked.episode(index), walked.biped, REFINED_SETTLED)
+            if tally is None or own_misses is None:
                 found[index] = None
             else:
-                own_misses.append(missed / np.sqrt(len(REFINED)))
+                own_misses.append(misses(tally, walked.biped) / np.sqrt(len(REFINED)))
     return [None if each is None else np.concatenate(each) for each in found]
 
 
-def misses(record: dict[str, NDArray], index: int, biped: Biped, settled: float) -> NDArray | None:
-    """What walk `index` misses in strides that begin after `settled` [s], in tolerances; None if it takes too few."""
-    human, weight, tick = biped.human, biped.body.mass * GRAVITY, Biped.tick_dt
+def misses(tally: StrideTally, biped: Biped) -> NDArray:
+    """Return the distance of a walk from people and from its plan, number by number, in tolerances.
+
+    The numbers are those of an evaluation (`springfoot.evaluation.numbers`).
+    """
+    human, both = biped.human, tally.both
     phase = PERCENT / 100
-    curves, periods, supports, travels = [], [], [], []
-    off_plan = record["com"][:, index] - record["planned_com"][:, index]
-    for side in range(len(SIDES)):
-        angle, moment, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
-        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
-        if len(strides) < 2:
-            return None
-        thigh = angle[:, HIP] - record["pitch"][:, index]
-        series = np.column_stack(
-            [
-                *(thigh, angle[:, KNEE], angle[:, ANKLE], angle[:, TOE]),
-                *(force[:, 1] / weight, force[:, 0] / weight),
-                *(-moment[:, joint] / biped.body.mass for joint in (HIP, KNEE, ANKLE)),
-                off_plan,
-                np.gradient(record["com"][:, index, 0], tick),
-                record["cop"][:, index] - record["ankle"][:, index, side],
-                record["work"][:, index, side].reshape(len(angle), -1) / tick / biped.body.mass,
-            ]
-        )
-        curves.append(on_percent(series, strides[:, 0], strides[:, 2], tick))
-        periods.append(strides[:, 2] - strides[:, 0])
-        supports.append(strides[:, 1] - strides[:, 0] - 0.5 * periods[-1])
-        for start, leave, _ in np.floor(strides / tick).astype(int):
-            sole = slice(start, leave + 1), index, side
-            travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
-    stride = np.concatenate(curves)
-    mean, period = stride.mean(0), np.mean(np.concatenate(periods))
+    mean = {curve: both.mean(column) * unit for curve, (column, unit) in CURVES.items()}
     theirs, their_work, band = _people(human)
-    off: dict[str, Any] = dict(zip(CURVES, (mean[:, : len(CURVES)] - theirs).T, strict=True))
-    speed = mean[:, len(CURVES) + 2].copy()
-    planned = np.array([0.0, 0.0, 1.0]) * biped.plan.com_velocity((2 * phase) % 1.0)[0][:, None]
-    off_com = (mean[:, len(CURVES) : len(CURVES) + len(PLANNED)] - planned).T
-    off |= dict(zip(PLANNED, off_com, strict=True))
-    step = phase < 0.5
-    off["cop"] = mean[step, len(CURVES) + len(PLANNED)] - biped.plan.zmp(2 * phase[step])
+    off: dict[str, Any] = {curve: values - theirs[curve] for curve, values in mean.items()}
+    course = planned_course(biped.plan)
+    planned_speed = biped.plan.com_velocity(np.minimum(phase, 1 - 1e-9))[0]
+    off["com_x"] = tally.com.mean("x") - course["plan_com"][:, 0]
+    off["com_z"] = tally.com.mean("z") - course["plan_com"][:, 1]
+    off["com_speed"] = tally.com.mean("vx") - planned_speed
+    off["cop"] = np.nan_to_num(tally.cop.mean("x") - course["plan_zmp"])[:-1]  # at 100 % the plan is at the next foot
     off["beyond_sd"] = _beyond(off["hip_moment"], band)
     off = {name: values / np.sqrt(len(values)) for name, values in off.items()}
-    late = phase > LATE_SWING, CURVES.index("hip_moment")
-    off["late_hip_moment"] = np.maximum(mean[late] - theirs[late].max() - 0.1, 0.0)
-    off["speed"] = speed.mean() - biped.settings.speed
-    off["period"] = period / (2 * biped.plan.step_time) - 1
-    off["double_support"] = np.mean(np.concatenate(supports)) - (human.toe_off - 0.5) * human.stride_time
-    own, people = (astuple(force_features(*each[:, 4:6].T)) for each in (mean, theirs))
-    peaks, fore_aft = slice(0, 3), slice(3, 5)
-    off["vertical"], off["fore_aft"] = (
-        _beyond(np.subtract(own[part], people[part]), band) for part, band in ((peaks, 0.05), (fore_aft, 0.03))
-    )
-    ankle = CURVES.index("ankle_moment")
-    off["peak_moment"] = _beyond(mean[:, ankle].max() - theirs[:, ankle].max(), 0.07)
-    work = np.abs(mean[:-1, len(CURVES) + len(PLANNED) + 1 :].mean(0).reshape(len(JOINTS), 2)) * period
+    late = phase > LATE_SWING
+    off["late_hip_moment"] = np.maximum(mean["hip_moment"][late] - theirs["hip_moment"][late].max() - 0.1, 0.0)
+    off["speed"] = mean_speed(tally) - biped.settings.speed
+    off["period"] = np.mean(tally.stride_time) / biped.plan.stride_time - 1
+    off["double_support"] = np.mean(tally.double_support) - (human.toe_off - 0.5) * human.stride_time
+    features = astuple(force_features(mean["grf_vertical"], mean["grf_forward"]))
+    people = astuple(force_features(theirs["grf_vertical"], theirs["grf_forward"]))
+    for name, part, allowed in (("vertical", slice(0, 3), 0.05), ("fore_aft", slice(3, 5), 0.03)):
+        off[name] = _beyond(np.subtract(features[part], people[part]), allowed)
+    off["peak_moment"] = _beyond(mean["ankle_moment"].max() - theirs["ankle_moment"].max(), 0.07)
+    work = np.abs(np.mean(tally.joint_work, axis=0))
     off["work"] = _beyond(work[: len(their_work)] - their_work, 0.03)
-    ankle_r = np.corrcoef(mean[:, CURVES.index("ankle")], theirs[:, CURVES.index("ankle")])[0, 1]
+    ankle_r = np.corrcoef(mean["ankle"], theirs["ankle"])[0, 1]
     off["ankle_r"] = max(0.985 - ankle_r, 0.0)
     off["effort"] = max(work[:, 0].sum() - 1.2 * their_work[:, 0].sum(), 0.0)
-    off["force_peak"] = np.mean(np.maximum(stride[..., 4].max(1) - theirs[:, 4].max() - 0.07, 0.0))
-    off["travel"] = np.mean(travels)
-    off["unsteady"] = np.sqrt(np.mean(stride[..., 4].var(0)))
+    off["force_peak"] = np.mean(np.maximum(np.array(tally.vertical_max) - theirs["grf_vertical"].max() - 0.07, 0.0))
+    off["travel"] = np.mean(tally.travel)
+    off["unsteady"] = np.sqrt(np.mean(both.sd("grf_vertical_bw") ** 2))
     return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
+
+
+def mean_speed(tally: StrideTally) -> float:
+    """Return the mean forward speed of the CoM over whole steps [m/s]."""
+    return float(tally.com.mean("vx")[:-1].mean())
 
 
 def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
@@ -240,10 +230,10 @@ def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
 
 
 @lru_cache(maxsize=16)
-def _people(human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
-    """(101, len(CURVES)) people's mean curves over the stride, (3, 2) positive and negative work of their hip, knee and
-    ankle in it [J/kg], from their mean power, and (101,) 1.9 SD of their hip moment."""
-    curves = np.stack([human.mean(name, PERCENT / 100) for name in CURVES], -1)
+def _people(human: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
+    """Return what walks are held against: people's mean curves (101,) by the names of `CURVES`, the positive and
+    negative work of their hip, knee and ankle (3, 2) [J/kg], from their mean power, and 1.9 SD of their hip moment."""
+    curves = {name: human.mean(name, PERCENT / 100) for name in CURVES}
     power = [human.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
     work = [np.concatenate(stride_work(each, np.array([human.stride_time]))) for each in power]
     return curves, np.stack(work), 1.9 * human.sd("hip_moment", PERCENT / 100)

@@ -1,24 +1,25 @@
-"""Walks of the search for leg constants: candidates side by side in one batch, with their own schedule and with springs
-that nobody tuned for them, and what was seen of each tick."""
+"""Walks of the search for leg constants: candidates side by side in one batch, recorded as an evaluation records.
+
+They walk with their own schedule and with springs that nobody tuned for them.
+"""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from springfoot.agents.policies.baselines import CONSTANT_STIFFNESS
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, foot_curves, plateau_curve
 from springfoot.envs.control.foot_springs import action_of, stiffness_ranges
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.physics.foot import Feet
-from springfoot.envs.physics.measurement import Measurement
-from springfoot.envs.physics.model import contact_material
 from springfoot.envs.settings.settings import BipedSettings
+from springfoot.evaluation.numbers.tally import StrideTally, add_episode
+from springfoot.evaluation.recording.recording import TICK, Episodes, record_walk
 from springfoot.gait.body.body import Body
 from springfoot.gait.body.tissue import TOE_STIFFNESS
 
@@ -50,29 +51,24 @@ def walk(
     ease: float = 0.0,
     foreign: Sequence[NDArray] = FOREIGN,
     seconds: float = SECONDS,
-    watched: bool = True,
     right: Sequence[LegConstants] | None = None,
     feet: Sequence[Feet] | None = None,
-) -> tuple[NDArray, Biped, list[Tick]]:
+) -> "Walks":
     """Walk candidates equally often, one walk for each of `seeds`, at an equilibrium that is the share `ease` planned.
 
     The last walks of each have the stiffnesses `foreign`, the others the schedule. `right` are the constants of each
     candidate's right leg, if it has its own, and `feet` each candidate's, in place of those of the settings.
-
-    Returns how much of the walk a fall took (C * walks,): 0 without a fall, 1 at once, 1/3 at the end, and standing
-    still counts as one; the core; and, if `watched`, every tick.
     """
-    num, walks = len(seeds), len(seeds) // len(candidates)
+    num = len(seeds)
+    walks = num // len(candidates)
     variant = np.repeat(np.arange(len(candidates)), walks)
     rest = _eased(settings, candidates, ease) if ease else None
     worn = feet and [feet[index] for index in variant.tolist()]
     biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest, feet=worn, right_legs=right)
     biped.reset(np.arange(num), seeds)
     role = np.tile(np.arange(walks), len(candidates)) - (walks - len(foreign))
-    ticks: list[Tick] = []
-    biped.on_tick = ticks.append if watched else None
-    active, walked = np.ones(num, bool), np.zeros(num)
-    for _ in range(round(seconds / biped.dt)):
+
+    def act(_observation: NDArray) -> NDArray:
         if settings.action_mode == "residual":
             action = np.zeros((num, 2, 2))
         else:
@@ -80,38 +76,58 @@ def walk(
         for index, stiffness in enumerate(foreign):
             place = (biped.leg_phase[role == index] * len(GRID)).astype(int)
             action[role == index] = action_of(stiffness[place], settings, biped.body)
-        result = biped.step(action.reshape(num, -1), active)
-        walked = np.where(active, biped.measurement.com[:, 0] / (settings.speed * seconds), walked)
-        active &= ~result.terminated
-        if not active.any():
-            break
-    return np.where(active & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0)), biped, ticks
+        return action.reshape(num, -1)
+
+    steps = round(seconds / biped.dt)
+    episodes = Episodes.empty(num, steps * biped.windows_per_step)
+    record_walk(biped, act, episodes, steps=steps)
+    return Walks(biped=biped, episodes=episodes, seconds=seconds)
 
 
-def series(biped: Biped, ticks: Sequence[Tick]) -> dict[str, NDArray]:
-    """The ticks as arrays (T, N, ...)."""
-    measured = [tick.measurement for tick in ticks]
-    return {
-        "com": np.stack([m.com for m in measured]),
-        "planned_com": np.stack([tick.com_reference for tick in ticks]),
-        "phase": np.stack([tick.phase for tick in ticks]),
-        "material": np.stack([contact_material(biped.body, m.contact, m.base, m.angle) for m in measured]),
-        "load": np.stack([m.force[..., 1] for m in measured]),
-        "pitch": np.stack([m.base[:, 2] for m in measured]),
-        "angle": np.stack([m.angle for m in measured]),
-        "moment": np.stack([tick.work.torque for tick in ticks]),
-        "force": np.stack([m.force.sum(2) for m in measured]),
-        "work": np.stack([tick.work.work for tick in ticks]),
-        "cop": np.stack([_centre_of_pressure(m) for m in measured]),
-        "ankle": np.stack([m.ankle[..., 0] for m in measured]),
-    }
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Walks:
+    """N walks of a search, recorded and measured as an evaluation records and measures."""
+
+    biped: Biped
+    """The batch that walked."""
+    episodes: Episodes
+    """One of each walk."""
+    seconds: float
+    """Their length without falls [s]."""
+
+    @property
+    def missing(self) -> NDArray:
+        """(N,) the share of each walk that a fall took: 0 without one, 1 at once, 1/3 at the end.
+
+        Standing still counts as a fall.
+        """
+        com = self.episodes.series["com"][..., 0].astype(float)
+        way = com[np.arange(len(com)), self.episodes.ticks - 1]
+        walked = way / (self.biped.settings.speed * self.seconds)
+        stood = self.episodes.fall_reason == ""
+        return np.where(stood & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0))
+
+    @property
+    def speed(self) -> NDArray:
+        """(N,) mean forward speed of the CoM from `SETTLED` on [m/s]."""
+        first = round(SETTLED / TICK)
+        found = np.zeros(len(self.episodes.ticks))
+        for index, ticks in enumerate(self.episodes.ticks.tolist()):
+            com = self.episodes.series["com"][index, :ticks, 0].astype(float)
+            last = ticks - 1
+            found[index] = (com[last] - com[min(first, last)]) / max((last - first) * TICK, TICK)
+        return found
+
+    def episode(self, index: int) -> dict[str, NDArray]:
+        """Return the series of walk `index`, as `evaluation.recording.recording.Episodes.episode`."""
+        return self.episodes.episode(index)
 
 
-def _centre_of_pressure(m: Measurement) -> NDArray:
-    """(N,) forward place of both feet's vertical force [m]; in flight the CoM's."""
-    load = m.force[..., 1]
-    total = load.sum((1, 2))
-    return np.where(total > 0.0, (load * m.contact[..., 0]).sum((1, 2)) / np.maximum(total, 1e-9), m.com[:, 0])
+def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED) -> StrideTally | None:
+    """Return the evaluation's tally of one walk's strides from `settled` [s] on; None if a leg takes fewer than two."""
+    tally = StrideTally()
+    add_episode(tally, series, biped.body, (settled, np.inf))
+    return None if min(curves.count for curves in tally.feet) < 2 else tally
 
 
 def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
@@ -123,11 +139,3 @@ def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: fl
     ]
     own, planned = np.array(curves)
     return own + ease * (planned - own)
-
-
-def speed_of(record: dict[str, NDArray]) -> NDArray:
-    """(N,) mean forward speed of the CoM from `SETTLED` on [m/s], of a record of `series`."""
-    first = round(SETTLED / Biped.tick_dt)
-    last = len(record["com"]) - 1
-    way = record["com"][last, :, 0] - record["com"][min(first, last), :, 0]
-    return way / max((last - first) * Biped.tick_dt, Biped.tick_dt)

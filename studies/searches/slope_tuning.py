@@ -20,6 +20,7 @@ from tqdm import tqdm
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
+from springfoot.envs.batch.walk import walk as steps_of
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import SlopeConstants, slope_constants_from
 from springfoot.envs.settings.settings import BipedSettings
@@ -67,13 +68,19 @@ def walk(
     biped = Biped(settings, num, threads, slope=constants)
     biped.subjects.slope[:] = np.repeat(np.radians(slopes_deg), walks)
     biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
-    active, lived, reward, heel, way = np.ones(num, bool), np.zeros(num), np.zeros(num), np.zeros(num), np.zeros(num)
+    lived = np.zeros(num)
+    reward = np.zeros(num)
+    heel = np.zeros(num)
+    way = np.zeros(num)
+    stood = np.ones(num, bool)
     ticks: list[Tick] = []
     biped.on_tick = ticks.append
-    for step in range(round(seconds / biped.dt)):
-        action = action_of(biped.scheduled_stiffness(), settings, biped.body)
+
+    def act(_observation: NDArray) -> NDArray:
         ticks.clear()
-        result = biped.step(action.reshape(num, -1), active)
+        return action_of(biped.scheduled_stiffness(), settings, biped.body).reshape(num, -1)
+
+    for step, (active, result) in enumerate(steps_of(biped, act, round(seconds / biped.dt))):
         lived += active * biped.dt
         reward += result.reward
         if step * biped.dt >= SETTLED:
@@ -81,11 +88,9 @@ def walk(
             for tick in ticks:
                 load = tick.measurement.force[..., 1].sum(-1) / (biped.body.total_mass * GRAVITY)
                 heel = np.maximum(heel, active * np.where(tick.phase < HEEL_STRIKE, load, 0.0).max(1))
-        active &= ~result.terminated
-        if not active.any():
-            break
+        stood &= ~(active & result.terminated)
     numbers = {
-        "missing": np.where(active, 0.0, 1.0 - 2.0 / 3.0 * lived / seconds),
+        "missing": np.where(stood, 0.0, 1.0 - 2.0 / 3.0 * lived / seconds),
         "speed": way / np.maximum(lived - SETTLED, biped.dt) - settings.speed,
         "heel": heel,
         "reward": reward * biped.dt / np.maximum(lived, biped.dt),

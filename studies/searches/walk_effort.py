@@ -9,12 +9,18 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.physics.model import HIP, SIDES
+from springfoot.evaluation.numbers.metrics import MOMENT_CURVES
+from springfoot.evaluation.numbers.series import foot_contacts, strides_within
+from springfoot.evaluation.numbers.tally import StrideTally
+from springfoot.evaluation.recording.recording import TICK
 from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, find_contacts, on_percent
-from springfoot.gait.people.scores import travel
+from springfoot.gait.people.cycle import on_percent
 from springfoot.gait.plan.effort import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_stride
 
+from .leg_walks import SETTLED
+
+ANGLE_CURVES = ("thigh_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg", "mtp_dorsiflexion_deg")
+"""The evaluation's curves of a leg's angles, thigh to the vertical."""
 PER_EFFORT = 10.0
 """Price of one unit of effort and impact; chosen, so that no walk pays as much as a fall."""
 TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "skipped": 0.01, "travel": 0.01, "unsteady": 0.05}
@@ -27,15 +33,14 @@ walk, and hardly how."""
 
 
 def effort_price(
-    record: dict[str, NDArray], index: int, biped: Biped, settled: float, missed: NDArray, impact: float = 1.0
-) -> float | None:
-    """What walk `index` of a record of `leg_walks.series` pays in strides that begin after `settled` [s]; None if it
-    takes too few. `missed` is how far it is off its plan [tolerances] (`leg_cost.misses`), `impact` the price of impact
-    over that of effort."""
-    found = effort_and_impact(record, index, biped, settled)
-    if found is None:
-        return None
-    effort, landing, held = found
+    series: dict[str, NDArray], tally: StrideTally, biped: Biped, missed: NDArray, impact: float = 1.0
+) -> float:
+    """Return the price of one walk, of its series and their tally.
+
+    `missed` is its distance from the plan [tolerances] (`leg_cost.misses`), `impact` the price of impact over that of
+    effort.
+    """
+    effort, landing, held = effort_and_impact(series, tally, biped)
     paid = effort.total + PER_DEGREE * effort.beyond_range + impact * landing
     off = [PER_HELD * held[name] / TASK_TOLERANCE[name] for name in TASK_TOLERANCE]
     return PER_EFFORT * paid + float(np.linalg.norm([*off, *(PER_MISS * missed)]))
@@ -48,49 +53,43 @@ def impact_of(force: NDArray, tick: float) -> float:
 
 
 def effort_and_impact(
-    record: dict[str, NDArray], index: int, biped: Biped, settled: float
-) -> tuple[Effort, float, dict[str, float]] | None:
-    """Effort of the mean stride and impact (`impact_of`), means of both legs, and what `TASK_TOLERANCE` holds, in its
-    units."""
-    body, tick = biped.body, Biped.tick_dt
-    weight = body.total_mass * GRAVITY
-    speed = np.gradient(record["com"][:, index, 0], tick)
-    ahead = record["com"][:, index, 0] - record["planned_com"][:, index, 0]
-    efforts, impacts, periods, travels, forces, speeds, places, landings = [], [], [], [], [], [], [], []
-    for side in range(len(SIDES)):
-        angle, torque, force = (record[name][:, index, side] for name in ("angle", "moment", "force"))
-        strides = find_contacts(force[:, 1], tick, CONTACT_THRESHOLD_BW * weight).strides(settled)
-        if len(strides) < 2:
-            return None
-        turned = angle.copy()
-        turned[:, HIP] -= record["pitch"][:, index]
-        series = np.column_stack([turned, -torque, force[:, 1] / weight, ahead, speed])
-        curves = on_percent(series, strides[:, 0], strides[:, 2], tick)
-        mean = curves.mean(0)[: len(PERCENT) - 1]
-        joints = angle.shape[-1]
-        periods.append(float(np.mean(strides[:, 2] - strides[:, 0])))
-        speeds.append(float(mean[:, -1].mean()))
-        places.append(float(np.sqrt(np.mean(mean[:, -2] ** 2))))
-        efforts.append(
-            effort_of_stride(
-                body, mean[:, :joints], None, mean[:, joints : 2 * joints], periods[-1], speeds[-1] * periods[-1]
-            )
-        )
-        forces.append(curves[..., 2 * joints])
-        first, last = (strides[[0, -1], [0, 2]] / tick).astype(int)
-        impacts.append(impact_of(force[first : last + 1] / weight, tick))
-        for start, leave, _ in np.floor(strides / tick).astype(int):
-            sole = slice(start, leave + 1), index, side
-            travels.append(travel(record["material"][sole], record["load"][sole], CONTACT_THRESHOLD_BW * weight))
-        for _, leave, land in np.floor(strides / tick).astype(int):
-            landings.append(record["phase"][leave:land, index, side].max())
+    series: dict[str, NDArray], tally: StrideTally, biped: Biped, settled: float = SETTLED
+) -> tuple[Effort, float, dict[str, float]]:
+    """Return effort of the mean stride and impact (`impact_of`), means of both legs, and what `TASK_TOLERANCE` holds.
+
+    `tally` is the evaluation's of the walk's `series` from `settled` [s] on.
+    """
+    body = biped.body
+    weight = body.mass * GRAVITY
+    speed = float(tally.com.mean("vx")[:-1].mean())
+    ahead = series["com"][:, 0] - series["com_reference"][:, 0]
+    sides = np.array(tally.stride_sides)
+    efforts: list[Effort] = []
+    impacts: list[float] = []
+    places: list[float] = []
+    landings: list[float] = []
+    for side, foot in enumerate(foot_contacts(series, body)):
+        strides = strides_within(foot, (settled, np.inf))
+        begin, _, end = strides.T
+        curves = tally.feet[side]
+        angle = np.radians(np.stack([curves.mean(name) for name in ANGLE_CURVES], -1))[:-1]
+        torque = np.stack([curves.mean(name) for name in MOMENT_CURVES.values()], -1)[:-1] * body.mass
+        period = float(np.mean(np.array(tally.stride_time)[sides == side]))
+        efforts.append(effort_of_stride(body, angle, None, torque, period, speed * period))
+        off = on_percent(ahead, begin, end, TICK, first=TICK).mean(0)[:-1]
+        places.append(float(np.sqrt(np.mean(off**2))))
+        force = series["force"][:, side].sum(1) / weight
+        first, last = (strides[[0, -1], [0, 2]] / TICK).astype(int)
+        impacts.append(impact_of(force[first : last + 1], TICK))
+        phase = series["phase"][:, side]
+        landings += [phase[leave:land].max() for _, leave, land in np.floor(strides / TICK).astype(int)]
     effort = Effort(**{name: float(np.mean([getattr(each, name) for each in efforts])) for name in vars(efforts[0])})
     held = {
-        "speed": float(np.mean(speeds)) - biped.settings.speed,
-        "period": float(np.mean(periods)) / (2 * biped.plan.step_time) - 1,
+        "speed": speed - biped.settings.speed,
+        "period": float(np.mean(tally.stride_time)) / biped.plan.stride_time - 1,
         "place": float(np.mean(places)),
         "skipped": (1.0 - float(np.mean(landings))) * 2 * biped.plan.step_length,
-        "travel": float(np.mean(travels)),
-        "unsteady": float(np.sqrt(np.concatenate(forces).var(0).mean())),
+        "travel": float(np.mean(tally.travel)),
+        "unsteady": float(np.sqrt(np.mean(tally.both.sd("grf_vertical_bw") ** 2))),
     }
     return effort, float(np.mean(impacts)), held

@@ -7,6 +7,7 @@ paired: copies from one seed are the same to the last bit until their first chan
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
+from math import ceil
 
 import mujoco
 import numpy as np
@@ -15,6 +16,7 @@ from springfoot.agents.policies.baselines import PolicyFunction, leg_phase
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
+from springfoot.envs.batch.walk import walk
 from springfoot.envs.control.equilibrium import PLATEAUS, TOE_OFF
 from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
 from springfoot.envs.physics.model import JOINTS, LEFT, RIGHT, SIDES
@@ -132,28 +134,36 @@ def paired_walks(
     biped = Biped(settings, copies * num, threads)
     biped.reset(np.arange(copies * num), list(seeds) * copies)
     changes, record = _Changes(action_step(settings, biped.body, change), num), _Record(biped, change, num)
-    phase, stride = np.zeros((copies * num, len(SIDES))), np.full(copies * num, -1)
+    before = np.zeros((copies * num, len(SIDES)))
+    stride = np.full(copies * num, -1)
     asked, cut = np.zeros((2, copies), int)
-    active, observation, steps = np.ones(copies * num, bool), biped.observe(), 0
-    longest = (WARM_UP + SLOWEST_STRIDE * (strides + 1)) / biped.dt
-    while steps < longest and (stride[active] <= strides).any():
-        before, phase = phase, leg_phase(observation)
+    steps = 0
+
+    def act(observation: NDArray) -> NDArray:
+        phase = leg_phase(observation)
         if steps * biped.dt >= WARM_UP:
-            stride += phase[:, LEFT] < before[:, LEFT]
+            stride[:] += phase[:, LEFT] < before[:, LEFT]
+        before[:] = phase
         record.stride = stride[:num]
         added = changes.added(phase, stride)
         action = policy(observation) + added
-        result = biped.step(action, active)
-        asked += (added != 0.0).reshape(copies, -1).sum(1)
-        cut += ((added != 0.0) & (np.abs(action) > 1.0)).reshape(copies, -1).sum(1)
-        observation, steps = result.observation, steps + 1
-        active &= ~result.terminated
-        progress(float(active.sum()) * biped.dt)
-    active &= stride > strides
-    if active[:num].sum() < 2:
+        asked[:] += (added != 0.0).reshape(copies, -1).sum(1)
+        cut[:] += ((added != 0.0) & (np.abs(action) > 1.0)).reshape(copies, -1).sum(1)
+        return action
+
+    stood = np.ones(copies * num, bool)
+    longest = ceil((WARM_UP + SLOWEST_STRIDE * (strides + 1)) / biped.dt)
+    for active, result in walk(biped, act, longest):
+        steps += 1
+        stood = active & ~result.terminated
+        progress(float(stood.sum()) * biped.dt)
+        if not (stride[stood] <= strides).any():
+            break
+    stood &= stride > strides
+    if stood[:num].sum() < 2:
         raise SpringfootError(f"of {num} unchanged walks fewer than two stay up: nothing can be held against them")
     asked, cut = (each[1:].reshape(len(CELLS), -1).sum(1) for each in (asked, cut))
-    return record.paired(strides, active, cut / np.maximum(asked, 1))
+    return record.paired(strides, stood, cut / np.maximum(asked, 1))
 
 
 class _Changes:

@@ -15,7 +15,7 @@ from springfoot.errors import SpringfootError
 from springfoot.studies.feet import person_cost
 from springfoot.studies.feet.adapt import Adapt, beginning
 from springfoot.studies.feet.person_search import OF_MUSCLES, Person, PersonSearch
-from springfoot.studies.searches.leg_walks import series, walk
+from springfoot.studies.searches.leg_walks import walk
 
 SETTINGS = settings_from(action_mode="residual", start=0.2)
 
@@ -57,20 +57,20 @@ def test_an_adaptive_foot_begins_as_the_passive_one():
     passive, adaptive = (beginning({"kind": kind}, 1.2) for kind in ("passive", "adaptive"))
     walks = []
     for person in (passive, adaptive):
-        biped, ticks = walk(
+        walked = walk(
             SETTINGS, [person.sound], [0], 1, foreign=(), seconds=1.0, right=[person.other], feet=[person.feet]
-        )[1:]
-        assert biped.num_envs == 1
-        walks.append(series(biped, ticks)["angle"])
+        )
+        assert walked.biped.num_envs == 1
+        walks.append(walked.episode(0)["angle"])
     # A device's damping is that of the joint's muscles unless it has its own.
-    np.testing.assert_allclose(*walks, atol=1e-9)
+    np.testing.assert_allclose(*walks, atol=1e-6)  # float32
 
 
 def missed(person: Person, **settings) -> dict[str, float]:
     own = replace(SETTINGS, **settings)
-    lost, biped, ticks = walk(own, [person.sound], [0], 1, foreign=(), right=[person.other], feet=[person.feet])
-    assert lost[0] == 0.0
-    found = person_cost.misses(series(biped, ticks), 0, biped, bend=0.0, bend_weight=2.0)
+    walked = walk(own, [person.sound], [0], 1, foreign=(), right=[person.other], feet=[person.feet])
+    assert walked.missing[0] == 0.0
+    found = person_cost.misses(walked.episode(0), walked.biped, bend=0.0, bend_weight=2.0)
     assert found is not None
     return dict(zip(["speed", "step", "stance", "peak L", "peak R"], found, strict=False)) | {"bend": found[-1]}
 

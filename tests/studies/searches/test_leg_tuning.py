@@ -13,6 +13,8 @@ from springfoot.cli.main import study_main
 from springfoot.envs.control.leg_constants import constants_from, leg_constants
 from springfoot.envs.control.legs import KNOTS
 from springfoot.envs.settings.settings import BipedSettings
+from springfoot.evaluation import measure, prepare, record
+from springfoot.evaluation.numbers import series as numbers_series
 from springfoot.gait.people.human import human_gait
 from springfoot.studies.searches import leg_cost
 from springfoot.studies.searches import leg_tuning as tuning
@@ -79,6 +81,27 @@ def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_le
     settings = BipedSettings(episode_seconds=SECONDS + 1)
     paid = leg_cost.cost(settings, [limp, COMMITTED, farther], seed=0, threads=1, push=0.0, foreign=0.0)
     assert paid[1] < paid[2] < paid[0]
+
+
+def test_a_search_pays_by_the_numbers_of_an_evaluation(monkeypatch):
+    """What the measurer finds late, evaluation and search both find late."""
+    settings = BipedSettings(episode_seconds=SECONDS + 1)
+    own = replace(settings, episode_seconds=SECONDS)
+
+    def both():
+        paid = leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0)
+        policy, walked = prepare("schedule", {"episode_seconds": own.episode_seconds})
+        return paid[0], measure(record(policy, walked, name="", episodes=1)).metrics["toe_off_percent"]
+
+    paid, toe_off = both()
+    found = numbers_series.find_contacts
+
+    def late(force, tick, threshold, first=0.0):
+        return found(force, tick, 8 * threshold, first)
+
+    monkeypatch.setattr(numbers_series, "find_contacts", late)
+    paid_late, toe_off_late = both()
+    assert toe_off_late < toe_off - 1.0 and abs(paid_late - paid) > 0.1
 
 
 def run(*words):

@@ -25,7 +25,7 @@ from springfoot.gait.plan.kinetics import planned_moments
 from springfoot.gait.plan.walk_style import least_work
 from springfoot.studies.searches.leg_cost import FALL_COST, cost, misses
 from springfoot.studies.searches.leg_tuning import LegTuning
-from springfoot.studies.searches.leg_walks import SETTLED, series, walk
+from springfoot.studies.searches.leg_walks import measured, walk
 from springfoot.studies.searches.walk_effort import effort_and_impact, effort_price, impact_of
 
 BODY = Body()
@@ -78,32 +78,40 @@ def test_impact_is_the_mean_square_of_the_forces_rate():
 
 
 def test_a_walk_is_measured_as_it_was_simulated():
-    missing, biped, ticks = walk(SETTINGS, [LEGS], [0], 1, foreign=())
-    record = series(biped, ticks)
-    measured, missed = effort_and_impact(record, 0, biped, SETTLED), misses(record, 0, biped, SETTLED)
-    assert missing[0] == 0.0 and measured is not None and missed is not None
-    effort, impact, held = measured
+    walked = walk(SETTINGS, [LEGS], [0], 1, foreign=())
+    biped = walked.biped
+    series = walked.episode(0)
+    tally = measured(series, biped)
+    assert walked.missing[0] == 0.0 and tally is not None
+    missed = misses(tally, biped)
+    effort, impact, held = effort_and_impact(series, tally, biped)
     assert held["speed"] == pytest.approx(0.0, abs=0.05) and held["period"] == pytest.approx(0.0, abs=0.03)
     # Over strides that repeat themselves hip, knee and ankle do little net work, and the energy is that of their work.
-    own = record["work"][:, 0, :, :3].sum((0, 1))
-    way = np.ptp(record["com"][:, 0, 0])
+    own = series["joint_work"][:, :, :3].sum((0, 1))
+    way = np.ptp(series["com"][:, 0])
     spent = own[:, 0].sum() / MUSCLE_EFFICIENCY[0] + np.abs(own[:, 1]).sum() / MUSCLE_EFFICIENCY[1]
     assert effort.work < 1.1 * spent / (BODY.mass * GRAVITY * way)  # tissue and tendon give some of it
     assert effort.work > 0.4 * spent / (BODY.mass * GRAVITY * way)
-    paid = effort_price(record, 0, biped, SETTLED, missed)
-    assert paid is not None and paid > 10 * (effort.total + impact)
-    assert effort_price(record, 0, biped, 6.0, missed) is None
+    assert effort_price(series, tally, biped, missed) > 10 * (effort.total + impact)
+    assert measured(series, biped, 6.0) is None
 
 
 def test_a_limp_is_unsteady_and_a_walk_off_its_plan_is_out_of_place():
-    _, biped, ticks = walk(SETTINGS, [LEGS], [0], 1, foreign=())
-    record = series(biped, ticks)
-    force, com = record["force"].copy(), record["com"].copy()
-    force[:, 0, 0, 1] *= 0.8  # the left foot carries less than the right, in every stride
-    com[..., 0] += 0.3
-    changes = {}, {"force": force}, {"com": com}, {"phase": 0.9 * record["phase"]}
-    level, limping, ahead, early = (effort_and_impact(record | each, 0, biped, SETTLED) for each in changes)
-    assert level is not None and limping is not None and ahead is not None and early is not None
+    walked = walk(SETTINGS, [LEGS], [0], 1, foreign=())
+    biped = walked.biped
+    series = walked.episode(0)
+    force = series["force"].copy()
+    com = series["com"].copy()
+    force[:, 0, :, 1] *= 0.8  # the left foot carries less than the right, in every stride
+    com[:, 0] += 0.3
+
+    def found(change):
+        changed = series | change
+        tally = measured(changed, biped)
+        assert tally is not None
+        return effort_and_impact(changed, tally, biped)
+
+    level, limping, ahead, early = map(found, ({}, {"force": force}, {"com": com}, {"phase": 0.9 * series["phase"]}))
     assert limping[2]["unsteady"] > level[2]["unsteady"] + 0.03
     assert ahead[2]["place"] == pytest.approx(0.3, abs=1.5 * level[2]["place"])
     assert ahead[2]["speed"] == pytest.approx(level[2]["speed"], abs=1e-9)

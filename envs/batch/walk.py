@@ -1,0 +1,39 @@
+"""The one loop over a walk: training, recordings, searches and the live page step the batch here."""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+
+from .biped_batch import Biped
+from .step_result import StepResult
+
+
+class Walked(NamedTuple):
+    """One step of a walk."""
+
+    active: NDArray
+    """(N,) environments that took the step."""
+    result: StepResult
+
+
+def walk(biped: Biped, act: Callable[[NDArray], NDArray], steps: int | None = None) -> Iterator[Walked]:
+    """Step `biped`, which was reset, until every episode has ended; yield after each step.
+
+    Args:
+        biped: N environments. Its `on_tick` hears every control window.
+        act: observations (N, D) -> actions (N, 4).
+        steps: most steps of an episode, in place of the length in the settings.
+    """
+    active = np.ones(biped.num_envs, bool)
+    observation = biped.observe()
+    taken = 0
+    while active.any() and (steps is None or taken < steps):
+        result = biped.step(act(observation), active)
+        yield Walked(active, result)
+        ended = result.terminated if steps is not None else result.terminated | result.truncated
+        active = active & ~ended
+        observation = result.observation
+        taken += 1
