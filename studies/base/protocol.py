@@ -9,8 +9,8 @@ from typing import Any
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
-from springfoot.files.writing import write_atomically
 
+from .kept import Kept
 from .study import OnProgress
 
 
@@ -49,18 +49,12 @@ class Protocol:
             f"±{self.push_newton:g} N, the same seeds in every row; all else undisturbed: return of the default "
             "reward, speed, RMSE of thigh, knee and ankle to people's mean, vertical force peaks, r of both forces "
             "with people's, largest ankle moment and where in the stride, RMSE of the CoM to the plan forward and of "
-            "the CoP to the planned ZMP in single support. What falls is measured before its falls."
+            "the CoP to the planned ZMP in single support. In episodes that end in a fall, only the strides "
+            "before it count."
         )
 
 
 def measured(path: Path, how: Protocol, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """What `make` found, kept in the file `path` as long as neither `how` nor `key` changes."""
+    """Return the metrics that `make` finds, kept in the file `path` for this `how` and `key`."""
     asked = json.loads(json.dumps({"how": {**vars(how), "threads": None, "progress": None}, "of": key}))
-    if path.is_file():
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["asked"] == asked:
-            return kept["metrics"]
-    metrics = make()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, (json.dumps({"asked": asked, "metrics": metrics}, indent=1) + "\n").encode())
-    return metrics
+    return Kept(path).get(asked, make)

@@ -21,6 +21,7 @@ import numpy as np
 import tyro
 from tqdm import tqdm
 
+from springfoot.arrays import NDArray
 from springfoot.envs.control.leg_constants import TUNED_SPEED, leg_constants
 from springfoot.envs.control.person import person_constants
 from springfoot.envs.physics.model import LEFT, RIGHT
@@ -35,6 +36,7 @@ from springfoot.files.writing import csv_text, write_atomically
 from ..base.flags import FootFlag, foot_given
 from ..base.study import Answer, OnProgress, Study, without_places
 from ..searches.constants_file import ADAPTED_FEET, read_feet
+from ..searches.kept_search import generations
 from . import person_cost
 from .foot_walks import ABOUT_STOPS, PUSH_NEWTON, SCHEDULE, TOLD, walked
 from .person_search import Person, PersonSearch
@@ -175,13 +177,14 @@ class Adapt(Study):
         options = {"popsize": self.population, "seed": seed + 1, "CMA_diagonal": True, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(space.size), self.sigma, options)
         bend = None if self.bend_deg is None else radians(self.bend_deg)
-        lines = []
-        for generation in range(self.generations):
-            vectors = strategy.ask()
+
+        def price(generation: int, vectors: list[NDArray]) -> NDArray:
             people = [space.person(vector) for vector in vectors]
             own = seed + 1000 * generation
-            paid = person_cost.cost(settings, people, own, self.threads, self.push_newton, bend, self.bend_weight)
-            strategy.tell(vectors, list(paid))
+            return person_cost.cost(settings, people, own, self.threads, self.push_newton, bend, self.bend_weight)
+
+        lines = []
+        for generation, _, paid in generations(strategy, self.generations, price):
             lines.append((generation + 1, float(paid.min()), float(np.median(paid))))
             progress(1)
             last = generation == self.generations - 1

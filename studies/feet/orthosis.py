@@ -29,8 +29,9 @@ from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record_feet
 from springfoot.files.writing import csv_text
 
+from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .foot_walks import NAMES, SCHEDULE, UNSEARCHED, Kept, numbers_of, walked
+from .foot_walks import NAMES, SCHEDULE, UNSEARCHED, numbers_of, walked
 from .orthosis_page import at_walked_speeds, best_springs, draw_drop, draw_weak, drop_text, people_text, weak_text
 
 PER_DEG = 180.0 / np.pi

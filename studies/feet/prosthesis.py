@@ -29,10 +29,11 @@ from springfoot.errors import SpringfootError, require_count
 from springfoot.files.writing import csv_text
 from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
+from ..base.kept import Kept
 from ..base.study import Answer, OnProgress
 from ..base.trainings import TrainingStudy
 from .adapt import kept_name
-from .foot_walks import NAMES, PUSH_NEWTON, SCHEDULE, UNSEARCHED, Kept, for_body, walked
+from .foot_walks import NAMES, PUSH_NEWTON, SCHEDULE, UNSEARCHED, for_body, walked
 from .prosthesis_page import ADAPTED_ALONE, NOT_ADAPTED, TOE_HELD, WITH_POLICY, draw, sections, share_rows
 
 WORN = ("rigid", "passive", "adaptive")

@@ -30,6 +30,7 @@ from springfoot.gait.body.body import GRAVITY
 
 from ..base.study import Answer, OnProgress, Study
 from .constants_file import CONSTANTS, read_constants, write_constants
+from .kept_search import generations
 
 SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
 """Walked on by every candidate."""
@@ -156,15 +157,18 @@ class SlopeTuning(Study):
             raise SpringfootError(f"{self.constants} has no constants for slopes to begin with") from None
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(vector_of(began), self.sigma, options)
-        lines, how = [], (self.walks, self.seconds)
-        for generation in range(self.generations):
-            vectors, seed = strategy.ask(), self.seed + 1000 * generation
+        how = self.walks, self.seconds
+
+        def price(generation: int, vectors: list[NDArray]) -> NDArray:
+            seed = self.seed + 1000 * generation
             level = walk(None, (0.0,), *how, seed, self.threads)["reward"].mean()
-            found = [walk(constants_of(v), SLOPES_DEG, *how, seed, self.threads) for v in vectors]
-            paid = [cost(walked, level) for walked in found]
-            strategy.tell(vectors, paid)
-            lines.append([generation + 1, min(paid), np.median(paid)])
-            tqdm.write(f"generation {generation + 1}: best {min(paid):.2f}, median {np.median(paid):.2f}")
+            found = [walk(constants_of(vector), SLOPES_DEG, *how, seed, self.threads) for vector in vectors]
+            return np.array([cost(walked, level) for walked in found])
+
+        lines = []
+        for generation, _, paid in generations(strategy, self.generations, price):
+            lines.append([generation + 1, paid.min(), np.median(paid)])
+            tqdm.write(f"generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}")
             progress(1)
         pays, told = self._judge(began)
         verdict = "wrote nothing: what it began with pays no more"

@@ -14,11 +14,11 @@ from springfoot.envs.settings.adapted import ADAPTED, committed_feet
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.per_leg import leg_numbers
 from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, record
-from springfoot.evaluation.recording.recording_feet import record_feet
+from springfoot.evaluation.recording.recording import TICK, WARM_UP, record, record_feet
 from springfoot.studies.base.intervals import t_interval
+from springfoot.studies.base.kept import Kept
 from springfoot.studies.feet.adapt import kept_name
-from springfoot.studies.feet.foot_walks import NAMES, SCHEDULE, Kept, beyond_stop, for_body, numbers_of, walked
+from springfoot.studies.feet.foot_walks import NAMES, SCHEDULE, beyond_stop, for_body, numbers_of, walked
 from springfoot.studies.feet.prosthesis import SEARCHES, config_of
 from springfoot.studies.feet.prosthesis_page import (
     ADAPTED_ALONE,

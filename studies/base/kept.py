@@ -1,0 +1,28 @@
+"""The one cache of studies: numbers by the question they answer, kept in a file, so that a stopped study goes on."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from springfoot.files.writing import write_atomically
+
+
+class Kept:
+    """Numbers by question, kept in a file if there is a `path`."""
+
+    def __init__(self, path: Path | None):
+        self._path = path
+        self._known: dict[str, Any] = {}
+        if path is not None and path.is_file():
+            self._known = json.loads(path.read_text(encoding="utf-8"))
+
+    def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return the answer to `question`, a JSON value; `make` it where it is not kept."""
+        text = json.dumps(question, sort_keys=True)
+        if text not in self._known:
+            self._known[text] = make()
+            if self._path is not None:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                write_atomically(self._path, (json.dumps(self._known, indent=1) + "\n").encode())
+        return self._known[text]
