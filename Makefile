@@ -7,14 +7,15 @@ SHELL := bash
 # The batched simulation brings its own threads; a second pool beside it in BLAS or torch only costs time.
 export OMP_NUM_THREADS ?= 1
 
-# On every core, a file of tests on one: what its tests share is made once.
-PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+# On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet clean
+.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
-	@echo "make test     run the tests"
+	@echo "make test     run the quick tests, in four minutes on two cores"
+	@echo "make test-all run all tests, those marked slow too (trainings, kills, studies twice): ten minutes on two cores"
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make test-learners  train with every library of docs/learners.md, each outside $(VENV); goes on after a stop"
@@ -22,7 +23,7 @@ help:
 	@echo "make fuzz     change files of every kind at random for ten minutes, and read them"
 	@echo "make extremes ten million extreme steps in drawn settings: is all finite, and the memory flat?"
 	@echo "make mutants  60 wrong signs, comparisons and indices: does a test fail? hours; goes on after a stop"
-	@echo "make check    format, lint, types, import floors, tests: what has to pass before a change lands"
+	@echo "make check    format, lint, types, import floors, all tests: what has to pass before a change lands"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
 	@echo "make feet     what feet are worth, from committed people and policies; goes on after a stop; FULL=1: searches, trains"
@@ -47,6 +48,9 @@ walk: install
 	  "Pictures: $$out/evaluation/gait.png, $$out/evaluation/walk.gif"
 
 test: install
+	$(PYTEST) -m "not slow"
+
+test-all: install
 	$(PYTEST)
 
 # A folder with the source distribution of what git knows, and an empty one.
@@ -80,7 +84,7 @@ test-wheel: install
 # The unpacked source distribution passes its own tests, in an environment that it makes itself. Not $(MAKE): with
 # --dry-run, which a test gives, that line would run.
 test-sdist: install
-	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test VENV=.venv
+	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test-all VENV=.venv
 
 test-learners: install build/learners/many/installed build/learners/rllib/installed
 	$(BIN)/python -m benchmarks.learners

@@ -275,6 +275,7 @@ def test_bad_input_of_a_command_is_one_printable_line_and_exit_code_2(monkeypatc
 # Where a setting ends, rewards are still numbers ---------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [

@@ -143,6 +143,7 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
     assert read_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number):
     folder = tmp_path / "run"

@@ -150,6 +150,7 @@ def begun(seed: int) -> gym.Env:
     return env
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 @pytest.mark.parametrize("method", METHODS)
 def test_gymnasium_s_processes_give_the_same_bits(method):
@@ -164,6 +165,7 @@ def test_gymnasium_s_processes_give_the_same_bits(method):
         there.close()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 @pytest.mark.parametrize("method", METHODS)
 def test_stable_baselines3_s_processes_give_the_same_bits(method):

@@ -132,11 +132,13 @@ def pixels(path: Path) -> np.ndarray:
     return rows[:, : 4 * width].reshape(height, width, 4)[..., :3].astype(int)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gl", "allowed"), [("disabled", ["hint"]), ("egl", ["frame", "hint"])])
 def test_rendering_gives_a_frame_or_says_what_to_install(gl, allowed):
     assert run(FRAME, MUJOCO_GL=gl) in allowed
 
 
+@pytest.mark.slow
 def test_checkers_have_nothing_to_say_about_frames_without_a_screen():
     assert run(CHECKERS, "rgb_array", MUJOCO_GL="egl") == "nothing to say"
 

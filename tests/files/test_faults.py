@@ -30,6 +30,7 @@ def on_tmpfs(folder, options, *command):
     return done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words", "said"),
     [
@@ -60,6 +61,7 @@ mount -o remount,size=64m . && "$0" "$1" "$2" train --resume new
 """A shell that trains until the disk is full, and goes on with more room."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "said"), [("8k", "results are written whole or not at all"), ("240k", "goes on from state-0.safetensors")]
 )
@@ -85,6 +87,7 @@ def test_a_disk_that_a_training_fills_is_one_line_and_it_goes_on_with_more_room(
     assert done.returncode == 0 and "1,024 steps in" in done.stdout and "finished." in done.stdout
 
 
+@pytest.mark.slow
 def test_a_folder_that_vanishes_meanwhile_is_one_line(tmp_path):
     parent = tmp_path / "runs"
     parent.mkdir()

@@ -135,6 +135,7 @@ def test_what_a_killed_process_wrote_for_a_folder_is_removed(tmp_path, capsys):
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["mine"] and not part.exists()
 
 
+@pytest.mark.slow
 def test_two_trainings_into_one_folder_are_one_training(tmp_path):
     words = ["--out", "run", "--timesteps", "512", "--num-envs", "4", "--update-steps", "256", "--threads", "1"]
     command = [sys.executable, train.__file__, *words, "--eval-episodes", "1", "--episode-seconds", "1"]
@@ -168,6 +169,7 @@ def test_a_signal_at_the_start_is_one_line_and_leaves_nothing(tmp_path, words, n
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_leaves_nothing_of_an_evaluation(tmp_path, number):
     command = [sys.executable, evaluate.__file__, "constant", "--episodes", "500"]

@@ -67,6 +67,7 @@ def test_figures_are_per_step_and_cases_take_turns(walk):
         assert each.sim_seconds_per_core_second == pytest.approx(1e6 * STEP / each.cpu_us)
 
 
+@pytest.mark.slow
 def test_bench_writes_the_figures_it_promises(tmp_path):
     out = tmp_path / "new" / "bench.json"
     command = [sys.executable, "-m", "benchmarks.bench", "--quick", "--out", out]

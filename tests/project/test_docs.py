@@ -70,6 +70,7 @@ def test_links_lead_somewhere(page):
     assert all(link.startswith("https://") or (page.parent / link).exists() for link in links), links
 
 
+@pytest.mark.slow
 def test_readme_examples_run_in_their_order(folder):
     code = "\n".join(BLOCKS).replace("range(500)", "range(50)").replace("1_000_000", "1")
     assert len(BLOCKS) == 6
@@ -78,6 +79,7 @@ def test_readme_examples_run_in_their_order(folder):
     assert prepare("mine.safetensors", {})[1].action_mode == "absolute"
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_on_policies_run(folder):
     page = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
     for command in commands_in(re.findall(r"```sh.*?```", page, re.DOTALL)[0]):
@@ -93,6 +95,7 @@ def test_the_documents_name_the_commands_there_are():
     assert named == set(STUDIES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS, ids=" ".join)
 def test_every_program_that_a_document_names_answers_help(program, capsys):
     if program[0] == "make":

@@ -36,6 +36,7 @@ def test_every_example_is_run_and_short():
     assert all(len(path.read_text().splitlines()) <= 60 for path in EXAMPLES.glob("*.py"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_example_does_what_it_says(name, tmp_path):
     words, said = RUNS[name]

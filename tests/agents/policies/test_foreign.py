@@ -60,6 +60,7 @@ def test_a_contract_beside_the_file_brings_its_settings(tmp_path):
     assert (settings.action_mode, settings.speed, settings.push_newton) == ("residual", 1.2, 100.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("contract", "said"),
     [
@@ -82,6 +83,7 @@ def test_a_contract_that_is_wrong_is_refused_with_one_line(contract, said, tmp_p
     assert str(refused.value).startswith(whole if said else other) and "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "said"),
     [
@@ -142,6 +144,7 @@ def test_an_onnx_file_that_is_too_large_or_crashes_the_library_is_one_line(tmp_p
         load_policy(save_linear(path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"", b"import springfoot\n" * 20, b"\x80\x04K\x01."])
 def test_what_is_no_onnx_file_is_refused_with_one_line(content, tmp_path):
     path = tmp_path / "mine.onnx"
@@ -251,6 +254,7 @@ def test_a_function_that_is_no_policy_is_refused_with_one_line(name, said, modul
     assert str(refused.value).startswith(said) and "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_evaluate_walks_an_onnx_file_and_a_function(module, tmp_path, capsys):
     path = save_linear(tmp_path / "mine.onnx", weight=np.zeros((D, 4)))
     words = ["--episodes", "1", "--seconds", "1", "--out"]
@@ -268,6 +272,7 @@ def test_results_are_called_as_the_policy_is():
     assert [policy_label(name) for name in ("runs/mine.onnx", "package.module:act")] == ["mine", "package.module-act"]
 
 
+@pytest.mark.slow
 def test_only_the_users_own_words_run_code(tmp_path):
     """A run folder of that name, a file in it and a contract are read and never imported."""
     code = "import pathlib; pathlib.Path('ran').touch()"

@@ -64,6 +64,7 @@ class Counting(BaseCallback):
         self.ended += 1
 
 
+@pytest.mark.slow
 def test_a_callback_may_end_the_training_which_can_be_resumed(tmp_path):
     counting, told = Counting(1200), []
     record = training.train(SHORT, tmp_path / "run", callbacks=[counting, told.append])
@@ -81,6 +82,7 @@ def test_a_function_of_evaluations_may_end_the_training(tmp_path):
     assert record["status"] == "finished"  # there was nothing left to end
 
 
+@pytest.mark.slow
 def test_onlookers_change_no_bit_of_what_is_trained(run, tmp_path):
     training.train(SHORT, tmp_path / "run", callbacks=[Counting(10**9), lambda evaluation: None])
     alone, seen = (read_policy(folder / training.LAST) for folder in (run[0], tmp_path / "run"))

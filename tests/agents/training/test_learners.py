@@ -10,6 +10,7 @@ from springfoot.agents import load_policy
 from springfoot.errors import SpringfootError
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ["sb3", "cleanrl_ppo"])
 def test_a_library_learns_to_walk_better(example, tmp_path):
     """Half of the steps that `make test-learners` gives."""
@@ -27,6 +28,7 @@ def test_a_library_learns_to_walk_better(example, tmp_path):
     assert result["p"] < learners.SIGNIFICANT and result["after"] > 1.1 * result["before"], result
 
 
+@pytest.mark.slow
 def test_who_did_not_get_better_has_not_learned():
     pretrained = load_policy("pretrained")
     assert learners.judge(pretrained, pretrained, must_learn=True)["passed"] is False

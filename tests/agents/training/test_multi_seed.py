@@ -27,6 +27,7 @@ def main(monkeypatch, *words):
     return train_command.train_main()
 
 
+@pytest.mark.slow
 def test_each_seed_is_the_training_it_would_be_alone_and_the_report_has_their_spread(monkeypatch, capfd, tmp_path):
     short = ["--timesteps", 1024, *SHORT]
     assert main(monkeypatch, "--out", tmp_path / "several", "--seeds", 2, "--seed", 3, *short) == 0
@@ -73,6 +74,7 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_on_disk(monkeypatch, caps
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
     folder = tmp_path / "several"
@@ -98,6 +100,7 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
     assert read_policy(folder / "seed-0").observation_mean.shape
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_is_told_and_the_others_go_on(tmp_path):
     folder = tmp_path / "several"
     words = ["--out", str(folder), "--seeds", "2", "--timesteps", "8192", "--num-envs", "4", "--update-steps", "512"]
@@ -135,6 +138,7 @@ def test_what_goes_on_where_all_were_killed_is_named(monkeypatch, capsys, tmp_pa
     assert capsys.readouterr().err == f"train.py: error: {error}\n"
 
 
+@pytest.mark.slow
 def test_ctrl_c_before_anything_runs_is_no_failure(tmp_path):
     command = [sys.executable, SCRIPT, "--out", tmp_path / "several", "--seeds", "3", *SHORT]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

@@ -74,6 +74,7 @@ def half(interrupted, tmp_path):
     return shutil.copytree(interrupted, tmp_path / "half")
 
 
+@pytest.mark.slow
 def test_three_kills_at_random_moments_change_nothing(whole, tmp_path):
     folder, random = tmp_path / "killed", np.random.default_rng(17)
     size = sum(path.stat().st_size for path in whole.glob(EVENTS))
@@ -96,6 +97,7 @@ def test_three_kills_at_random_moments_change_nothing(whole, tmp_path):
     assert names[0] == names[1] and "state-2560.safetensors" in names[0]
 
 
+@pytest.mark.slow
 def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeypatch):
     record = read_record(half)
     assert (record["status"], record["signal"], record["timesteps"]) == ("interrupted", "SIGINT", 1280)
@@ -119,6 +121,7 @@ def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeyp
     assert differences(whole, half) == []
 
 
+@pytest.mark.slow
 def test_a_damaged_newest_checkpoint_is_passed_over(whole, half, capsys):
     newest, second = checkpoints(half)[:2]
     newest.write_bytes(newest.read_bytes()[:-100])
@@ -136,6 +139,7 @@ def test_no_checkpoint_that_is_whole_is_no_run_to_continue(half):
     assert checkpoints(half) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["best.safetensors", "last.safetensors", "run.json"])
 def test_what_disagrees_with_the_last_checkpoint_is_made_again(whole, tmp_path, lost):
     folder = shutil.copytree(whole, tmp_path / "run")
@@ -162,6 +166,7 @@ def test_an_evaluation_that_is_none_is_no_record(whole, tmp_path, evaluation):
         resume(folder)
 
 
+@pytest.mark.slow
 def test_killed_before_the_first_checkpoint_it_begins_again(whole, tmp_path):
     folder = tmp_path / "run"
     folder.mkdir()
@@ -176,6 +181,7 @@ def test_killed_before_the_first_checkpoint_it_begins_again(whole, tmp_path):
     assert scalars(folder) == scalars(whole)
 
 
+@pytest.mark.slow
 def test_killed_before_its_record_a_folder_is_still_new(tmp_path):
     folder = tmp_path / "run"
     folder.mkdir()
@@ -185,6 +191,7 @@ def test_killed_before_its_record_a_folder_is_still_new(tmp_path):
     assert not list(folder.glob(".*"))
 
 
+@pytest.mark.slow
 def test_the_best_is_measured_anew_where_the_reward_has_changed(half, capsys):
     record = read_record(half)
     words = ["--resume", str(half), "--reward-weights", '{"grf": 0.0, "pose": 0.0}']
@@ -200,6 +207,7 @@ def test_the_best_is_measured_anew_where_the_reward_has_changed(half, capsys):
     assert after["best"] == max([told["best"], *later], key=lambda entry: entry["return_mean"])
 
 
+@pytest.mark.slow
 def test_another_number_of_timesteps_goes_on_from_the_same_state(half):
     found = newest_checkpoint(half)
     assert found is not None

@@ -94,6 +94,7 @@ def alone(folder: Path, *words: str, **environment: str) -> subprocess.Completed
     return subprocess.run(command, cwd=folder, env=variables, check=True, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("part", [0.0, 0.01, 0.5, 0.99])
 def test_a_cache_cut_short_is_made_anew(tmp_path, ending, part):
@@ -117,6 +118,7 @@ def test_a_cache_with_a_flipped_bit_does_not_run(tmp_path):
     assert alone(tmp_path).stdout == "1 0\n"
 
 
+@pytest.mark.slow
 def test_a_full_disk_costs_the_cache_alone_and_says_so_once(tmp_path):
     assert alone(tmp_path, "full").stdout == "0 1\n"
     assert alone(tmp_path).stdout == "0 0\n"

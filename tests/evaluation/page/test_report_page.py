@@ -194,6 +194,7 @@ def test_a_name_is_text_and_nothing_else(tmp_path):
     assert reader.data["policies"][0]["name"].startswith("</script><img") and "</script><img" in " ".join(reader.said)
 
 
+@pytest.mark.slow
 def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = ["schedule", "...csv", "schedule", "report.html.csv"]

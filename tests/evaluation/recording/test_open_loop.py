@@ -62,6 +62,7 @@ def test_the_open_loop_copy_of_a_schedule_is_that_schedule_with_its_equilibrium(
     assert played.returns == pytest.approx(own.returns, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_copy_follows_speed_and_body_as_the_schedule_does():
     ranges: dict[str, Any] = {"speed_range": (1.1, 1.25), "height_range": (1.6, 1.75), "mass_range": (50.0, 80.0)}
     policy, settings = prepare("schedule", ranges)
@@ -86,6 +87,7 @@ def _observed(settings):
     return np.concatenate(seen)
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_the_phase_alone():
     own, settings = prepare("pretrained", {})
     copy, absolute = prepare("frozen:pretrained", {})
@@ -204,6 +206,7 @@ def test_a_policy_that_walks_no_strides_has_no_copy():
         open_loop_copy(policy, settings, name="nobody")
 
 
+@pytest.mark.slow
 def test_evaluate_names_the_command_of_the_copy_and_walks_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     told = []

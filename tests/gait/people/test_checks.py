@@ -190,6 +190,7 @@ WALKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "settings"), WALKS.values(), ids=WALKS)
 def test_what_walks_here_can_be_walked_after(tmp_path, name, settings):
     gait = measure(record(*prepare(name, {"episode_seconds": 8.0} | settings), name=name, episodes=1))

@@ -130,6 +130,7 @@ def plan_or_reason(plan: Callable, *args, **asked):
         return None
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(walks())
 def test_any_walk_asked_for_is_valid_or_refused_with_a_number(walk):

@@ -17,6 +17,7 @@ STUDIES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: type(study).__name__)
 def test_what_is_walked_is_the_total(study):
     walked = []
@@ -24,6 +25,7 @@ def test_what_is_walked_is_the_total(study):
     assert sum(walked) == pytest.approx(study.total, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_walked_at_least_to_the_first_falls():
     """Rebuilding a gait needs strides of it, and copies of a policy walks of their own."""
     study = AnyStiffness(stiffness=("recorded", "people"), episodes=1, seconds=6.0)

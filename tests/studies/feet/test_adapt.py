@@ -91,6 +91,7 @@ def test_a_foot_that_makes_steps_uneven_costs_and_falls_cost_most():
     assert paid[0] < paid[1] < 30 < paid[2]
 
 
+@pytest.mark.slow
 def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
     feet = tmp_path / "adapted.json"
     words = ["adapt", "--generations", "1", "--population", "2", "--searches", "1", "--feet", str(feet)]
@@ -121,6 +122,7 @@ def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
     assert "foot must be one of 'intact', 'rigid'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_same_seed_finds_the_same(tmp_path):
     found = []
     for index in range(2):

@@ -103,6 +103,7 @@ def test_a_cure_has_no_falls_with_any_stiffer_spring_of_its_rest_angle():
     assert weakest_cure([row | {"falls": 1} for row in map_of], "falls") is None
 
 
+@pytest.mark.slow
 def test_quick_walks_and_the_same_command_writes_the_same_numbers(tmp_path):
     for name in ("one", "two"):
         words = ["orthosis", "--quick", "--out", str(tmp_path / f"{name}-out")]

@@ -176,6 +176,7 @@ def test_both_searches_of_every_kind_are_committed():
             assert kept_name(kind, search) in committed_feet()
 
 
+@pytest.mark.slow
 def test_quick_walks_and_the_same_command_writes_the_same_numbers(tmp_path):
     for name in ("one", "two"):
         words = ["prosthesis", "--quick", "--out", str(tmp_path / name), "--policies", str(tmp_path)]

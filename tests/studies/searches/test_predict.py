@@ -16,6 +16,7 @@ from springfoot.studies.searches.kept_search import generations
 from springfoot.studies.searches.prediction_table import PREDICTION, people_numbers, plan_numbers, prediction_table
 
 
+@pytest.mark.slow
 def test_all_stages_run_and_a_second_time_nothing_is_done_again(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     pages, before = [], {}

@@ -62,6 +62,7 @@ def test_the_committed_numbers_pay_less_than_none():
     assert slopes.cost(walked[0], level) < slopes.cost(harder, level) < slopes.cost(walked[1], level)
 
 
+@pytest.mark.slow
 def test_better_numbers_are_written_with_their_command_and_worse_ones_are_not(monkeypatch, capsys, constants):
     monkeypatch.setattr(slopes, "JUDGED_WALKS", 1)
     monkeypatch.setattr(slopes, "JUDGED_SECONDS", 3.0)

@@ -124,6 +124,7 @@ def test_bad_flags_are_refused_before_anything_walks(flags, message):
         Influence(**flags).check()
 
 
+@pytest.mark.slow
 def test_the_same_seeds_give_the_same_files_with_any_number_of_threads(tmp_path, capsys):
     for threads in (1, 2):
         assert Influence(quick=True, threads=threads, out=tmp_path / str(threads)).run("influence") == 0

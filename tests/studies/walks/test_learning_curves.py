@@ -3,6 +3,7 @@
 import dataclasses
 import json
 
+import pytest
 from drawn import has_line, kept_figures
 
 from springfoot.agents.training.config import TrainingConfig
@@ -19,6 +20,7 @@ def test_the_last_fall_counts():
     assert first_without_falls(entries[:3]) is None
 
 
+@pytest.mark.slow
 def test_the_command_draws_and_judges_a_run(tmp_path, capsys):
     config = TrainingConfig(
         timesteps=64,
