@@ -1,10 +1,31 @@
-"""A real browser for tests of pages; how to get one is the reason of the skip."""
+"""Kernels compiled before the tests begin; and a real browser for tests of pages, or why they are skipped."""
 
 import shutil
+import subprocess
+import sys
 
 import pytest
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+COMPILE = """
+from springfoot.envs import SegmentedFootBipedVector
+
+for settings in (
+    {"start": "standing", "left_foot": "passive"},
+    {"speed_range": (1.0, 1.4), "speed_interval": 1.0, "decisions": "event"},
+):
+    environments = SegmentedFootBipedVector(num_envs=2, **settings)
+    environments.reset(seed=0)
+    for _ in range(150):
+        environments.step(environments.action_space.sample())
+"""
+"""A program that calls every kernel, so that numba has them all in its cache."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes():
+    """Compile the kernels once, before pytest-xdist starts its workers: each would compile all of them."""
+    subprocess.run([sys.executable, "-c", COMPILE], check=False)  # what fails here fails in the tests
 
 
 @pytest.fixture(scope="module")
