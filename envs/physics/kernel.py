@@ -91,7 +91,7 @@ class _DigestedFile:
         digest, content = found
         if sha256(content).digest() != digest:
             raise ValueError("damaged")
-        return pickle.loads(content)
+        return pickle.loads(content)  # noqa: S301  # written by numba here, and whole by its digest
 
 
 @cache

@@ -1,11 +1,11 @@
 """Copies of environments, by pickle or deepcopy, and environments in other processes: bits go on equal."""
 
 import copy
-import pickle
+import pickle  # noqa: TID251  # environments are copied by it
 from functools import partial
 from typing import Any
 
-import cloudpickle
+import cloudpickle  # noqa: TID251  # environments are copied by it
 import gymnasium as gym
 import numpy as np
 import pytest

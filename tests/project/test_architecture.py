@@ -1,14 +1,11 @@
-"""The house stays easy to see: no file too long, no public name with two meanings; and no file is run by reading it."""
+"""The house stays easy to see: no public name with two meanings; and no file is run by reading it."""
 
 import ast
 from collections import defaultdict
 from pathlib import Path
 
-import pytest
-
 REPOSITORY = Path(__file__).parents[2]
 ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli")
-MOST_LINES = 300
 FILES = sorted(path for room in ROOMS for path in (REPOSITORY / room).rglob("*.py"))
 
 
@@ -24,12 +21,6 @@ def names_defined_in(path: Path) -> set[str]:
     return {name for name in names if not name.startswith("_")} - {"main"}  # what a module does as a command
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(REPOSITORY)))
-def test_no_file_of_the_five_packages_is_too_long(path):
-    lines = path.read_text(encoding="utf-8").count("\n")
-    assert lines <= MOST_LINES
-
-
 def test_no_public_name_means_different_things_in_two_packages():
     rooms_of: dict[str, set[str]] = defaultdict(set)
     for path in FILES:
@@ -38,23 +29,16 @@ def test_no_public_name_means_different_things_in_two_packages():
     assert {name: sorted(rooms) for name, rooms in rooms_of.items() if len(rooms) > 1} == {}
 
 
-OF_NUMBA = {"kernel.py": {"pickle"}}  # its cache of compiled kernels, which are pickles; no file that a user hands over
 SOURCES = sorted(path for room in ("package", "examples", "benchmarks") for path in (REPOSITORY / room).rglob("*.py"))
 SOURCES += [*FILES, *sorted(REPOSITORY.glob("*.py"))]
-UNPICKLERS = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
 LOADERS = {"torch.load", "PPO.load", "VecNormalize.load"}
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(REPOSITORY)))
-def test_nothing_executes_what_a_file_says(path):
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names = {alias.name.partition(".")[0] for alias in node.names} - OF_NUMBA.get(path.name, set())
-            assert not UNPICKLERS & names, f"{path}:{node.lineno}"
-        elif isinstance(node, ast.ImportFrom):
-            assert (node.module or "").partition(".")[0] not in UNPICKLERS, f"{path}:{node.lineno}"
-        elif isinstance(node, ast.Call):
-            called = ast.unparse(node.func)
-            assert called not in {"eval", "exec"}, f"{path}:{node.lineno}"
-            assert ".".join(called.split(".")[-2:]) not in LOADERS, f"{path}:{node.lineno}"
-            assert "allow_pickle" not in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"
+def test_nothing_executes_what_a_file_says():
+    """Of what reads pickles, the calls that the rules S102 to S307 of ruff and the contracts do not know."""
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                called = ast.unparse(node.func)
+                assert ".".join(called.split(".")[-2:]) not in LOADERS, f"{path}:{node.lineno}"
+                assert "allow_pickle" not in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"

@@ -2,7 +2,7 @@
 
 import copy
 import json
-import pickle
+import pickle  # noqa: TID251  # environments are copied by it
 from dataclasses import replace
 from typing import Any
 
