@@ -1,7 +1,7 @@
 """What needs a learner: training by PPO, policies as files, and the baselines they are held against.
 
-Training and the stable-baselines3 environment import torch; they are imported when first asked for, so that a policy
-can be loaded and run where torch is not installed.
+A name is imported when it is first asked for: a policy can be loaded and run where torch is not installed, and the
+configuration of a training needs no simulator.
 """
 
 from importlib import import_module
@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from springfoot.extras import naming_extras
 
-with naming_extras():
+if TYPE_CHECKING:
     from .policies.baselines import BASELINES, PolicyFunction, baseline
     from .policies.conversion import policy_from_mlp, policy_from_sb3
     from .policies.export import export_policy
     from .policies.foreign import ForeignPolicy
     from .policies.policy import Policy, load_policy, read_policy, save_policy
     from .training.config import PRESETS, TrainingConfig
-
-if TYPE_CHECKING:
     from .training.multi_seed import train_seeds
     from .training.sb3_vec_env import SegmentedFootBipedVecEnv
     from .training.training import resume, train
@@ -42,9 +40,22 @@ __all__ = [
     "train_seeds",
 ]
 
-_NEEDS_TORCH = {
+_MODULE = {
+    "BASELINES": "policies.baselines",
+    "ForeignPolicy": "policies.foreign",
+    "PRESETS": "training.config",
+    "Policy": "policies.policy",
+    "PolicyFunction": "policies.baselines",
     "SegmentedFootBipedVecEnv": "training.sb3_vec_env",
+    "TrainingConfig": "training.config",
+    "baseline": "policies.baselines",
+    "export_policy": "policies.export",
+    "load_policy": "policies.policy",
+    "policy_from_mlp": "policies.conversion",
+    "policy_from_sb3": "policies.conversion",
+    "read_policy": "policies.policy",
     "resume": "training.training",
+    "save_policy": "policies.policy",
     "train": "training.training",
     "train_seeds": "training.multi_seed",
 }
@@ -52,7 +63,7 @@ _NEEDS_TORCH = {
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
 
     def __getattr__(name: str) -> Any:
-        if name not in _NEEDS_TORCH:
+        if name not in _MODULE:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         with naming_extras():
-            return getattr(import_module(f"{__name__}.{_NEEDS_TORCH[name]}"), name)
+            return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)

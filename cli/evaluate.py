@@ -11,11 +11,8 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from springfoot.agents.policies.baselines import FROZEN, has_feedback
 from springfoot.command_line import end_in_order, exit_code, parse
-from springfoot.envs.physics.simulation import MOST_THREADS
-from springfoot.errors import MOST_COUNT, SpringfootError, printable, require_count
-from springfoot.evaluation.recording.policies import policy_label
+from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, printable, require_count
 from springfoot.files.writing import whole_folder
 from springfoot.studies.base.flags import SettingsFlags, given
 
@@ -88,6 +85,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     labels = _labels(flags.policies)
     if flags.out is not None and flags.out.exists():
         raise SpringfootError(f"{flags.out} exists already; give --out a new folder")
+    from springfoot.agents.policies.baselines import FROZEN, has_feedback
     from springfoot.evaluation.numbers import metrics
     from springfoot.evaluation.page import (
         report_page,  # not above: Matplotlib takes a while, and bad flags need not wait for it
@@ -175,6 +173,8 @@ def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
 
 def _labels(names: Sequence[str]) -> list[str]:
     """What results call the policies: no two the same, in capitals or not, and none as the page beside them."""
+    from springfoot.evaluation.recording.policies import policy_label
+
     labels: list[str] = []
     taken = {"report.html"}
     for label in map(policy_label, names):

@@ -8,8 +8,6 @@ from typing import Annotated
 
 import tyro
 
-from springfoot.agents.policies.baselines import has_feedback
-from springfoot.agents.policies.foreign import is_function
 from springfoot.command_line import end_in_order, exit_code, parse
 from springfoot.errors import SpringfootError
 
@@ -38,7 +36,9 @@ def export_main(arguments: Sequence[str] | None = None, program: str = "springfo
 
 def run_export(flags: ExportFlags) -> None:
     """Export, then print where the results are."""
+    from springfoot.agents.policies.baselines import has_feedback
     from springfoot.agents.policies.export import export_policy, planned_files
+    from springfoot.agents.policies.foreign import is_function
     from springfoot.agents.policies.policy import read_policy
 
     end_in_order()

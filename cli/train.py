@@ -9,9 +9,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from springfoot.agents.policies.policy import RUN
 from springfoot.agents.training.config import PRESETS, TrainingConfig
-from springfoot.agents.training.run_record import runs_within
 from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError, require_count
@@ -66,6 +64,9 @@ def train_main(arguments: Sequence[str] | None = None, program: str = "train.py"
 def run_training(flags: TrainFlags) -> int:
     """Train or continue a run, then print where the results are."""
     settings = given(flags.training) | given(flags.environment)
+    from springfoot.agents.policies.policy import RUN  # here, as below: help and bad flags need no simulator
+    from springfoot.agents.training.run_record import runs_within
+
     if (flags.out is None) == (flags.resume is None):
         raise SpringfootError("give either --out NEW_FOLDER or --resume FOLDER")
     if flags.out is not None:
@@ -113,6 +114,7 @@ def run_training(flags: TrainFlags) -> int:
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     """Train from several seeds, then print how far they agree and where the results are."""
+    from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training import multi_seed
 
     end_in_order()

@@ -1,12 +1,20 @@
-"""The walking model in MuJoCo, as Gymnasium environments; importing it registers `SegmentedFootBiped-v0`."""
+"""The walking model in MuJoCo, as Gymnasium environments; importing it registers `SegmentedFootBiped-v0`.
+
+Settings need no simulator; MuJoCo and numba are imported with the first name that walks.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
-from .batch.biped_batch import Biped
-from .batch.step_result import TERMINATIONS
-from .env import SegmentedFootBiped
 from .settings.settings import BipedSettings, body_of, reference_gait, settings_from, settings_to_json
-from .vector_env import SegmentedFootBipedVector
+
+if TYPE_CHECKING:
+    from .batch.biped_batch import Biped
+    from .batch.step_result import TERMINATIONS
+    from .env import SegmentedFootBiped
+    from .vector_env import SegmentedFootBipedVector
 
 __all__ = [
     "TERMINATIONS",
@@ -20,8 +28,22 @@ __all__ = [
     "settings_to_json",
 ]
 
+_MODULE = {
+    "Biped": "batch.biped_batch",
+    "SegmentedFootBiped": "env",
+    "SegmentedFootBipedVector": "vector_env",
+    "TERMINATIONS": "batch.step_result",
+}
+
 gym.register(
     id="SegmentedFootBiped-v0",
     entry_point="springfoot.envs.env:SegmentedFootBiped",
     vector_entry_point="springfoot.envs.vector_env:SegmentedFootBipedVector",
 )
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULE:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)

@@ -11,12 +11,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 
 from .batch.biped_batch import Biped
 from .batch.step_result import INFO, StepResult, report_start
 from .gym_face import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
-from .physics.simulation import MOST_THREADS
 from .settings.checks import MOST_ENVIRONMENTS, check_seed
 from .settings.feet import each_foot
 from .settings.settings import BipedSettings, settings_from

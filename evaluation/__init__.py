@@ -1,6 +1,6 @@
 """From recorded walks to a verdict: how human a walk is.
 
-What draws imports matplotlib and Pillow; it is imported when first asked for.
+A name is imported when it is first asked for: what draws needs matplotlib and Pillow, criteria and curves no simulator.
 """
 
 from importlib import import_module
@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from springfoot.extras import naming_extras
 
-from .numbers.criteria import HUMAN_LIKE, WALKS, Criterion, unmet
-from .numbers.curves import StrideCurves
-from .numbers.metrics import Gait, measure
-from .recording.open_loop import open_loop_copy
-from .recording.policies import prepare
-from .recording.recording import Recording, load_recording, record, record_each
-
 if TYPE_CHECKING:
+    from .numbers.criteria import HUMAN_LIKE, WALKS, Criterion, unmet
+    from .numbers.curves import StrideCurves
+    from .numbers.metrics import Gait, measure
+    from .recording.open_loop import open_loop_copy
+    from .recording.policies import prepare
+    from .recording.recording import Recording, load_recording, record, record_each
     from .report.animation import save_animation
     from .report.gait_figure import save_gait_figure
     from .report.gait_table import print_table
@@ -42,10 +41,23 @@ __all__ = [
     "write_report",
 ]
 
-_DRAWS = {
+_MODULE = {
+    "Criterion": "numbers.criteria",
+    "Gait": "numbers.metrics",
+    "HUMAN_LIKE": "numbers.criteria",
+    "Recording": "recording.recording",
+    "StrideCurves": "numbers.curves",
+    "WALKS": "numbers.criteria",
+    "load_recording": "recording.recording",
+    "measure": "numbers.metrics",
+    "open_loop_copy": "recording.open_loop",
+    "prepare": "recording.policies",
     "print_table": "report.gait_table",
+    "record": "recording.recording",
+    "record_each": "recording.recording",
     "save_animation": "report.animation",
     "save_gait_figure": "report.gait_figure",
+    "unmet": "numbers.criteria",
     "write_gait_cycle": "report.report",
     "write_report": "report.report",
 }
@@ -53,7 +65,7 @@ _DRAWS = {
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
 
     def __getattr__(name: str) -> Any:
-        if name not in _DRAWS:
+        if name not in _MODULE:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         with naming_extras():
-            return getattr(import_module(f"{__name__}.{_DRAWS[name]}"), name)
+            return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)

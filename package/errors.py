@@ -5,6 +5,8 @@ from numbers import Integral, Real
 
 MOST_COUNT = 10**12
 """Largest count of anything; chosen."""
+MOST_THREADS = 1024
+"""Most threads of the physics; chosen, beyond all machines."""
 
 
 class SpringfootError(ValueError):

@@ -6,10 +6,9 @@ from itertools import pairwise
 from numbers import Integral
 from typing import Any
 
-from springfoot.envs.physics.simulation import MOST_THREADS
 from springfoot.envs.settings.checks import MOST_ENVIRONMENTS, refusing_unknown
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.errors import MOST_COUNT, SpringfootError, quoted, require_count, require_number
+from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, quoted, require_count, require_number
 
 WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
 """Units of the widest hidden layer, most of those layers, and most weights between them; chosen: a training state is

@@ -4,12 +4,14 @@ Contact softness scales with the body as in `envs.physics.model`.
 """
 
 from math import sqrt
-
-import mujoco
+from typing import TYPE_CHECKING
 
 from springfoot.gait.body.body import HEEL_RADIUS, Body
 
 from .timing import PHYSICS_STEP
+
+if TYPE_CHECKING:
+    import mujoco  # not at run time: settings read a constant here, and `--help` needs no simulator
 
 CONTACTS = ("heel", "ball", "toe")
 BALL_RADIUS, TOE_RADIUS = 0.02, 0.012
@@ -51,8 +53,10 @@ def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
     }
 
 
-def add_sphere(segment: mujoco.MjsBody, name: str, offset: tuple[float, float, float]) -> None:
+def add_sphere(segment: "mujoco.MjsBody", name: str, offset: tuple[float, float, float]) -> None:
     """Add a sphere to a segment; it touches the ground of its foot (see `add_touch`) and nothing else."""
+    import mujoco
+
     forward, up, radius = offset
     segment.add_geom(
         name=name,
@@ -65,7 +69,7 @@ def add_sphere(segment: mujoco.MjsBody, name: str, offset: tuple[float, float, f
     )
 
 
-def add_touch(spec: mujoco.MjSpec, contact: str, side: str, body: Body, friction: float) -> None:
+def add_touch(spec: "mujoco.MjSpec", contact: str, side: str, body: Body, friction: float) -> None:
     """Let a sphere touch the ground of its foot; softness scales with the body (time ~ sqrt(l), depth ~ l).
 
     It is an explicit pair because only a pair has a time constant of its own for friction.

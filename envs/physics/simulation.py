@@ -14,7 +14,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 from springfoot.gait.body.body import Body
 
 from .contact import CONTACTS, FRICTION
@@ -28,8 +28,6 @@ MjModel: TypeAlias = Any
 """A `mujoco.MjModel`; MuJoCo has no type stubs, and what it leaves unknown would be unknown in our users' files."""
 MjData: TypeAlias = Any
 """A `mujoco.MjData`, likewise."""
-MOST_THREADS = 1024
-"""Most threads of the physics; chosen, beyond all machines."""
 
 
 class Physics(NamedTuple):

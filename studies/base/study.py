@@ -14,9 +14,8 @@ from typing import Annotated, Any, ClassVar
 import tyro
 from tqdm import tqdm
 
-from springfoot.envs.physics.simulation import MOST_THREADS
 from springfoot.envs.settings.checks import LONGEST_EPISODE
-from springfoot.errors import MOST_COUNT, SpringfootError, require_count, require_number
+from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, require_count, require_number
 from springfoot.files.writing import whole_folder
 
 OnProgress = Callable[[float], object]
