@@ -1,6 +1,7 @@
 """The configuration of a training, and presets of it."""
 
 import dataclasses
+import os
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from numbers import Integral
@@ -134,3 +135,8 @@ def config_from_json(values: dict[str, Any]) -> TrainingConfig:
     if "environment" in plain:
         plain["environment"] = settings_from(**plain["environment"])
     return TrainingConfig(**plain)
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -17,7 +17,6 @@ from types import TracebackType
 from typing import Any
 
 from springfoot.command_line import end_in_order, exit_code, stopped_by
-from springfoot.envs.batch.biped_batch import Biped
 from springfoot.errors import SpringfootError, require_count
 from springfoot.files.locks import owned
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
@@ -25,10 +24,8 @@ from springfoot.files.writing import require_new, write_atomically
 from springfoot.gait.people.scores import mean_sd
 
 from ..policies.policy import RUN
-from .config import TrainingConfig, config_from_json, config_to_json
+from .config import TrainingConfig, config_from_json, config_to_json, processors
 from .run_record import read_record
-from .session import processors
-from .training import resume, train
 
 SEEDS = "seeds.json"
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -43,6 +40,8 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
     running ones save a usable policy and stop, and no more are started. Raises `SpringfootError`, with nothing
     written, if `out` exists and is not an empty folder.
     """
+    from springfoot.envs import Biped  # not above: help needs no simulator
+
     require_count("seeds", seeds)
     require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)
     out = require_new(out)
@@ -210,6 +209,8 @@ def _main() -> int:
 
 
 def _train(config: TrainingConfig, folder: str) -> int:
+    from .training import resume, train  # not above: torch takes seconds, which the process of all need not wait for
+
     _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
     end_in_order()
     record = resume(folder, threads=config.threads) if (Path(folder) / RUN).is_file() else train(config, folder)

@@ -1,7 +1,6 @@
 """One session of a run: PPO's callback, which logs, evaluates and saves between the updates."""
 
 import json
-import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -23,7 +22,7 @@ from ..policies.fingerprint import fingerprint, require_same
 from ..policies.policy import BEST, LAST, Policy, read_policy, save_policy
 from .callbacks import Onlooker, Onlookers, tell
 from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, checkpoints, write_checkpoint
-from .config import TrainingConfig, config_to_json
+from .config import TrainingConfig, config_to_json, processors
 from .learning_state import learning_state, restore_learning
 from .ppo import Learner
 from .progress import Progress
@@ -255,8 +254,3 @@ class Session(BaseCallback):
         if status == "interrupted" and self._stopping.signal is not None:
             self._record["signal"] = self._stopping.signal.name
         write_record(self._out, self._record)
-
-
-def processors() -> int:
-    """Processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
