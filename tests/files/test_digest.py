@@ -133,6 +133,7 @@ def test_gigabytes_in_place_of_data_of_the_package_are_refused_unread(tmp_path, 
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 50_000  # kB
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [

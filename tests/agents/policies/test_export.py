@@ -150,6 +150,7 @@ def test_exporting_twice_gives_the_same_bytes(tmp_path):
     assert all((tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes() for name in names)
 
 
+@pytest.mark.slow
 def test_the_walk_that_an_export_makes_earns_what_the_policys_does(tmp_path):
     policy = read_policy("pretrained")
     alone = dict.fromkeys(("height_range", "mass_range", "speed_range", "speed_interval", "slope_range_deg"))

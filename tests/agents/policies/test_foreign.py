@@ -37,6 +37,7 @@ def save_linear(
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [TensorProto.FLOAT, TensorProto.DOUBLE])
 @pytest.mark.parametrize("shape", [("N", D), ("N", "D"), (1, D), (D,)])
 def test_an_onnx_file_of_any_batch_is_a_policy(shape, kind, tmp_path):

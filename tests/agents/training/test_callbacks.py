@@ -74,6 +74,7 @@ def test_a_callback_may_end_the_training_which_can_be_resumed(tmp_path):
     assert [entry["timesteps"] for entry in told][-1] >= SHORT.timesteps
 
 
+@pytest.mark.slow
 def test_a_function_of_evaluations_may_end_the_training(tmp_path):
     record = training.train(SHORT, tmp_path / "run", callbacks=[lambda evaluation: evaluation["timesteps"] < 2048])
     assert record["status"] == "interrupted" and record["evaluations"][-1]["timesteps"] == 2048

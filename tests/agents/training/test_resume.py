@@ -157,6 +157,7 @@ def test_what_disagrees_with_the_last_checkpoint_is_made_again(whole, tmp_path, 
     assert (folder / lost).is_file() and not list(folder.rglob(".*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("evaluation", [{}, {"timesteps": "x"}])
 def test_an_evaluation_that_is_none_is_no_record(whole, tmp_path, evaluation):
     folder = shutil.copytree(whole, tmp_path / "run")

@@ -61,6 +61,7 @@ def test_a_policy_does_not_read_what_never_varied_in_its_training(run):
     assert np.abs(policy(other) - policy(seen)).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_a_policy_of_any_body_reads_speed_and_height_and_is_evaluated_on_one_body(tmp_path):
     preset = PRESETS["any-body"]
     environment = dataclasses.replace(preset.environment, episode_seconds=1.0)

@@ -51,6 +51,7 @@ print(whole(1.0), sum(whole.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 def test_a_change_in_another_file_reaches_the_kernels_that_use_it(tmp_path):
     (tmp_path / "caller.py").write_text(CALLER, encoding="utf-8")
 

@@ -38,6 +38,7 @@ def test_people_scrambled_walk_the_same_bits(noise_file, more):
     assert digest(**more) == digest(**more, people_file=noise_file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pays", ["likeness", "effort"])
 def test_people_scrambled_cost_a_search_the_same(noise_file, pays):
     candidates = [generic_constants(), leg_constants("planned", "people", guide="plan")]

@@ -106,6 +106,7 @@ def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_t
     assert rest[1] == pytest.approx(rest[0], abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_copy_decides_when_it_is_told_and_keeps_the_stiffness_of_the_policys_own_decisions():
     (one, at_50), (other, at_100) = (prepare("frozen:pretrained", {"decisions": each}) for each in ("50hz", "100hz"))
     assert (at_50.decisions, at_100.decisions) == ("50hz", "100hz")

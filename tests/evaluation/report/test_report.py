@@ -192,6 +192,7 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
     assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} - PARQUET == {*FILES, "report.html"}
 
 
+@pytest.mark.slow
 def test_a_gait_that_was_measured_here_can_be_walked_after(command, folder, tmp_path):
     curves = folder / "gait_cycle.csv"
     code, out, _ = command("schedule", "--episodes", "1", "--seconds", "10", "--human", str(curves), "--out", "own")

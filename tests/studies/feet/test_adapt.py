@@ -140,6 +140,7 @@ def test_the_same_seed_finds_the_same(tmp_path):
     assert "rigid, search 2" in json.loads((tmp_path / "0.json").read_text())["feet"]
 
 
+@pytest.mark.slow
 def test_a_search_that_was_stopped_is_searched_anew_and_a_finished_one_is_not(tmp_path, capsys, monkeypatch):
     command = "springfoot study adapt --foot rigid --searches 1 --generations 1 --population 2 --episodes 1 --seconds 1"
     known, to = tmp_path / "known.json", tmp_path / "to.json"

@@ -54,6 +54,7 @@ class Stop(BaseCallback):
         return self.n_calls < 3
 
 
+@pytest.mark.slow
 def test_resume_keeps_finished_trainings(monkeypatch, capsys, tmp_path):
     quick = TrainingConfig(
         num_envs=8, update_steps=512, eval_interval=512, eval_episodes=2, environment=BipedSettings(episode_seconds=0.5)
