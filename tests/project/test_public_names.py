@@ -60,6 +60,12 @@ def test_readers_import_from_rooms_only(name, code):
             {"stable_baselines3", "torch"},
         ),
         ("from springfoot.evaluation import measure, prepare, record", {"matplotlib", "PIL", "torch"}),
+        (
+            "from springfoot.agents import TrainingConfig; from springfoot.envs import BipedSettings",
+            {"mujoco", "numba"},
+        ),
+        ("import springfoot.cli.train, springfoot.cli.evaluate, springfoot.cli.export", {"mujoco", "numba", "torch"}),
+        ("from springfoot.cli.main import STUDIES, study_class; [study_class(name) for name in STUDIES]", {"torch"}),
     ],
 )
 def test_a_light_name_imports_nothing_heavy(code, absent):
