@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet clean
+.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet docs clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -18,12 +18,13 @@ help:
 	@echo "make test-all run all tests, those marked slow too (trainings, kills, studies twice): ten minutes on two cores"
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
-	@echo "make test-learners  train with every library of docs/learners.md, each outside $(VENV); goes on after a stop"
+	@echo "make test-learners  train with every library of docs/how-to/learners.md, each outside $(VENV); goes on after a stop"
 	@echo "make test-kills   end 20 trainings several times each, resume them, and compare them with uninterrupted ones"
 	@echo "make fuzz     change files of every kind at random for ten minutes, and read them"
 	@echo "make extremes ten million extreme steps in drawn settings: is all finite, and the memory flat?"
 	@echo "make mutants  60 wrong signs, comparisons and indices: does a test fail? hours; goes on after a stop"
 	@echo "make check    format, lint, types, import floors, all tests: what has to pass before a change lands"
+	@echo "make docs     build the site in build/site; a warning is an error"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
 	@echo "make feet     what feet are worth, from committed people and policies; goes on after a stop; FULL=1: searches, trains"
@@ -106,6 +107,13 @@ check: install build/typing/made
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	PYTHONPATH=build/typing $(BIN)/lint-imports
 	$(PYTEST)
+
+docs: install build/typing/made $(VENV)/docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
+$(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/installed
+	$(BIN)/pip install --disable-pip-version-check --constraint constraints.txt --editable ".[docs]"
+	@touch $@
 
 format: install
 	$(BIN)/ruff check --fix .

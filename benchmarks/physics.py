@@ -1,4 +1,4 @@
-"""Which physics settings and joint constants leave the walk unchanged: the tables of docs/physics.md.
+"""Which physics settings and joint constants leave the walk unchanged: the tables of docs/results/cost.md.
 
     python -m benchmarks.physics
     python -m benchmarks.physics --policies schedule --episodes 4

@@ -111,7 +111,7 @@ def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def contract_of(policy: Policy) -> dict[str, Any]:
-    """The contract of a policy, as plain JSON values; docs/policies.md explains each of them."""
+    """The contract of a policy, as plain JSON values; docs/how-to/policies.md explains each of them."""
     settings, scale, header = policy.settings, scale_of(policy.settings), policy.header
     bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
     contract = {

@@ -1,7 +1,7 @@
 """Schedules in files as policies: K over the stride (CSV), or the springs of a few finite states (JSON).
 
-An evaluation writes both of its walk (`springfoot.evaluation.report.schedule_tables`); docs/policies.md says what may
-stand in them. K scales with the body; a file that names none is of 1.70 m and 63 kg.
+An evaluation writes both of its walk (`springfoot.evaluation.report.schedule_tables`); docs/how-to/policies.md says
+what may stand in them. K scales with the body; a file that names none is of 1.70 m and 63 kg.
 """
 
 from collections.abc import Callable

@@ -21,7 +21,7 @@ FRICTION = 1.0
 """Coefficient of Coulomb friction between foot and ground [-]; chosen, as of rubber soles on a dry floor."""
 FRICTION_TIME = 0.004
 """Time constant [s] in which sliding is stopped. MuJoCo leaves the change of the contact's Jacobian out of its
-constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms (docs/design.md)."""
+constraints, so a loaded foot slides at that acceleration times half of this: 2 cm/s at 15 ms."""
 HEEL_CONTACT = {"solref": (0.02, 1.0), "solimp": (0.05, 0.95, 0.01)}
 """MuJoCo's contact of the heel pad at 1.70 m: time constant [s] and damping ratio [-]; impedance at zero and at full
 depth [-], and that depth [m]. Chosen together with the leg constants, which were tuned on it: another pad needs another

@@ -33,7 +33,7 @@ DAMPING_TIME = (0.031, 0.0377, 0.02, 0.02)
 
 Chosen, of the order of damping over stiffness in people's ankles in stance, 14 ms (0.016/1.14, 0.080/5.43: J. Medical
 Devices 12 (2018) 011010, abstract), and in a powered prosthesis, 8-20 ms (Sup et al. 2009, Table III). Like the next
-three constants it is varied in docs/physics.md.
+three constants it is varied in docs/results/cost.md.
 """
 TORQUE_LIMIT = (200.0, 200.0, 200.0, 60.0)
 """Largest actuator torque [N m] at 1.70 m and 63 kg, in the order of `JOINTS`.
@@ -53,7 +53,7 @@ default of their code, PredSim, `damping_coefficient_all_dofs`).
 """
 JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
 """Stops of the joints [deg], in the order of `JOINTS`; chosen: walking on sound feet never reaches them
-(docs/physics.md), some of the people who have adapted to other feet do (docs/feet.md)."""
+(docs/results/cost.md), some of the people who have adapted to other feet do (docs/results/feet.md)."""
 
 _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
 

@@ -1,7 +1,7 @@
 """The three clocks of a simulated walk, each a whole number of the one before it."""
 
 PHYSICS_STEP = 0.002
-"""Physics step [s], the same for every body: half the cost of 1 ms, and the same gait (docs/physics.md)."""
+"""Physics step [s], the same for every body: half the cost of 1 ms, and the same gait (docs/results/cost.md)."""
 CONTROL_WINDOW = 0.01
 """Control window [s]: controls are held and forces averaged over it; chosen."""
 ACTION_STEP = 0.02

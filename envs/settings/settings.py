@@ -109,7 +109,7 @@ class BipedSettings:
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
     guide: Guide = field(default="people", metadata=_REFERENCE)
     """What the controller follows, what is fed forward, what starts an episode and what the reward holds against:
-    people's walk; or the plan's own (plan), of people the step length and time alone (`docs/prediction.md`)."""
+    people's walk; or the plan's own (plan), of people the step length and time alone (`docs/results/prediction.md`)."""
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     plan_file: str | None = field(default=None, metadata=_REFERENCE)

@@ -23,7 +23,7 @@ PEOPLES_SHARE = 0.9
 PEOPLES_ZMP = (0.020, 0.150)
 """ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m]; chosen: people's, to 0.5 cm."""
 LOWEST = 0.065
-"""Latest time of the lowest CoM over step time [-]; people's is 0.07 at 1.2 m/s (docs/thesis.md)."""
+"""Latest time of the lowest CoM over step time [-]; people's is 0.07 at 1.2 m/s (docs/results/thesis.md)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

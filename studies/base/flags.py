@@ -24,7 +24,7 @@ from springfoot.gait.springs.foot_file import read_foot
 from .flag_words import NOT_GIVEN, flag_of, spec
 
 
-def _field_help(settings: type) -> dict[str, str]:
+def field_help(settings: type) -> dict[str, str]:
     """The docstring below each field of a dataclass, on one line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
     return {
@@ -111,7 +111,7 @@ def optional_flags(
     theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
     `themes` has for it. Of the fields that the command refuses, by name, the help says `refused`: what is there for it.
     """
-    help_of, flags, themed = _field_help(settings), [], {theme: [] for theme in themes}
+    help_of, flags, themed = field_help(settings), [], {theme: [] for theme in themes}
     hints, metadata = get_type_hints(settings), {item.name: item.metadata for item in dataclasses.fields(settings)}
     for item_name, kind in hints.items():
         if item_name not in leave_out:

@@ -4,8 +4,8 @@ policy, and how it walks.
     springfoot study predict
 
 Nothing that was found before takes part: the plan's search begins at round numbers, that of leg constants at `generic`
-ones, the policy untrained. Of people it knows what docs/prediction.md lists. What each stage finds is kept in the
-folder `runs`; after a stop the same command goes on, with the bits of one that nothing interrupted.
+ones, the policy untrained. Of people it knows what docs/results/prediction.md lists. What each stage finds is kept in
+the folder `runs`; after a stop the same command goes on, with the bits of one that nothing interrupted.
 """
 
 import hashlib

@@ -31,8 +31,8 @@ from springfoot.gait.springs.stiffness import SPRINGS
 _EDGES = (0.0, LOADING_END_PERCENT / 100, PLATEAUS[4], PUSH_OFF_BEGIN_PERCENT / 100, 0.5, TOE_OFF[0], 1.0)
 _NAMES = ("loading", "early mid-stance", "late mid-stance", "heel-off", "push-off", "swing")
 PHASES = dict(zip(_NAMES, pairwise(_EDGES), strict=True))
-"""Begin and end of each phase of a leg's stride. They are the four of docs/metrics.md, with mid-stance cut where the
-schedule's late stance begins, push-off where the other foot lands, and toe-off where the schedule has it."""
+"""Begin and end of each phase of a leg's stride. They are the four of docs/reference/metrics.md, with mid-stance cut
+where the schedule's late stance begins, push-off where the other foot lands, and toe-off where the schedule has it."""
 CELLS = tuple(product(range(len(SPRINGS)), PHASES))
 """Where stiffness changes: joint (0 ankle, 1 toe) and phase; C = 12."""
 DURATIONS = ("one stride", "every stride")

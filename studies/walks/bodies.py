@@ -68,7 +68,7 @@ def walk_pairs(
     block: int = BATCH,
     progress: OnProgress = lambda seconds: None,
 ) -> list[dict[str, Any]]:
-    """One episode of each pair, and its numbers as in pairs.csv (docs/metrics.md); None where there is none.
+    """One episode of each pair, and its numbers as in pairs.csv (docs/reference/metrics.md); None where there is none.
 
     Arguments as for `recording.record_each`; `block` pairs at a time, whose series are then let go.
     """

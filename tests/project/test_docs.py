@@ -15,13 +15,14 @@ from springfoot.cli.export import ExportFlags
 from springfoot.cli.live import LiveFlags
 from springfoot.cli.main import STUDIES, main, study_class
 from springfoot.cli.train import TrainFlags
-from springfoot.evaluation import prepare
 from springfoot.gait import human_gait
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+GENERATED = ("settings", "commands", "observations", "api")
+"""Pages of the reference that `make docs` makes."""
 PREFIXES = ("python ", "make ", "springfoot ", "train.py ", "evaluate.py ")
 
 
@@ -64,24 +65,31 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page):
     links = re.findall(r"\]\(([^)#]+)", re.sub(r"\s+", " ", page.read_text(encoding="utf-8")))
-    assert all(link.startswith("https://") or (page.parent / link).exists() for link in links), links
+    generated = {(ROOT / "docs" / "reference" / f"{name}.md").resolve() for name in GENERATED}
+    dead = [
+        link
+        for link in links
+        if not link.startswith("https://")
+        and not (page.parent / link).exists()
+        and (page.parent / link).resolve() not in generated
+    ]
+    assert dead == []
 
 
 @pytest.mark.slow
 def test_readme_examples_run_in_their_order(folder):
-    code = "\n".join(BLOCKS).replace("range(500)", "range(50)").replace("1_000_000", "1")
-    assert len(BLOCKS) == 6
+    code = "\n".join(BLOCKS)
+    assert BLOCKS
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
-    assert prepare("mine.safetensors", {})[1].action_mode == "absolute"
 
 
 @pytest.mark.slow
 def test_the_examples_of_the_page_on_policies_run(folder):
-    page = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how-to" / "policies.md").read_text(encoding="utf-8")
     for command in commands_in(re.findall(r"```sh.*?```", page, re.DOTALL)[0]):
         assert main(shlex.split(command)[1:]) == 0
     code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
@@ -127,7 +135,9 @@ def test_every_command_that_a_document_names_is_understood(command):
 
 
 def test_every_test_that_guarantees_name_exists():
-    named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", (ROOT / "docs" / "guarantees.md").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "explanation" / "guarantees.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", page)
     assert len(named) > 20
     for file, test in named:
-        assert f"def {test}(" in (ROOT / "tests" / file).read_text(encoding="utf-8"), (file, test)
+        texts = [path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob(file)]
+        assert any(f"def {test}(" in text for text in texts), (file, test)

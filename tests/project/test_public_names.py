@@ -35,10 +35,10 @@ def sources():
     """What readers copy: the examples, and the Python blocks of the pages."""
     for path in sorted((ROOT / "examples").glob("*.py")):
         yield path.name, path.read_text(encoding="utf-8")
-    for page in sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]):
+    for page in sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]):
         blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
         if blocks:
-            yield page.name, "\n".join(blocks)
+            yield str(page.relative_to(ROOT)), "\n".join(blocks)
 
 
 @pytest.mark.parametrize(("name", "code"), [pytest.param(*source, id=source[0]) for source in sources()])

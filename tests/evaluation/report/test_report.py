@@ -244,9 +244,9 @@ def test_a_foreign_policy_name_lists_what_is_allowed():
         prepare("nonsense", {})
 
 
-# docs/metrics.md says what all of it means ----------------------------------------------------------------------
+# The page of metrics says what all of it means ----------------------------------------------------------------------
 
-DOCUMENT = (Path(__file__).parents[3] / "docs" / "metrics.md").read_text(encoding="utf-8")
+DOCUMENT = (Path(__file__).parents[3] / "docs" / "reference" / "metrics.md").read_text(encoding="utf-8")
 
 
 def documented(heading):
