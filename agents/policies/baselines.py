@@ -24,7 +24,7 @@ from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.errors import SpringfootError
 from springfoot.gait.body.body import Body
 from springfoot.gait.body.tissue import TOE_STIFFNESS
-from springfoot.gait.springs.stiffness import PRINTED_SWING, THESIS_SWING, StiffnessSchedule, thesis_schedule
+from springfoot.gait.springs.stiffness import PRINTED_SWING, THESIS_SWING, thesis_schedule
 
 PolicyFunction = Callable[[NDArray], NDArray]
 """Observations (N, D) -> actions (N, 4) in [-1, 1]."""
@@ -71,7 +71,7 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
     """
     body, speeds = body_of(settings), tabulated_speeds(settings)
     if settings.schedule is not None:
-        stiffness = StiffnessSchedule.from_json(settings.schedule).at(GRID)[0]
+        stiffness = settings.schedule.at(GRID)[0]
         return follow(factor * stiffness[None], speeds[:1], settings, body)
     left, right = walks_of_legs(settings)
     stiffness = np.stack([_scheduled(left), _scheduled(right)], 2) if right else _scheduled(left)

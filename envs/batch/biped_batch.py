@@ -28,7 +28,6 @@ from ..physics.model import ACTIONS, JOINTS, SIDES
 from ..physics.simulation import MjData, MjModel, Simulation
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.checks import real_numbers
-from ..settings.feet import feet_of
 from ..settings.settings import BipedSettings
 from ..task.ground import Ground
 from ..task.initial_state import place, random_phase, start_table, walking_posture
@@ -87,7 +86,7 @@ class Biped(ExactState):
         table, right = list(rows(self.walks)), list(rows(self.right_walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
-        feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * num_envs
+        feet = feet or [settings.feet] * num_envs
         incline = slope_table(slope or slope_constants())
         self._legs = LegController(table, self.subjects, right)
         planned, stiffness = foot_tables(settings, (*table, *right))

@@ -7,7 +7,6 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
 from springfoot.gait.people.human import FootHabits, HumanGait, foot_habits
-from springfoot.gait.springs.stiffness import StiffnessSchedule
 
 from ..physics.model import ANKLE, TOE, damping_times
 from ..settings.settings import BipedSettings
@@ -37,7 +36,7 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
     if settings.schedule is None:
         stiffness, rest = fixed_stiffness(constants, walk.body, walk.human.foot.plateaus), neutral(constants)
     else:
-        stiffness, rest = StiffnessSchedule.from_json(settings.schedule).at(GRID)
+        stiffness, rest = settings.schedule.at(GRID)
     match settings.equilibrium:
         case "planned":
             rest = planned(constants, walk)

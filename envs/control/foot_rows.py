@@ -10,7 +10,6 @@ from springfoot.gait.springs.stiffness import StiffnessSchedule
 
 from ..physics.foot import LOCK, Feet
 from ..physics.kernel import part
-from ..settings.feet import feet_of
 from ..settings.settings import BipedSettings
 from .phase_table import GRID, SAMPLES, PhaseTable, read
 from .state import FOOT, PLACE
@@ -91,5 +90,4 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
 
 def controlled_joints(settings: BipedSettings) -> NDArray:
     """(side, 2) whether actions set the stiffness of ankle and toe; others are read as 0."""
-    feet = feet_of(settings.left_foot, settings.right_foot)
-    return foot_rows(settings, [feet])["controlled"][0].astype(bool)
+    return foot_rows(settings, [settings.feet])["controlled"][0].astype(bool)

@@ -17,7 +17,6 @@ from ..physics.foot import Feet
 from ..physics.kernel import kernel, part
 from ..physics.model import ANKLE
 from ..physics.timing import CONTROL_WINDOW
-from ..settings.feet import feet_of
 from ..settings.settings import BipedSettings
 from .foot_rows import device, foot_lines, foot_rows
 from .phase_table import PhaseTable, read
@@ -259,7 +258,7 @@ class FootSprings:
         subjects: Subjects,
         feet: Sequence[Feet] | None = None,
     ):
-        feet = feet or [feet_of(settings.left_foot, settings.right_foot)] * len(subjects.rows)
+        feet = feet or [settings.feet] * len(subjects.rows)
         subjects.rows["feet"], self.feet = foot_rows(settings, feet), tuple(foot_lines(feet))
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)

@@ -30,11 +30,8 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
 
     Raises `SpringfootError` where both feet have it, and for settings other than those the legs were found in.
     """
-    found = [
-        (side, foot[ADAPTED])
-        for side, name in enumerate(FOOT_SETTINGS)
-        if isinstance(foot := getattr(settings, name), Mapping) and ADAPTED in foot
-    ]
+    feet = settings.left_foot, settings.right_foot
+    found = [(side, foot.adapted) for side, foot in enumerate(feet) if foot.adapted is not None]
     if not found:
         return None
     if len(found) > 1:

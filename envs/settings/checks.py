@@ -51,15 +51,15 @@ def check_people_file(name: object) -> None:
         harmonics(Path(name))
 
 
-def check_guide(guide: str, human: object, plan_file: object) -> None:
+def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
     """Refuse somebody's walk where the plan is the guide, and a file of plans where it is not."""
-    if guide == "plan" and human is not None:
+    if follows_plan and human is not None:
         raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
     if plan_file is not None:
         if not isinstance(plan_file, str):
             raise SpringfootError(f"plan_file must be the name of a file, got {quoted(plan_file)}")
-        if guide != "plan":
-            raise SpringfootError(f"plan_file needs guide 'plan', got {guide!r}")
+        if not follows_plan:
+            raise SpringfootError("plan_file needs guide 'plan', got 'people'")
         styles_of(Path(plan_file))  # raises for another kind of file
 
 

@@ -1,10 +1,12 @@
-"""The feet that the settings `left_foot` and `right_foot` name: kinds, their numbers, and what makes a `Foot` of them.
+"""The settings `left_foot` and `right_foot`: kinds of feet and their numbers, read once into a `FootSetting`.
 
-A foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind, in plain JSON values;
+In plain JSON values a foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind;
 `adapted` says that the person has adapted to it (`envs.settings.adapted`).
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from math import radians
 from typing import Any, NamedTuple
@@ -83,11 +85,58 @@ to a share of `envs.physics.model.TORQUE_LIMIT`. `drop`: the ankle's muscles are
 """
 
 
-def foot_setting(name: str, value: Any) -> str | dict[str, Any]:
-    """A foot in its plain form: floats for numbers, a word where the kind says all.
+@dataclass(frozen=True, repr=False)
+class FootSetting:
+    """A foot of the settings; `foot_setting` makes and checks it."""
 
-    Raises `SpringfootError` for what is no foot; `name` is that of the setting.
+    plain: str | dict[str, Any]
+    """The foot in plain JSON values: floats for numbers, a word where the kind says all."""
+
+    def __repr__(self) -> str:
+        return repr(self.plain)
+
+    def __str__(self) -> str:
+        return str(self.plain)
+
+    def to_json(self) -> str | dict[str, Any]:
+        """Return the plain JSON values; `foot_setting` is the inverse."""
+        return self.plain
+
+    @property
+    def kind(self) -> str:
+        """The kind, one of `KINDS`."""
+        return self.plain if isinstance(self.plain, str) else self.plain["kind"]
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The given numbers, lines, schedule and orthosis by name; the usual ones hold for all others."""
+        given = {} if isinstance(self.plain, str) else self.plain
+        return {name: value for name, value in given.items() if name not in ("kind", ADAPTED)}
+
+    @property
+    def adapted(self) -> str | dict[str, Any] | None:
+        """The person who has adapted to the foot: a name, or leg constants by speed; None for nobody."""
+        return None if isinstance(self.plain, str) else self.plain.get(ADAPTED)
+
+    @cached_property
+    def foot(self) -> Foot:
+        """The foot as physics."""
+        return _physical(self.kind, self.numbers)
+
+
+INTACT_FOOT = FootSetting("intact")
+"""The setting of a sound leg's foot."""
+
+
+def foot_setting(name: str, value: Any) -> FootSetting:
+    """Return the foot of a setting, which may be one already or plain JSON values.
+
+    Raises `SpringfootError` for anything else; `name` is that of the setting.
     """
+    return value if isinstance(value, FootSetting) else FootSetting(_plain(name, value))
+
+
+def _plain(name: str, value: Any) -> str | dict[str, Any]:
     kind = value.get("kind") if isinstance(value, Mapping) else value
     if not isinstance(kind, str) or kind not in KINDS:
         form = "" if isinstance(value, (str, Mapping)) else ", or a dictionary with one of them as its 'kind'"
@@ -171,21 +220,10 @@ def _numbers(
     }
 
 
-def _adapted(setting: str | Mapping[str, Any]) -> Any:
-    return None if isinstance(setting, str) else setting.get(ADAPTED)
-
-
-def kind_of(setting: str | Mapping[str, Any]) -> str:
-    """The kind of a foot of the settings."""
-    return setting if isinstance(setting, str) else setting["kind"]
-
-
-def foot_of(setting: str | Mapping[str, Any]) -> Foot:
-    """The foot of a setting in its plain form."""
-    given: dict[str, Any] = {"kind": setting} if isinstance(setting, str) else dict(setting)
-    kind, orthosis = given.pop("kind"), given.pop("orthosis", None)
-    given.pop(ADAPTED, None)  # of the person, not of the foot
-    value: dict[str, Any] = _usual(KINDS[kind]) | given
+def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
+    """Return the foot of a kind with the given numbers."""
+    orthosis = given.get("orthosis")
+    value: dict[str, Any] = {**_usual(KINDS[kind]), **given}
     beside = (None, None) if orthosis is None else _springs(_usual(ORTHOSIS_NUMBERS) | orthosis)
     ankle, toe = (FootJoint(orthosis=spring) for spring in beside)
     match kind:
@@ -210,11 +248,6 @@ def foot_of(setting: str | Mapping[str, Any]) -> Foot:
     return Foot(kind=kind, ankle=ankle, toe=toe, schedule=schedule, one_piece=kind == "no_toe", **segments)
 
 
-def feet_of(left: str | Mapping[str, Any], right: str | Mapping[str, Any]) -> Feet:
-    """Both feet of settings in their plain form."""
-    return foot_of(left), foot_of(right)
-
-
 def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
     """Settings of which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
 
@@ -224,15 +257,15 @@ def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], li
     for name, feet in listed.items():
         if len(feet) != num:
             raise SpringfootError(f"{name} must be one foot or a list of {num}, got {len(feet)} feet")
-    plain = {
-        name: [foot_setting(name, foot) for foot in listed.get(name, [settings.get(name, "intact")] * num)]
+    all_feet = {
+        name: [foot_setting(name, foot) for foot in listed.get(name, [settings.get(name, INTACT_FOOT)] * num)]
         for name in FOOT_SETTINGS
     }
-    for name, feet in plain.items():
-        if any(_adapted(foot) != _adapted(feet[0]) for foot in feet):
+    for name, feet in all_feet.items():
+        if any(foot.adapted != feet[0].adapted for foot in feet):
             raise SpringfootError(f"{name}: all feet of a list must have the same {ADAPTED}, as legs are of the batch")
-    first = {name: feet[0] for name, feet in plain.items() if name in listed}
-    pairs = [feet_of(*pair) for pair in zip(*plain.values(), strict=True)]
+    first = {name: all_feet[name][0] for name in listed}
+    pairs = [(left.foot, right.foot) for left, right in zip(*all_feet.values(), strict=True)]
     return {**settings, **first}, pairs if listed else None
 
 

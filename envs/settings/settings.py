@@ -1,11 +1,12 @@
-"""Everything that can be set about the walking task: plain JSON values, validated in one place.
+"""Everything that can be set about the walking task: read from plain JSON values once, validated in one place.
 
-Flat, as `gym.make` takes them. Each also names its theme, once: of it are made the groups of `--help`, the table of the
-environment and what an evaluation sets anew.
+Flat, as `gym.make` takes them. Feet, `schedule` and `human` are held as objects; `settings_to_json` writes them plain.
+Each setting also names its theme, once: of it are made the groups of `--help`, the table of the environment and what an
+evaluation sets anew.
 """
 
 import json
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from math import ceil
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -18,6 +19,7 @@ from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.springs.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
 
 from ..physics.contact import FRICTION
+from ..physics.foot import Feet
 from ..physics.timing import ACTION_STEP
 from .checks import (
     check_bounds,
@@ -32,7 +34,7 @@ from .checks import (
     plain,
     refusing_unknown,
 )
-from .feet import FOOT_SETTINGS, foot_setting
+from .feet import FOOT_SETTINGS, INTACT_FOOT, FootSetting, foot_setting
 from .themes import CONDITION_THEMES, THEMES
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -75,7 +77,10 @@ _KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it se
 @refusing_unknown
 @dataclass(frozen=True, kw_only=True)
 class BipedSettings:
-    """The walking task of the biped with segmented feet; raises `SpringfootError` for a bad value."""
+    """The walking task of the biped with segmented feet; raises `SpringfootError` for a bad value.
+
+    Feet, `schedule` and `human` may be given in plain JSON values as well, and are held as objects.
+    """
 
     height: float = field(default=REFERENCE_HEIGHT, metadata=_BODY)
     """Standing height of the body [m]."""
@@ -87,11 +92,11 @@ class BipedSettings:
     """Length of the foot over the average at that height [-]."""
     carried_ratio: float = field(default=0.0, metadata=_BODY)
     """Mass of a load on the back over body mass [-]."""
-    left_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
+    left_foot: FootSetting = field(default=INTACT_FOOT, metadata=_FEET)
     """The left foot, a kind of `springfoot.envs.settings.feet` (intact, rigid, rigid_toe, no_toe, passive, adaptive,
     weak, drop) a dictionary of a `kind` and its numbers, `{"kind": "passive", "ankle_stiffness": 600}`, or, on the
     command line, a file (`springfoot.gait.springs.foot_file`)."""
-    right_foot: str | dict[str, Any] = field(default="intact", metadata=_FEET)
+    right_foot: FootSetting = field(default=INTACT_FOOT, metadata=_FEET)
     """The right foot, likewise."""
     speed: float = field(default=1.2, metadata=_SPEED)
     """Commanded walking speed [m/s]."""
@@ -131,10 +136,10 @@ class BipedSettings:
     """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     toe_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[1], 200.0), metadata=_SPRINGS)
     """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
-    schedule: dict[str, Any] | None = field(default=None, metadata=_SPRINGS)
+    schedule: StiffnessSchedule | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
-    human: dict[str, Any] | None = field(default=None, metadata=_REFERENCE)
+    human: OwnGait | None = field(default=None, metadata=_REFERENCE)
     """Someone's own walk in place of people's, JSON form of `springfoot.gait.people.own_data.OwnGait` (on the command
     line a CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time follow it."""
     episode_seconds: float = field(default=20.0, metadata=_EPISODE | _KEPT)
@@ -182,19 +187,19 @@ class BipedSettings:
         ):
             check_choice(name, getattr(self, name), get_args(choices))
         for name in FOOT_SETTINGS:
-            foot_setting(name, getattr(self, name))
+            object.__setattr__(self, name, foot_setting(name, getattr(self, name)))
         check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
         check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
-        if self.schedule is not None:
-            StiffnessSchedule.from_json(self.schedule)
-        elif self.equilibrium == "phase":
+        if self.schedule is not None and not isinstance(self.schedule, StiffnessSchedule):
+            object.__setattr__(self, "schedule", StiffnessSchedule.from_json(self.schedule))
+        if self.schedule is None and self.equilibrium == "phase":
             raise SpringfootError(
                 "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
             )
-        if self.human is not None:
-            OwnGait.from_json(self.human)
+        if self.human is not None and not isinstance(self.human, OwnGait):
+            object.__setattr__(self, "human", OwnGait.from_json(self.human))
         check_people_file(self.people_file)
-        check_guide(self.guide, self.human, self.plan_file)
+        check_guide(self.follows_plan, self.human, self.plan_file)
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
         if self.stop_at is not None:
@@ -206,6 +211,16 @@ class BipedSettings:
         self._check_world()
         check_weights(self.reward_weights, DEFAULT_WEIGHTS)
         check_bounds(self)
+
+    @property
+    def feet(self) -> Feet:
+        """The left and the right foot as physics."""
+        return self.left_foot.foot, self.right_foot.foot
+
+    @property
+    def follows_plan(self) -> bool:
+        """Whether the guide is the plan: the target is then the plan's own gait, else that of people."""
+        return self.guide == "plan"
 
     @property
     def step_seconds(self) -> float:
@@ -268,17 +283,13 @@ def settings_from(**values: Any) -> BipedSettings:
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    values = {name: foot_setting(name, each) if name in FOOT_SETTINGS else plain(each) for name, each in values.items()}
-    if values.get("schedule") is not None:
-        values["schedule"] = StiffnessSchedule.from_json(values["schedule"]).to_json()
-    if values.get("human") is not None:
-        values["human"] = OwnGait.from_json(values["human"]).to_json()
-    return BipedSettings(**values)
+    return BipedSettings(**{name: each if name in FOOT_SETTINGS else plain(each) for name, each in values.items()})
 
 
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
     """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
-    return json.loads(json.dumps(asdict(settings)))
+    values = {item.name: getattr(settings, item.name) for item in fields(settings)}
+    return json.loads(json.dumps(values, default=lambda value: value.to_json()))
 
 
 def body_of(settings: BipedSettings) -> Body:
@@ -296,4 +307,4 @@ def reference_gait(settings: BipedSettings) -> HumanGait:
     people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
     if settings.human is None:
         return human_gait(settings.speed, settings.height, people)
-    return OwnGait.from_json(settings.human).gait(settings.speed, settings.height, people)
+    return settings.human.gait(settings.speed, settings.height, people)

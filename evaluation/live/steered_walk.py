@@ -82,8 +82,8 @@ class Wishes:
     slope_deg: float = BipedSettings.slope_deg
     height: float = BipedSettings.height
     mass: float = BipedSettings.mass
-    left_foot: str | dict[str, Any] = BipedSettings.left_foot
-    right_foot: str | dict[str, Any] = BipedSettings.right_foot
+    left_foot: str | dict[str, Any] = "intact"
+    right_foot: str | dict[str, Any] = "intact"
 
 
 OFFSETS = ("ankle_offset_deg", "toe_offset_deg")

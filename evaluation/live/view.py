@@ -17,7 +17,7 @@ import viser
 from viser import uplot
 
 from springfoot.envs.physics.model import SIDES
-from springfoot.envs.settings.feet import KINDS, kind_of
+from springfoot.envs.settings.feet import KINDS
 from springfoot.envs.settings.settings import SLOPE_RANGE_DEG
 from springfoot.errors import SpringfootError
 from springfoot.gait.springs.stiffness import SPRINGS
@@ -206,4 +206,4 @@ class LiveView:
 
 def _shown(wish: Any) -> Any:
     """A wish as its slider or list shows it: of a foot its kind."""
-    return kind_of(wish) if isinstance(wish, dict) else wish
+    return wish["kind"] if isinstance(wish, dict) else wish

@@ -6,7 +6,6 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.physics.model import JOINTS, SIDES
-from springfoot.envs.settings.feet import feet_of, kind_of
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.gait.people import scores as score
 
@@ -23,12 +22,12 @@ ANGLE_COLUMNS = {
 
 def kinds_of(settings: BipedSettings) -> dict[str, str]:
     """`feet` of metrics.json: the kind of the left and of the right foot."""
-    return {"left": kind_of(settings.left_foot), "right": kind_of(settings.right_foot)}
+    return {"left": settings.left_foot.kind, "right": settings.right_foot.kind}
 
 
 def differ(settings: BipedSettings) -> bool:
     """Whether the two feet are not the same."""
-    left, right = feet_of(settings.left_foot, settings.right_foot)
+    left, right = settings.feet
     return left != right
 
 

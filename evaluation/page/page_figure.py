@@ -1,6 +1,5 @@
 """The body of `report.html`: two strides of it tick by tick, as plain JSON values, and what its feet are."""
 
-from collections.abc import Mapping
 from math import radians, tan
 from typing import Any
 
@@ -9,9 +8,9 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.envs.control.foot_springs import stiffness_ranges
 from springfoot.envs.physics.contact import contact_offsets
-from springfoot.envs.physics.foot import LOCK, Foot, FootJoint
+from springfoot.envs.physics.foot import LOCK, FootJoint
 from springfoot.envs.physics.model import SIDES
-from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, feet_of, kind_of
+from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts
@@ -44,14 +43,13 @@ def figure_data(recording: Recording) -> dict[str, Any]:
     steps = np.unique(np.concatenate([each.heel_strikes for each in contacts]))
     phase = np.append(whole["phase"], whole["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
     offsets, weight = contact_offsets(body), body.mass * GRAVITY
-    settings_of_feet = settings.left_foot, settings.right_foot
     acting = {"px": 1.0, "vx": weight, "vy": weight}
     return {
         "seconds_a_frame": TICK,
         "strides": bool(np.isfinite(percent[0]).any()),
         "slope": slope,
         "height": body.height,
-        "feet": [_foot(own, foot) for own, foot in zip(settings_of_feet, feet_of(*settings_of_feet), strict=True)],
+        "feet": [_foot(settings.left_foot), _foot(settings.right_foot)],
         "lengths": {
             "trunk": body.trunk_length,
             "thigh": body.thigh_length,
@@ -104,8 +102,9 @@ def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     return series["ankle"][every, side, 0] + ahead
 
 
-def _foot(setting: str | Mapping[str, Any], foot: Foot) -> dict[str, Any]:
+def _foot(setting: FootSetting) -> dict[str, Any]:
     """What a foot is, in words; whether it is one piece, without a toe joint; what is at its ankle and its toe."""
+    foot = setting.foot
     joints = [_at_joint(joint) for joint in foot.joints]
     worn = any(joint.orthosis is not None for joint in foot.joints)
     return {"words": foot_words(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": worn}
@@ -117,18 +116,17 @@ def _at_joint(joint: FootJoint) -> str:
     return "lock" if joint.device == LOCK else "device"
 
 
-def foot_words(setting: str | Mapping[str, Any]) -> str:
+def foot_words(setting: FootSetting) -> str:
     """A foot of the settings for people who read: its kind, and the numbers that were given of it."""
-    kind = kind_of(setting)
-    given = {} if isinstance(setting, str) else dict(setting)
-    known = KINDS[kind] | SEGMENT_RATIOS
+    given = setting.numbers
+    known = KINDS[setting.kind] | SEGMENT_RATIOS
     words = [f"{_plain(name)} {given[name]:g} {known[name].unit}" for name in known if name in given]
     words += [f"{_plain(name)} of {len(given[name])} points" for name in given if name.endswith("_table")]
     words += ["on a schedule of its own"] if "schedule" in given else []
     if "orthosis" in given:
         its = [f"{_plain(name)} {value:g} {ORTHOSIS_NUMBERS[name].unit}" for name, value in given["orthosis"].items()]
         words.append(f"in an orthosis with {' and '.join(its) or 'no spring'}")
-    return f"{_plain(kind)} ({', '.join(words)})" if words else _plain(kind)
+    return f"{_plain(setting.kind)} ({', '.join(words)})" if words else _plain(setting.kind)
 
 
 def _plain(name: str) -> str:

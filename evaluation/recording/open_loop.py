@@ -15,7 +15,6 @@ from springfoot.arrays import NDArray
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.standing import steady_walk
-from springfoot.envs.settings.feet import feet_of
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, THEME_OF, BipedSettings, body_of
 from springfoot.errors import SpringfootError
 from springfoot.gait.springs.stiffness import SPRINGS
@@ -41,8 +40,7 @@ SAME_K = 1e-9
 
 def deciding_legs(settings: BipedSettings) -> list[int]:
     """The sides whose springs follow the policy's stiffness at ankle and toe; in others either is a device."""
-    feet = feet_of(settings.left_foot, settings.right_foot)
-    return [side for side, foot in enumerate(feet) if not any(joint.device for joint in foot.joints)]
+    return [side for side, foot in enumerate(settings.feet) if not any(joint.device for joint in foot.joints)]
 
 
 def decided(

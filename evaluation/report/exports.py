@@ -16,7 +16,6 @@ from springfoot.arrays import NDArray
 from springfoot.envs.physics.contact import ground_name
 from springfoot.envs.physics.model import JOINTS, SIDES, build_spec
 from springfoot.envs.physics.model_file import model_text
-from springfoot.envs.settings.feet import feet_of
 from springfoot.envs.settings.settings import BipedSettings, body_of
 
 from ..numbers.series import mid_tick
@@ -84,7 +83,7 @@ def write_model(path: Path, recording: Recording) -> None:
 def sloping_spec(recording: Recording) -> MjSpec:
     """The model's specification of the recorded body and feet, its ground with the walk's slope."""
     settings = recording.settings
-    spec = build_spec(body_of(settings), settings.friction, feet_of(settings.left_foot, settings.right_foot))
+    spec = build_spec(body_of(settings), settings.friction, settings.feet)
     half = radians(settings.slope_deg) / 2
     for side in SIDES:
         spec.body(ground_name(side)).quat = (cos(half), 0.0, -sin(half), 0.0)

@@ -61,6 +61,9 @@ class OwnGait:
     sd: Mapping[str, NDArray]
     """As `mean`, of the standard deviation."""
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OwnGait) and self.to_json() == other.to_json()
+
     def gait(self, speed: float, height: float, people: str | Path = PEOPLE_FILE) -> HumanGait:
         """These curves as a `HumanGait`; what is missing is that of `people` of `height` [m] at `speed` [m/s].
 

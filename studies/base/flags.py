@@ -20,6 +20,7 @@ from springfoot.errors import quoted
 from springfoot.files.json_file import json_fault, keys_once, read_object
 from springfoot.gait.people.own_data import read_gait
 from springfoot.gait.springs.foot_file import read_foot
+from springfoot.gait.springs.stiffness import StiffnessSchedule
 
 from .flag_words import NOT_GIVEN, flag_of, spec
 
@@ -144,10 +145,10 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
     parts = get_args(kind)
     if name in FILE_FLAGS:
         how = spec(lambda words: words[0], "FILE")
-    elif dict not in (get_origin(kind), *map(get_origin, parts)):
-        how = flag_of(kind)
-    elif str in parts and get_origin(kind) is not dict:
+    elif name in FOOT_SETTINGS:
         how = spec(_read_word_or_json, "WORD|JSON|FILE")
+    elif get_origin(kind) is not dict and StiffnessSchedule not in parts:
+        how = flag_of(kind)
     else:
         how = spec(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
     return Annotated[Any, how, tyro.conf.arg(help=text, help_behavior_hint=hint)]

@@ -27,7 +27,7 @@ from springfoot.envs.control.person import person_constants
 from springfoot.envs.physics.model import LEFT, RIGHT
 from springfoot.envs.settings.adapted import without_person
 from springfoot.envs.settings.checks import LONGEST_EPISODE
-from springfoot.envs.settings.feet import SPRING_NUMBERS, foot_of, foot_setting, kind_of
+from springfoot.envs.settings.feet import SPRING_NUMBERS, foot_setting
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.markdown import table, text_of
@@ -51,7 +51,8 @@ def beginning(foot: str | dict[str, Any], speed: float) -> Person:
     """The person who has not adapted; the springs of an adaptive foot have the stiffness of a usual passive one."""
     tuned = leg_constants("planned", "people", speed)
     other = tuned
-    if kind_of(foot) == "adaptive" and foot_of(foot).schedule is None:
+    setting = foot_setting("foot", foot)
+    if setting.kind == "adaptive" and setting.foot.schedule is None:
         ankle, toe = (float(SPRING_NUMBERS[f"{joint}_stiffness"].usual or 0.0) for joint in ("ankle", "toe"))
         other = replace(tuned, ankle_schedule=(ankle,) * 5, toe_schedule=toe)
     return Person(sound=tuned, other=other, foot=foot)
@@ -124,10 +125,9 @@ class Adapt(Study):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Search."""
-        foot = foot_setting("foot", foot_given(self.foot))
-        if isinstance(foot, dict):
-            foot = without_person(foot)
-        name = self.name or (kind_of(foot) if self.speed == TUNED_SPEED else f"{kind_of(foot)}, {self.speed:g} m/s")
+        setting = foot_setting("foot", foot_given(self.foot))
+        foot = without_person(setting.plain) if isinstance(setting.plain, dict) else setting.plain
+        name = self.name or (setting.kind if self.speed == TUNED_SPEED else f"{setting.kind}, {self.speed:g} m/s")
         begin = self._begin(foot)
         lines, told, files = [], [], {}
         walks = []
@@ -163,7 +163,7 @@ class Adapt(Study):
         known = read_feet(self.feet)["feet"]
         if self.start not in known:
             raise SpringfootError(f"no foot {self.start!r} to start from in {self.feet}; there are {', '.join(known)}")
-        if foot == kind_of(known[self.start]):  # a word: the numbers found there
+        if foot == known[self.start]["kind"]:  # a word: the numbers found there
             foot = without_person(known[self.start])
         walked = BipedSettings(speed=self.speed, right_foot=known[self.start])
         sound, other = (person_constants(walked, self.speed, side) for side in (LEFT, RIGHT))

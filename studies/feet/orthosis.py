@@ -21,7 +21,6 @@ import tyro
 from springfoot.envs.physics.foot import Spring
 from springfoot.envs.physics.model import ANKLE, RIGHT, damping_times
 from springfoot.envs.settings.adapted import ADAPTED, committed_feet, without_person
-from springfoot.envs.settings.feet import foot_of
 from springfoot.envs.settings.settings import body_of
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers.metrics import measure
@@ -189,7 +188,7 @@ def muscle_energy(recording: Recording) -> float | None:
     The right ankle's is of the mean torque and the change of angle of each 10 ms; None without progress.
     """
     settings, first = recording.settings, round(WARM_UP / TICK)
-    orthosis = foot_of(settings.right_foot).ankle.orthosis or Spring()
+    orthosis = settings.right_foot.foot.ankle.orthosis or Spring()
     beta = damping_times(body_of(settings))[ANKLE] if orthosis.damping_time is None else orthosis.damping_time
     energy = way = 0.0
     for episode, end in enumerate(recording.ticks):

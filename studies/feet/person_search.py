@@ -11,7 +11,7 @@ from springfoot.envs.control.leg_constants import LegConstants, constants_from
 from springfoot.envs.control.person import HELD_BY_SOUND
 from springfoot.envs.physics.foot import INTACT, Feet
 from springfoot.envs.settings.adapted import ADAPTED, LEGS
-from springfoot.envs.settings.feet import KINDS, SPRING_NUMBERS, foot_of, kind_of
+from springfoot.envs.settings.feet import KINDS, SPRING_NUMBERS, foot_setting
 
 from ..searches.leg_search import GAIN_STEP, Search
 
@@ -35,7 +35,7 @@ class Person:
     @property
     def feet(self) -> Feet:
         """A sound left foot, and this one on the right."""
-        return INTACT, foot_of(self.foot)
+        return INTACT, foot_setting("foot", self.foot).foot
 
     def setting(self, speed: float) -> dict[str, Any]:
         """The foot as a setting, with `adapted` for `speed` [m/s]."""
@@ -56,14 +56,14 @@ class PersonSearch:
     def __init__(self, start: Person, speed: float, design: float):
         self._start, self._design = start, design
         self._legs = [Search(start.sound, speed), Search(start.other, speed)]
-        kind = kind_of(start.foot)
-        device = foot_of(start.foot).ankle.device is not None
+        foot = foot_setting("foot", start.foot)
+        device = foot.foot.ankle.device is not None
         skipped = [NEVER, NEVER + HELD_BY_SOUND + (OF_MUSCLES if device else ())]
         self._free = [
             np.array([name not in left_out for name in legs.names])
             for legs, left_out in zip(self._legs, skipped, strict=True)
         ]
-        self._numbers = tuple(KINDS[kind]) if design else ()
+        self._numbers = tuple(KINDS[foot.kind]) if design else ()
         self._numbers = tuple(name for name in self._numbers if name in SPRING_NUMBERS and name != "damping_time")
         self.size = sum(int(free.sum()) for free in self._free) + len(self._numbers)
 

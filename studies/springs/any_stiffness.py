@@ -169,7 +169,7 @@ def any_stiffness(
     lowest, highest = stiffness_ranges(settings, springs.body)
     for each in stiffnesses:
         schedules[each] = rebuilt(springs, np.clip(stiffness_named(each, springs), lowest, highest))
-        own_springs = {"schedule": schedules[each].to_json(), "equilibrium": "phase", "decisions": "100hz"}
+        own_springs = {"schedule": schedules[each], "equilibrium": "phase", "decisions": "100hz"}
         changed = replace(settings, action_mode="absolute", **own_springs)
         rows.append(walk_row(each, walk(each, schedule, changed)))
     return rows, schedules

@@ -126,7 +126,7 @@ def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> Trainin
     preset = PRESETS["walk"]
     own = dict(ABLATIONS[name])
     if name == "phase":
-        own["schedule"] = phase_schedule(preset.environment).to_json()
+        own["schedule"] = phase_schedule(preset.environment)
     environment = settings_from(**settings_to_json(preset.environment) | own)
     pace = ACTION_STEP / environment.step_seconds
     return replace(

@@ -22,7 +22,7 @@ from springfoot.envs.physics.model import (
     damping_times,
     passive_damping,
 )
-from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, feet_of, foot_of
+from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, foot_setting
 from springfoot.envs.settings.settings import settings_from
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body.body import Body
@@ -49,7 +49,9 @@ def of_right(ticks: list[Tick], what: str) -> np.ndarray:
 @pytest.fixture(scope="module")
 def together() -> tuple[Biped, list[Tick]]:
     """One body with each of the feet, side by side, and its walk."""
-    biped = Biped(settings_from(), len(MIXED), feet=[feet_of(*pair) for pair in MIXED])
+    biped = Biped(
+        settings_from(), len(MIXED), feet=[settings_from(left_foot=pair[0], right_foot=pair[1]).feet for pair in MIXED]
+    )
     return biped, walked_ticks(biped)
 
 
@@ -76,7 +78,7 @@ def test_in_a_batch_of_mixed_feet_each_walks_as_alone_bit_for_bit(together, inde
 
 @pytest.mark.parametrize("foot", FEET_SEEN, ids=named)
 def test_right_is_the_mirror_image_of_left(foot):
-    biped = Biped(settings_from(), 2, feet=[feet_of(foot, "intact"), feet_of("intact", foot)])
+    biped = Biped(settings_from(), 2, feet=[settings_from(left_foot=foot).feet, settings_from(right_foot=foot).feet])
     biped.reset(np.array([0]), [0], start=0.2)
     biped.reset(np.array([1]), [0], start=0.7)
     for _ in range(25):
@@ -89,7 +91,7 @@ def test_right_is_the_mirror_image_of_left(foot):
 
 def test_masses_of_the_model_are_those_asked_for_and_the_com_is_that_of_mujoco():
     body = Body(1.8, 80.0)
-    feet = feet_of("intact", PROSTHESIS)
+    feet = settings_from(right_foot=PROSTHESIS).feet
     model, sound = build_model(body, feet=feet), build_model(body)
     for segment, mass, inertia in (("shank", 0.6, 0.4), ("foot", 0.6, 0.5), ("toe", 0.6, 0.5), ("thigh", 1.0, 1.0)):
         own, intact = model.body(f"{segment}_right").id, sound.body(f"{segment}_right").id
@@ -116,7 +118,7 @@ def test_a_locked_joint_does_not_move(foot, joint):
 
 
 def test_a_foot_in_one_piece_touches_with_heel_and_tip_alone():
-    model = build_model(Body(), feet=feet_of("no_toe", "rigid_toe"))
+    model = build_model(Body(), feet=settings_from(left_foot="no_toe", right_foot="rigid_toe").feet)
     pairs = {model.geom(geom).name for geom in (*model.pair_geom1, *model.pair_geom2)}
     assert "ball_left" not in pairs and {"heel_left", "toe_left", "ball_right"} <= pairs
     spheres = [model.geom(name) for name in ("toe_left", "toe_right")]
@@ -218,7 +220,7 @@ def test_the_controller_of_the_sound_side_and_of_hips_and_knees_is_unchanged(foo
 def test_actions_of_a_device_are_read_as_0_and_named_in_info():
     env = SegmentedFootBipedVector(3, right_foot=["intact", "rigid_toe", "passive"])
     observation, info = env.reset(seed=0)
-    assert env.settings.right_foot == "intact"
+    assert env.settings.right_foot.plain == "intact"
     last = list(env.biped.observation_names).index("last_action_ankle_left")
     wanted = np.array([[1, 1, 1, 1], [1, 1, 1, 0], [1, 1, 0, 0]])
     for _ in range(2):
@@ -234,7 +236,7 @@ def test_another_body_keeps_its_feet():
     biped = Biped(settings_from(right_foot=SPRING, mass_range=(50, 100)), 2)
     biped.reset(np.arange(2), [1, 2])
     for index, body in enumerate(biped.subjects.bodies):
-        expected = segments_of(body, feet_of("intact", SPRING))
+        expected = segments_of(body, settings_from(right_foot=SPRING).feet)
         np.testing.assert_array_equal(biped._simulation.arrays.bodies["segments"][index], expected[0])
         beta = biped.model_of(index).actuator_gainprm[0, 2]
         assert beta == pytest.approx(-damping_times(body)[0])
@@ -242,14 +244,17 @@ def test_another_body_keeps_its_feet():
 
 
 def test_every_number_of_a_foot_changes_the_foot():
+    def physical(foot):
+        return foot_setting("right_foot", foot).foot
+
     for kind, numbers in KINDS.items():
         for name, number in (numbers | SEGMENT_RATIOS).items():
             other = {"kind": kind, name: 0.5 * (number.low + number.high)}
-            assert foot_of(other) != foot_of(kind), (kind, name)
+            assert physical(other) != physical(kind), (kind, name)
     for name, number in ORTHOSIS_NUMBERS.items():
         orthosis = {"ankle_stiffness": 50.0, "toe_stiffness": 5.0}
         other = {"kind": "intact", "orthosis": orthosis | {name: 0.45 * number.high}}
-        assert foot_of(other) != foot_of({"kind": "intact", "orthosis": orthosis}), name
+        assert physical(other) != physical({"kind": "intact", "orthosis": orthosis}), name
 
 
 def test_a_neighbours_reset_and_a_pause_leave_a_drop_foot_as_it_is():

@@ -72,7 +72,7 @@ def test_policies_of_other_legs_have_another_fingerprint():
 def test_every_committed_person_can_be_named(name):
     foot = committed_feet()[name]
     bare = {key: value for key, value in foot.items() if key != ADAPTED}
-    assert foot_setting("right_foot", foot) == foot
+    assert foot_setting("right_foot", foot).plain == foot
     Biped(settings_from(right_foot={**bare, ADAPTED: name}), 1)
 
 

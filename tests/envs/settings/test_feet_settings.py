@@ -164,10 +164,10 @@ def test_json_round_trip_keeps_a_foot_and_numbers_become_floats():
     }
     settings = settings_from(left_foot=foot, right_foot={"kind": "rigid"})
     assert settings_from(**json.loads(json.dumps(settings_to_json(settings), allow_nan=False))) == settings
-    assert settings.right_foot == "rigid"
+    assert settings.right_foot.plain == "rigid"
     foot["orthosis"]["ankle_stiffness"] = 99
     numbers = {"ankle_stiffness": 400.0, "toe_deg": 5.0, "shank_mass_ratio": 0.6}
-    assert settings.left_foot == {"kind": "passive", **numbers, "orthosis": {"ankle_stiffness": 20.0}}
+    assert settings.left_foot.plain == {"kind": "passive", **numbers, "orthosis": {"ankle_stiffness": 20.0}}
     assert "400.0" in repr(settings.left_foot)
 
 
@@ -184,9 +184,12 @@ def test_an_exported_policy_returns_the_stiffness_of_the_joints_it_controls():
 
 
 def test_an_evaluation_takes_the_feet_it_is_told_and_else_the_policys_own():
-    assert prepare("pretrained", {"right_foot": "rigid"})[1].right_foot == "rigid"
-    assert prepare("pretrained", {})[1].right_foot == "intact"
-    assert prepare("constant", {"left_foot": PASSIVE})[1].left_foot == {"kind": "passive", "ankle_stiffness": 400.0}
+    assert prepare("pretrained", {"right_foot": "rigid"})[1].right_foot.plain == "rigid"
+    assert prepare("pretrained", {})[1].right_foot.plain == "intact"
+    assert prepare("constant", {"left_foot": PASSIVE})[1].left_foot.plain == {
+        "kind": "passive",
+        "ankle_stiffness": 400.0,
+    }
 
 
 def test_a_list_of_feet_is_for_a_vector_and_has_one_for_each():

@@ -2,11 +2,14 @@
 
 import inspect
 import json
-from dataclasses import fields
+import pickle
+from dataclasses import fields, replace
+from math import radians
 
 import numpy as np
 import pytest
 
+from springfoot.envs.physics.foot import Spring
 from springfoot.envs.settings.settings import (
     CONDITION_SETTINGS,
     CONDITION_THEMES,
@@ -21,6 +24,8 @@ from springfoot.envs.settings.settings import (
 )
 from springfoot.errors import SpringfootError
 from springfoot.gait.people.human import human_gait
+from springfoot.gait.people.own_data import OwnGait
+from springfoot.gait.springs.stiffness import StiffnessSchedule
 
 OWN = {"name": "my_gait.csv", "strides": 12, "speed": None, "stride_time": 1.2, "step_length": None, "toe_off": 0.63}
 OWN |= {"mean": {"knee": [[0.4, 0], [0.1, -0.2]]}, "sd": {}}
@@ -48,6 +53,19 @@ def test_settings_hold_their_own_copy_of_what_was_given():
     settings = settings_from(reward_weights=weights)
     weights["alive"] = 9.0
     assert settings.reward_weights == {"alive": 0.5}
+
+
+def test_feet_schedule_and_human_are_objects_whether_given_plain_or_as_objects():
+    springs = {"ankle": [[0.0, 300.0, 0.1]], "toe": [[0.0, 28.0, 0.0]]}
+    passive = {"kind": "passive", "ankle_stiffness": 400.0}
+    settings = BipedSettings(schedule=springs, human=OWN, left_foot=passive)  # type: ignore[arg-type]
+    assert isinstance(settings.schedule, StiffnessSchedule) and isinstance(settings.human, OwnGait)
+    assert settings.left_foot.foot.ankle.device == Spring(stiffness=400.0, rest=radians(2.0))
+    again = settings_from(schedule=settings.schedule, human=settings.human, left_foot=settings.left_foot)
+    assert again == settings == replace(settings) == pickle.loads(pickle.dumps(settings))
+    written = settings_to_json(settings)
+    assert (written["schedule"], written["left_foot"], written["right_foot"]) == (springs, passive, "intact")
+    assert settings != replace(settings, human=OWN | {"strides": 13})
 
 
 def test_defaults_are_the_body_and_speed_of_the_thesis():

@@ -104,7 +104,7 @@ def test_feedback_is_of_the_leg_that_decides(recordings):
     assert np.isfinite(share) and share < alike + 0.2
     weak = measure(walked(right_foot="drop")).metrics["feedback"]["ankle"]
     assert weak["share"] is None or np.isfinite(weak["share"])
-    assert settings_from(right_foot="drop").right_foot == "drop"
+    assert settings_from(right_foot="drop").right_foot.kind == "drop"
 
 
 @pytest.mark.parametrize(("which", "changed"), [(0, (True, False)), (1, (False, True)), (2, (True, True))])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from springfoot.cli.evaluate import evaluate_main
+from springfoot.envs.settings.feet import foot_setting
 from springfoot.envs.settings.settings import reference_gait
 from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers.metrics import measure
@@ -165,7 +166,7 @@ def test_feet_of_other_kinds_are_told_drawn_and_measured_apart(tmp_path):
     ],
 )
 def test_a_foot_in_words(setting, words):
-    assert foot_words(setting) == words
+    assert foot_words(foot_setting("right_foot", setting)) == words
 
 
 def test_the_verdict_is_told_in_words(walk):

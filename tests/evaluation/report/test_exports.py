@@ -7,8 +7,7 @@ import pytest
 from springfoot.envs.physics.model import JOINTS, SIDES, build_model, build_spec
 from springfoot.envs.physics.model_file import model_text
 from springfoot.envs.physics.simulation import Simulation
-from springfoot.envs.settings.feet import feet_of
-from springfoot.envs.settings.settings import body_of
+from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import TICK, record
@@ -110,7 +109,8 @@ BODIES = [
 @pytest.mark.parametrize("feet", [("intact", "intact"), ("no_toe", "rigid")])
 @pytest.mark.parametrize("body", BODIES)
 def test_a_model_file_has_every_number_that_moves_the_body_to_the_last_bit(body, feet):
-    how = body, 0.87, feet_of(*feet)
+    left, right = feet
+    how = body, 0.87, settings_from(left_foot=left, right_foot=right).feet
     ours, loaded = build_model(*how), mujoco.MjModel.from_xml_string(model_text(build_spec(*how)))
     seen = [name for name in dir(ours) if isinstance(getattr(ours, name, None), np.ndarray)]
     off = [name for name in seen if not np.array_equal(getattr(ours, name), getattr(loaded, name))]

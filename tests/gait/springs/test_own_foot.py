@@ -14,7 +14,6 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.model import ANKLE
-from springfoot.envs.settings.feet import feet_of
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.gait.springs.foot_file import read_foot
@@ -104,7 +103,11 @@ def test_an_adaptive_foot_follows_its_schedule_whatever_is_asked():
 def test_beside_other_feet_it_is_as_alone_bit_for_bit(foot):
     other = {"kind": "passive", "ankle_table": [[-10.0, 50.0], [10.0, -50.0]]}
     later = {"kind": "adaptive", "schedule": {"ankle": [[0.0, 90.0, 0.1]], "toe": [[0.0, 9.0, 0.1]]}}
-    pairs = [feet_of(other, later), feet_of("intact", foot), feet_of("rigid", "drop")]
+    pairs = [
+        settings_from(left_foot=other, right_foot=later).feet,
+        settings_from(right_foot=foot).feet,
+        settings_from(left_foot="rigid", right_foot="drop").feet,
+    ]
     together, alone = Biped(settings_from(), 3, feet=pairs), Biped(settings_from(right_foot=foot), 1)
     together.reset(np.arange(3), [4, 5, 6])
     alone.reset(np.arange(1), [5])

@@ -103,7 +103,7 @@ def test_it_writes_feet_that_walk_and_goes_on_from_them(tmp_path, capsys):
     assert json.loads((tmp_path / "one" / "foot-1.json").read_text()) == foot
     assert kept["found_by"]["passive"].startswith("springfoot study adapt --generations 1")
     assert "--out" not in kept["found_by"]["passive"]
-    assert settings_from(right_foot=foot).right_foot == foot
+    assert settings_from(right_foot=foot).right_foot.plain == foot
     assert foot[ADAPTED]["1.2"].keys() == {"sound", "other"}
     told = capsys.readouterr().out
     assert "| passive, not adapted | 0.00 | " in told

@@ -164,9 +164,8 @@ def test_what_was_measured_is_kept(tmp_path):
 def test_trainings_are_of_the_committed_people():
     config = config_of("passive", 3, 1000)
     worn = config.environment.right_foot
-    assert isinstance(worn, dict)
-    assert worn[ADAPTED] == "passive"
-    assert worn["ankle_stiffness"] == committed_feet()["passive"]["ankle_stiffness"]
+    assert worn.adapted == "passive"
+    assert worn.numbers["ankle_stiffness"] == committed_feet()["passive"]["ankle_stiffness"]
     assert (config.seed, config.timesteps, config.environment.action_mode) == (3, 1000, "residual")
 
 

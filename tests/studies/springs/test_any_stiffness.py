@@ -80,7 +80,7 @@ def test_the_command_writes_table_and_schedules(capsys, tmp_path):
         "schedule",
         {"equilibrium": "phase", "schedule": json.loads((tmp_path / "springs/times-0.9.json").read_text())},
     )
-    assert settings.schedule is not None and len(settings.schedule["ankle"]) == PHASE_SEGMENTS
+    assert settings.schedule is not None and len(settings.schedule.ankle) == PHASE_SEGMENTS
 
 
 @pytest.mark.parametrize("name", ["flat", "flat:0", "times:-1", "flat:inf", "times:x", "forwards"])
