@@ -82,7 +82,7 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
     )
     search.ask(lambda progress: None)
     walking = folder / "walking.json"
-    known = {"predicted": asdict(leg_constants("planned", "people", guide="plan"))}
+    known = {"predicted": asdict(leg_constants("planned", "people", follows_plan=True))}
     write_constants(walking, {"constants": known, "found_by": {}})
     replace(search, start="", pays="effort", constants=walking, log=folder / "effort.json").ask(lambda progress: None)
     paid = [json.loads((folder / name).read_text(encoding="utf-8"))["paid"] for name in ("paid.json", "effort.json")]

@@ -80,7 +80,7 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
 
 def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
     """(speeds, samples, (ankle, toe)) stiffness of the leg tuning [N m/rad]."""
-    return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.human.foot.plateaus) for walk in walks])
+    return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.target.foot.plateaus) for walk in walks])
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:

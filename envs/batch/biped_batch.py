@@ -82,7 +82,7 @@ class Biped(ExactState):
         self.on_tick: Callable[[Tick], None] | None = None
         self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
         own = next(walk for walk in self.walks if walk.speed == settings.speed)
-        self.body, self.human, self.plan, self.constants = own.body, own.human, own.plan, own.constants
+        self.body, self.target, self.plan, self.constants = own.body, own.target, own.plan, own.constants
         table, right = list(rows(self.walks)), list(rows(self.right_walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
@@ -92,7 +92,7 @@ class Biped(ExactState):
         planned, stiffness = foot_tables(settings, (*table, *right))
         rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
-        self._decisions = DecisionTimes(settings, self.human, self.subjects.rows)
+        self._decisions = DecisionTimes(settings, self.target, self.subjects.rows)
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
@@ -116,7 +116,7 @@ class Biped(ExactState):
                 legs=self._legs.table.table,
                 incline=incline.table,
                 feet=self._springs.feet,
-                reference=self._task.table,
+                target=self._task.table,
             )
         )
         self._physics = tuple(self._simulation.arrays)

@@ -53,8 +53,8 @@ class Tables(NamedTuple):
     """(1, SAMPLES, 2, 4) of `slope_table`."""
     feet: tuple[NDArray, NDArray]
     """`FootLines`."""
-    reference: NDArray
-    """(R, SAMPLES, 2, C) of `REFERENCE`."""
+    target: NDArray
+    """(R, SAMPLES, 2, C) of `TARGET`."""
 
 
 @kernel
@@ -119,10 +119,10 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     Returns whether an episode is terminated.
     """
     controls, tasks, forces, _ = rows
-    bodies, reference, outcome = Physics(*physics).bodies, Tables(*tables).reference, Outcome(*outcome)
+    bodies, target, outcome = Physics(*physics).bodies, Tables(*tables).target, Outcome(*outcome)
     end_window(rows, physics, len(forces) - 1, walking)
     terms, any_terminated = np.empty((len(running), len(task[0].weights))), False
-    judge(tasks, controls, bodies, reference, task, forces, terms)
+    judge(tasks, controls, bodies, target, task, forces, terms)
     total(terms, task, outcome.reward)
     average(tasks, forces, running)
     for i in range(len(running)):
@@ -134,6 +134,6 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
         decision = controls[i].decision
         for k in range(4):
             decision.last_action[k] = decision.action[k]
-    observe(tasks, controls, bodies, reference, outcome.observation)
+    observe(tasks, controls, bodies, target, outcome.observation)
     report(tasks, controls, bodies, terms, task, outcome.values)
     return any_terminated

@@ -13,11 +13,11 @@ from ..settings.settings import BipedSettings
 from .phase_table import GRID
 
 
-def gait_events(human: HumanGait) -> NDArray:
-    """(4,) stride phases of the guide's heel strike, foot flat, heel-off and toe-off, from its angle curves."""
-    ankle = ankle_events(GRID, human.mean("ankle", GRID), human.toe_off)
-    toe = toe_events(GRID, human.mean("toe", GRID), human.toe_off)
-    return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], human.toe_off])
+def gait_events(target: HumanGait) -> NDArray:
+    """(4,) stride phases of the target's heel strike, foot flat, heel-off and toe-off, from its angle curves."""
+    ankle = ankle_events(GRID, target.mean("ankle", GRID), target.toe_off)
+    toe = toe_events(GRID, target.mean("toe", GRID), target.toe_off)
+    return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], target.toe_off])
 
 
 @kernel
@@ -60,16 +60,16 @@ class DecisionTimes:
     """Decides which actions of N bodies take effect in a step.
 
     With `decisions="event"` events are read from the leg's phase. A touchdown sets the phase to 0, so the heel strike
-    is that of the foot itself, and a foot that bounces does not decide again. Other events lie at people's phases.
+    is that of the foot itself, and a foot that bounces does not decide again. Other events lie at the target's phases.
 
     Args:
         settings: when stiffness is decided.
-        human: whose events count.
+        target: the gait whose events count.
         rows: (N,) of `CONTROL_ROW`, which tell whose stiffness.
     """
 
-    def __init__(self, settings: BipedSettings, human: HumanGait, rows: NDArray):
-        self._events = gait_events(human) if settings.decisions == "event" else np.empty(0)
+    def __init__(self, settings: BipedSettings, target: HumanGait, rows: NDArray):
+        self._events = gait_events(target) if settings.decisions == "event" else np.empty(0)
         self._rows = rows
         self._own = rows["decision"]
         self.action = self._own["action"]

@@ -34,14 +34,14 @@ def plateau_curve(values: tuple[float, ...], plateaus: tuple[float, ...] = PLATE
 def foot_curves(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> tuple[NDArray, NDArray]:
     """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
     if settings.schedule is None:
-        stiffness, rest = fixed_stiffness(constants, walk.body, walk.human.foot.plateaus), neutral(constants)
+        stiffness, rest = fixed_stiffness(constants, walk.body, walk.target.foot.plateaus), neutral(constants)
     else:
         stiffness, rest = settings.schedule.at(GRID)
     match settings.equilibrium:
         case "planned":
             rest = planned(constants, walk)
         case "angle":
-            rest = angle(walk.human)
+            rest = angle(walk.target)
         case "neutral":
             rest = neutral(constants)
     return rest, stiffness
@@ -66,39 +66,42 @@ def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, 
 
 
 def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad] that follows the guide's ankle and feeds a moment forward through its K_ref.
+    """(SAMPLES, 2) equilibrium [rad] that follows the target's ankle and feeds a moment forward through its K_ref.
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
     times the moment M of the walk (plantarflexion positive). The toe's equilibrium is the tuned angle from foot flat to
     toe-off, and that in swing otherwise. A plan has no K_ref: theta_eq is its ankle and toe alone, each ahead by beta,
     and its moments are fed forward beside the spring (`foot_feed`).
     """
-    body, human, foot = walk.body, walk.human, walk.human.foot
+    body = walk.body
+    target = walk.target
+    foot = target.foot
     beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
     if foot.ankle_quasi_stiffness is None:
         flat = np.interp(GRID, [*foot.toe_flat, *foot.toe_off], [0.0, 1.0, 1.0, 0.0])
         shifts = knot_curve(constants.ankle_knots_deg), flat * np.deg2rad(constants.toe_flat_deg)
         named = zip(("ankle", "toe"), (beta[ANKLE], beta[TOE]), shifts, strict=True)
-        return np.stack([human.mean(n, GRID) + b * human.rate(n, GRID) / period + own for n, b, own in named], axis=-1)
+        ahead = [target.mean(n, GRID) + b * target.rate(n, GRID) / period + shift for n, b, shift in named]
+        return np.stack(ahead, axis=-1)
     quasi = plateau_curve(foot.ankle_quasi_stiffness or (), foot.plateaus) * body.stiffness_scale
-    lead = beta[ANKLE] * human.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
-    ankle = human.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
+    lead = beta[ANKLE] * target.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
+    ankle = target.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
     return np.stack([ankle, _toe(foot, constants.toe_flat_deg)], axis=-1)
 
 
 def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> NDArray | None:
     """(SAMPLES, 2) torque [N m], dorsiflexion positive, that acts beside the springs of ankle and toe whatever their K;
     None where none is asked for."""
-    if settings.equilibrium != "planned" or walk.human.foot.ankle_quasi_stiffness is not None:
+    if settings.equilibrium != "planned" or walk.target.foot.ankle_quasi_stiffness is not None:
         return None
     unit = walk.body.total_mass * walk.body.length_scale
-    moments = [walk.human.mean(f"{joint}_moment", GRID) for joint in ("ankle", "toe")]
+    moments = [walk.target.mean(f"{joint}_moment", GRID) for joint in ("ankle", "toe")]
     return -constants.feedforward[ANKLE] * unit * np.stack(moments, axis=-1)
 
 
-def angle(human: HumanGait) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad]: the guide's ankle angle alone, and the planned toe."""
-    return np.stack([human.mean("ankle", GRID), _toe(human.foot, 0.0)], axis=-1)
+def angle(target: HumanGait) -> NDArray:
+    """(SAMPLES, 2) equilibrium [rad]: the target's ankle angle alone, and the planned toe."""
+    return np.stack([target.mean("ankle", GRID), _toe(target.foot, 0.0)], axis=-1)
 
 
 def neutral(constants: LegConstants) -> NDArray:

@@ -23,17 +23,17 @@ class LegConstants:
     """Tuned constants of the leg controller, for 1.70 m and 63 kg."""
 
     hip_knots_deg: tuple[float, ...]
-    """Added to people's thigh angle at `envs.control.legs.KNOTS` [deg]."""
+    """Added to the target's thigh angle at `envs.control.legs.KNOTS` [deg]."""
     knee_knots_deg: tuple[float, ...]
-    """Added to people's knee angle at `envs.control.legs.KNOTS` [deg]."""
+    """Added to the target's knee angle at `envs.control.legs.KNOTS` [deg]."""
     ankle_knots_deg: tuple[float, ...]
-    """Added to people's ankle angle at `envs.control.legs.KNOTS` in the planned equilibrium [deg]."""
+    """Added to the target's ankle angle at `envs.control.legs.KNOTS` in the planned equilibrium [deg]."""
     hip_stiffness: tuple[float, float]
     """Stance, swing [N m/rad]."""
     knee_stiffness: tuple[float, float]
     """Stance, swing [N m/rad]."""
     feedforward: tuple[float, float, float]
-    """Share of people's hip, knee, ankle moment that is fed forward."""
+    """Share of the target's hip, knee, ankle moment that is fed forward."""
     period_factor: float
     """Period of the phase against the plan's stride time."""
     period_speed_gain: float
@@ -81,13 +81,15 @@ class SlopeConstants:
 
 
 def constants_name(
-    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", guide: str = "people"
+    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", follows_plan: bool = False
 ) -> str:
-    """Name of the committed constants for a setting; "angle" and "phase" share those of "planned", and with the guide
-    "plan" all equilibria share one set."""
-    name = "predicted" if guide == "plan" else "neutral" if equilibrium == "neutral" else "planned"
+    """Return the name of the committed constants for a setting.
+
+    The equilibria "angle" and "phase" share those of "planned"; a body that follows the plan has one set for all.
+    """
+    name = "predicted" if follows_plan else "neutral" if equilibrium == "neutral" else "planned"
     name = name if cadence == "people" else f"{name}, {cadence} cadence"
-    if guide == "plan":
+    if follows_plan:
         feedforward = "people"  # its own moments are fed forward in any case
     name = name if feedforward == "people" else f"{name}, {feedforward}'s moments"
     return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
@@ -98,7 +100,7 @@ def leg_constants(
     cadence: str,
     speed: float = TUNED_SPEED,
     feedforward: str = "people",
-    guide: str = "people",
+    follows_plan: bool = False,
     file: Path | None = None,
 ) -> LegConstants:
     """The constants for a setting at `speed` [m/s at 1.70 m], the committed ones or those of `file`.
@@ -106,9 +108,9 @@ def leg_constants(
     They are linear between the speeds of the sets there; beyond those speeds the nearest set holds. Raises
     `SpringfootError` for a setting without a set.
     """
-    name = constants_name(equilibrium, cadence, feedforward=feedforward, guide=guide)
+    name = constants_name(equilibrium, cadence, feedforward=feedforward, follows_plan=follows_plan)
     table = _committed() if file is None else _constants_of(file, name)
-    if guide == "plan" and name not in table:
+    if follows_plan and name not in table:
         raise SpringfootError(f"no leg constants walk with guide 'plan' at cadence {cadence!r}; it must be 'people'")
     if name not in table:
         raise SpringfootError(

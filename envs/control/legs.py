@@ -1,7 +1,7 @@
 """The phase of the gait, and the hips and knees, which no action sets.
 
-Each hip and knee is a spring like the ankle (variable impedance) around people's curves at the walking speed, with
-people's moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The
+Each hip and knee is a spring like the ankle (variable impedance) around the target's curves at the walking speed, with
+its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The
 constants of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by
 `springfoot study slope-tuning` (command and seed stand in that file).
 Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
@@ -26,7 +26,7 @@ from .state import GAINS, PLACE
 from .subjects import Subjects
 
 KNOTS = np.arange(10) / 10
-"""Stride phases of the knots of the corrections to people's curves, which are periodic cubic splines."""
+"""Stride phases of the knots of the corrections to the target's curves, which are periodic cubic splines."""
 STANCE_FALL = (0.5, 0.6)
 """Stride phases over which the trunk torque of a leg falls to zero as its stance ends; chosen, about double support."""
 TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
@@ -211,7 +211,7 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     """(SAMPLES, 7) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], the planned CoM's
     forward speed over its mean, and how far it is ahead of the other leg's ankle [m]."""
-    body, human = walk.body, walk.human
+    body, target = walk.body, walk.target
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
     beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
@@ -222,12 +222,12 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         (KNEE, "knee", constants.knee_knots_deg, constants.knee_stiffness),
     ):
         stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
-        target = human.mean(name, GRID) + beta[joint] * human.rate(name, GRID) / period + knot_curve(knots)
+        rest = target.mean(name, GRID) + beta[joint] * target.rate(name, GRID) / period + knot_curve(knots)
         if joint == HIP:
-            target = target + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
+            rest = rest + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
         feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
-        drives.append(stiffness * target + feed)
+        drives.append(stiffness * rest + feed)
     planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
     planned_place = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
     return np.stack([*columns, *drives, planned_speed, planned_place], axis=-1)

@@ -36,7 +36,7 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
         return None
     if len(found) > 1:
         raise SpringfootError("left_foot and right_foot: a person adapts to one foot, the other one sound; got both")
-    asked = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.guide
+    asked = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.follows_plan
     if (kind := constants_name(*asked)) != "planned":
         raise SpringfootError(f"{FOOT_SETTINGS[found[0][0]]}: adapted legs are of 'planned' constants, got {kind!r}")
     return found[0]
@@ -44,7 +44,7 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
 
 def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
     """The constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
-    asked = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.guide
+    asked = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
     tuned = leg_constants(*asked, plan_file_of(settings))
     adapted = adapted_foot(settings)
     if adapted is None:

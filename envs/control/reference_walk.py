@@ -1,4 +1,4 @@
-"""What a body is asked to do: people, plan and leg constants, tabulated at a few speeds of one body.
+"""What a body is asked to do: target, plan and leg constants, tabulated at a few speeds of one body.
 
 The body is that of the settings. Between two tabulated speeds everything is linear in speed. Since mechanics scale
 exactly (`envs.physics.model`), another body at a Froude-equal speed does the same in its own units
@@ -48,8 +48,8 @@ class ReferenceWalk:
     """The settings' body."""
     speed: float
     """Walking speed [m/s]."""
-    human: HumanGait
-    """The gait that the body follows: people's, or the plan's own."""
+    target: HumanGait
+    """The gait that the body follows: people's, or the plan's own where the guide is the plan."""
     plan: ComPlan
     """The planned motion of the CoM, over people's ZMP where the body follows people, and the time of a stride."""
     constants: tuple[LegConstants, ...]
@@ -86,32 +86,32 @@ def reference_walk_at(
     """The walk of the settings' body at `speed` [m/s]."""
     body = body_of(settings)
     settings = replace(settings, speed=speed)
-    human = reference_gait(settings)
+    people = reference_gait(settings)
     equal_speed = speed / sqrt(body.length_scale)
     legs = legs or [person_constants(settings, equal_speed, side)]
-    if settings.guide == "plan":
+    if settings.follows_plan:
         style = least_work(equal_speed, plan_file_of(settings))
-        plan = plan_walk(body, speed, settings.cadence, human=human, style=style)
-        guide = gait_of(plan)
-        moments = _moments_of(guide, body)
-        return ReferenceWalk(body=body, speed=speed, human=guide, plan=plan, constants=tuple(legs), moments=moments)
+        plan = plan_walk(body, speed, settings.cadence, human=people, style=style)
+        target = gait_of(plan)
+        moments = _moments_of(target, body)
+        return ReferenceWalk(body=body, speed=speed, target=target, plan=plan, constants=tuple(legs), moments=moments)
     if settings.human is None and settings.people_file is None:
         plan = _plan(body, speed, settings.cadence)
     else:
-        plan = plan_walk(body, speed, settings.cadence, human=human)
+        plan = plan_walk(body, speed, settings.cadence, human=people)
     return ReferenceWalk(
         body=body,
         speed=speed,
-        human=human,
+        target=people,
         plan=over_peoples_zmp(plan),
         constants=tuple(legs),
-        moments=_plans_moments(plan) if settings.feedforward == "plan" else _moments_of(human, body),
+        moments=_plans_moments(plan) if settings.feedforward == "plan" else _moments_of(people, body),
     )
 
 
-def _moments_of(human: HumanGait, body: Body) -> NDArray:
+def _moments_of(gait: HumanGait, body: Body) -> NDArray:
     """(SAMPLES, 3) `ReferenceWalk.moments` as they are in a gait."""
-    moments = [human.mean(f"{joint}_moment", GRID) for joint in FED]
+    moments = [gait.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
 

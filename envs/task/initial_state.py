@@ -1,4 +1,4 @@
-"""How an episode starts: in people's posture in single support, or standing, with the lowest point on the floor."""
+"""How an episode starts: in the target's posture in single support, or standing, with the lowest point on the floor."""
 
 from collections.abc import Iterable
 
@@ -70,13 +70,15 @@ def place(
 
 
 def _start_curves(walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 9): people's joint angles, the thigh's to the vertical [rad], their rates [rad/s], trunk pitch [rad].
+    """Return (SAMPLES, 9): the target's joint angles, the thigh's to the vertical, and their rates; the trunk's pitch.
+
+    Angles in rad, rates in rad/s.
 
     All variants of the leg constants start like the first one.
     """
     first = walk.constants[0]
     period = first.period_factor * walk.plan.stride_time
-    angles = [walk.human.mean(name, GRID) for name in ANGLES]
-    rates = [walk.human.rate(name, GRID) / period for name in ANGLES]
+    angles = [walk.target.mean(name, GRID) for name in ANGLES]
+    rates = [walk.target.rate(name, GRID) / period for name in ANGLES]
     pitch = np.deg2rad(first.trunk_pitch_deg) + walk.body.trunk_lean + walk.plan.lean
     return np.stack([*angles, *rates, np.full(len(GRID), pitch)], axis=-1)

@@ -13,7 +13,7 @@ from ..physics.contact import CONTACTS
 from ..physics.kernel import kernel
 from ..physics.model import ACTIONS, ANKLE, JOINTS, LEFT, SIDES
 from .observation_entries import OBSERVATION, UNITS
-from .tracking import curves_at, error_of
+from .target import error_of, targets_at
 
 LOW, HIGH = (np.array([getattr(entry, end) for entry in OBSERVATION], np.float32) for end in ("low", "high"))
 """(D,) bounds of the observation."""
@@ -52,15 +52,15 @@ def observe(rows, controls, bodies, table, observation) -> None:
         rows: (N,) of `TASK_ROW`.
         controls: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        table: (R, SAMPLES, 2, C) of `REFERENCE`, of a `PhaseTable`.
+        table: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
         observation: (N, D) float32, which is filled.
     """
     entries, curves = np.empty(len(LOW)), np.empty((2, table.shape[-1]))
     seen = entries.view(SEEN)[0]
     for i in range(len(rows)):
         row, control, m = rows[i], controls[i], bodies[i].measured
-        planned = curves_at(table, control, curves)
-        seen.error[0], seen.error[1], seen.error[2] = error_of(control, planned, m)
+        targets = targets_at(table, control, curves)
+        seen.error[0], seen.error[1], seen.error[2] = error_of(control, targets, m)
         left = control.legs.phase[LEFT]
         s, c = sin(2 * pi * left), cos(2 * pi * left)
         seen.cycle[0], seen.cycle[1], seen.cycle[2], seen.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
@@ -72,7 +72,7 @@ def observe(rows, controls, bodies, table, observation) -> None:
         for k in range(4):
             seen.last_action[k] = control.decision.last_action[k]
         for side in range(2):
-            seen.planned_ankle[side] = planned[side].pose[ANKLE]
+            seen.planned_ankle[side] = targets[side].pose[ANKLE]
             for joint in range(4):
                 seen.angle[side, joint], seen.velocity[side, joint] = m.angle[side, joint], m.velocity[side, joint]
             for contact in range(3):

@@ -24,9 +24,9 @@ from ..settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from .episode_end import TOO_LOW, TOO_TILTED, divergence
 from .observation import HIGH, LOW, observe, units_of
 from .observation_entries import OBSERVATION
-from .reward_reference import body_scales, reference_curves
+from .scales import body_scales
 from .state import TASK_ROW
-from .tracking import curves_at, error_of, track
+from .target import error_of, target_curves, targets_at, track
 
 if TYPE_CHECKING:
     from ..physics.measurement import Measurement
@@ -39,9 +39,9 @@ POSE_TOLERANCE = 0.02
 MAX_FORCE = 1.2
 """Vertical force of one foot beyond which it costs more [body weights]; chosen: people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
-"""Weight of that excess against the distance from people's range [-]; chosen high, as a peak is short."""
+"""Weight of that excess against the distance from the target's range [-]; chosen high, as a peak is short."""
 FORCE_TOLERANCE = 0.4
-"""Force outside people's range, both feet together, at which its reward is 1/e [body weights]; chosen: at 0.15 a
+"""Force outside the target's range, both feet together, at which its reward is 1/e [body weights]; chosen: at 0.15 a
 push-off far too strong costs hardly more than one a little too strong."""
 
 
@@ -63,7 +63,7 @@ TASK_OPTIONS = np.dtype(
 
 
 @part
-def _near_zmp(scale, control, planned, m, forces, i):
+def _near_zmp(scale, control, targets, m, forces, i):
     """exp(-(distance / tolerance)^2) of the CoP of both feet, mean over the windows of a step, from the planned ZMP."""
     load = moment = 0.0
     for window in range(len(forces)):
@@ -75,24 +75,24 @@ def _near_zmp(scale, control, planned, m, forces, i):
         return 0.0
     phase = control.legs.phase
     leader = LEFT if phase[LEFT] < 0.5 else RIGHT
-    own = planned[leader]
-    ahead = control.subject.scale.length * (own.stride_length * phase[leader] + own.zmp)
+    target = targets[leader]
+    ahead = control.subject.scale.length * (target.stride_length * phase[leader] + target.zmp)
     return exp(-(((moment / load - m.ankle[leader, 0] - ahead) / scale.tolerance[3]) ** 2))
 
 
 @part
-def _pose_error(scale, pitch, angle, people):
-    """Weighted squared distance [rad^2] of a leg's `angle` (4,) [rad] under a trunk at `pitch` [rad] from `people`."""
+def _pose_error(scale, pitch, angle, target):
+    """Weighted squared distance [rad^2] of a leg's `angle` (4,) [rad] under a trunk at `pitch` [rad] from `target`."""
     error = 0.0
     for joint in range(4):
         lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
-        error += scale.pose_share[joint] * (angle[joint] - people.pose[joint] - lean) ** 2
+        error += scale.pose_share[joint] * (angle[joint] - target.pose[joint] - lean) ** 2
     return error
 
 
 @part
-def _force_distance(scale, forces, i, side, people):
-    """Body weights by which one foot's forces in the windows of a step leave people's range."""
+def _force_distance(scale, forces, i, side, target):
+    """Body weights by which one foot's forces in the windows of a step leave the target's range."""
     count = len(forces)
     forward = up = excess = 0.0
     for window in range(count):
@@ -101,8 +101,8 @@ def _force_distance(scale, forces, i, side, people):
         forward += (contacts[0, 0] + contacts[1, 0] + contacts[2, 0]) / scale.weight / count
         up += vertical / count
         excess += max(vertical - MAX_FORCE, 0.0) / count
-    beyond_forward = max(abs(forward - people.force[0]) - people.force_band[0], 0.0)
-    beyond_up = max(abs(up - people.force[1]) - people.force_band[1], 0.0)
+    beyond_forward = max(abs(forward - target.force[0]) - target.force_band[0], 0.0)
+    beyond_up = max(abs(up - target.force[1]) - target.force_band[1], 0.0)
     return EXCESS_SHARE * excess + beyond_forward + beyond_up
 
 
@@ -123,8 +123,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against the ZMP plan;
     `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
     `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 2.5, 3, 0.1) x squared distance [rad^2] of thigh (to the
-    vertical), knee, ankle and toe from people's mean curves at the leg's phase.
-    `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave people's range: vertical beyond 1.2
+    vertical), knee, ankle and toe from the target at the leg's phase.
+    `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave the target's range: vertical beyond 1.2
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
     [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of the muscles that act (a slack joint and a device in their place cost
@@ -135,7 +135,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         rows: (N,) of `TASK_ROW`.
         controls: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured at the step's end.
-        table: (R, SAMPLES, 2, C) of `REFERENCE`, of a `PhaseTable`.
+        table: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
         options: (1,) of `TASK_OPTIONS`.
         forces: (W, N, side, contact, 2) on the body [N] in the W control windows of the step.
         terms: as above.
@@ -143,19 +143,18 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     curves, share = np.empty((2, table.shape[-1])), options[0].share
     for i in range(len(rows)):
         scale, control, m = rows[i].scales, controls[i], bodies[i].measured
-        planned = curves_at(table, control, curves)
+        targets = targets_at(table, control, curves)
         upright = m.base[1] >= scale.min_hip_height and abs(m.base[2]) <= MAX_PITCH  # False for NaN
         terms[i, ALIVE] = 1.0 if upright and m.diverged < 0 else 0.0
-        x, z, speed = error_of(control, planned, m)
+        x, z, speed = error_of(control, targets, m)
         terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
         terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
-        terms[i, ZMP] = _near_zmp(scale, control, planned, m, forces, i)
+        terms[i, ZMP] = _near_zmp(scale, control, targets, m, forces, i)
         terms[i, SPEED] = exp(-((speed / scale.tolerance[2]) ** 2))
         pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
         for side in range(2):
-            people = planned[side]
-            pose_error += 0.5 * _pose_error(scale, m.base[2], m.angle[side], people)
-            force_distance += _force_distance(scale, forces, i, side, people)
+            pose_error += 0.5 * _pose_error(scale, m.base[2], m.angle[side], targets[side])
+            force_distance += _force_distance(scale, forces, i, side, targets[side])
             for joint in range(2):
                 k = muscle_stiffness(control.springs, side, joint) / scale.stiffness_unit[joint]
                 stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
@@ -200,9 +199,9 @@ class Task:
         share, limit = seconds / ACTION_STEP, settings.max_episode_steps
         self.options = np.array([(weights, seconds, share, limit)], TASK_OPTIONS)
         """(1,) of `TASK_OPTIONS`."""
-        curves = {walk: reference_curves(walk.plan, walk.human, seconds) for _, walk in rows}
+        curves = {walk: target_curves(walk.target, walk.plan, seconds) for _, walk in rows}
         self.table = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows])).table
-        """(R, SAMPLES, 2, C) of `REFERENCE`."""
+        """(R, SAMPLES, 2, C) of `TARGET`."""
         self._subjects = subjects
         self.fit(range(len(self.rows)))
 
@@ -220,7 +219,7 @@ class Task:
         return observation
 
     def tracking(self, bodies: NDArray) -> NDArray:
-        """CoM minus plan: x [m], z [m] and forward speed [m/s], shape (N, 3); `bodies` (N,) of `BODY_ROW`."""
+        """CoM minus target: x [m], z [m] and forward speed [m/s], shape (N, 3); `bodies` (N,) of `BODY_ROW`."""
         error = np.empty((len(self.rows), 3))
         track(self._subjects.rows, bodies, self.table, error)
         return error

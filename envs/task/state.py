@@ -5,7 +5,7 @@ import numpy as np
 from ..physics.contact import CONTACTS
 from ..physics.model import SIDES
 from .observation_entries import OBSERVATION, UNITS
-from .reward_reference import SCALES
+from .scales import SCALES
 
 PUSH = np.dtype([("begin", float), ("force", float), ("ends", float)])
 """A body's next or present push: when it begins [s], its force at the mass of the settings [N], and the end of the

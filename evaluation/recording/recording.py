@@ -24,7 +24,6 @@ from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.foot import Feet
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.simulation import MjModel
-from springfoot.envs.settings.feet import feet_of
 from springfoot.envs.settings.settings import (
     DRAWN_SETTINGS,
     BipedSettings,
@@ -243,7 +242,7 @@ def record_feet(
 ) -> list[Recording]:
     """As `record`, the same episodes for each of the `right_feet`, settings of feet, side by side; a recording each."""
     each = [replace(settings, right_foot=foot) for foot in right_feet]
-    feet = [feet_of(own.left_foot, own.right_foot) for own in each for _ in range(episodes)]
+    feet = [own.feet for own in each for _ in range(episodes)]
     seeds = [seed + episode for _ in each for episode in range(episodes)]
     planned = planned_course(reference_walk_at(settings, settings.speed).plan)
     kept = record_all(policy, settings, seeds, threads=threads, feet=feet, progress=progress)

@@ -78,7 +78,7 @@ def misses(
     tally = measured(series, biped)
     if tally is None:
         return None
-    human = biped.human
+    target = biped.target
     first = round(SETTLED / TICK)
     sides = np.array(tally.stride_sides)
     landed = np.array(tally.step_sides)
@@ -91,7 +91,7 @@ def misses(
             off["bend"].append(bend_weight * max(float(np.ptp(toe)) - bend, 0.0))
         for name in ("thigh", "knee"):
             curve = np.radians(curves.mean(f"{name}_flexion_deg"))
-            off[name].append(float(np.sqrt(np.mean((curve - human.mean(name, PERCENT / 100)) ** 2))))
+            off[name].append(float(np.sqrt(np.mean((curve - target.mean(name, PERCENT / 100)) ** 2))))
         off["force_peak"].append(max(float(np.mean(np.array(tally.vertical_max)[sides == side])) - MOST_PEAK, 0.0))
         step_length.append(float(np.mean(np.array(tally.step_length)[landed == side])))
         stance.append(float(np.mean(np.array(tally.toe_off)[sides == side])) / 100)

@@ -126,7 +126,7 @@ def cost(
         else:
             paid = _paid(walked.episode(index), walked.biped, pays, impact)
             total[candidate] += (FALL_COST if paid is None else paid) / SCHEDULED
-    if settings.equilibrium == "planned" and settings.guide == "people":
+    if settings.equilibrium == "planned" and not settings.follows_plan:
         lines = replace(settings, **own_settings("thesis", settings))
         walked = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
         pairs = zip(walked.missing, walked.speed, strict=True)
@@ -181,14 +181,15 @@ def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], thre
 
 
 def misses(tally: StrideTally, biped: Biped) -> NDArray:
-    """Return the distance of a walk from people and from its plan, number by number, in tolerances.
+    """Return the distance of a walk from its target and from its plan, number by number, in tolerances.
 
     The numbers are those of an evaluation (`springfoot.evaluation.numbers`).
     """
-    human, both = biped.human, tally.both
+    target = biped.target
+    both = tally.both
     phase = PERCENT / 100
     mean = {curve: both.mean(column) * unit for curve, (column, unit) in CURVES.items()}
-    theirs, their_work, band = _people(human)
+    theirs, their_work, band = _target(target)
     off: dict[str, Any] = {curve: values - theirs[curve] for curve, values in mean.items()}
     course = planned_course(biped.plan)
     planned_speed = biped.plan.com_velocity(np.minimum(phase, 1 - 1e-9))[0]
@@ -202,7 +203,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["late_hip_moment"] = np.maximum(mean["hip_moment"][late] - theirs["hip_moment"][late].max() - 0.1, 0.0)
     off["speed"] = mean_speed(tally) - biped.settings.speed
     off["period"] = np.mean(tally.stride_time) / biped.plan.stride_time - 1
-    off["double_support"] = np.mean(tally.double_support) - (human.toe_off - 0.5) * human.stride_time
+    off["double_support"] = np.mean(tally.double_support) - (target.toe_off - 0.5) * target.stride_time
     features = astuple(force_features(mean["grf_vertical"], mean["grf_forward"]))
     people = astuple(force_features(theirs["grf_vertical"], theirs["grf_forward"]))
     for name, part, allowed in (("vertical", slice(0, 3), 0.05), ("fore_aft", slice(3, 5), 0.03)):
@@ -230,10 +231,10 @@ def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
 
 
 @lru_cache(maxsize=16)
-def _people(human: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
+def _target(gait: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
     """Return what walks are held against: people's mean curves (101,) by the names of `CURVES`, the positive and
     negative work of their hip, knee and ankle (3, 2) [J/kg], from their mean power, and 1.9 SD of their hip moment."""
-    curves = {name: human.mean(name, PERCENT / 100) for name in CURVES}
-    power = [human.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
-    work = [np.concatenate(stride_work(each, np.array([human.stride_time]))) for each in power]
-    return curves, np.stack(work), 1.9 * human.sd("hip_moment", PERCENT / 100)
+    curves = {name: gait.mean(name, PERCENT / 100) for name in CURVES}
+    power = [gait.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
+    work = [np.concatenate(stride_work(each, np.array([gait.stride_time]))) for each in power]
+    return curves, np.stack(work), 1.9 * gait.sd("hip_moment", PERCENT / 100)

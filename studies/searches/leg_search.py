@@ -41,14 +41,14 @@ class Search:
         self,
         start: LegConstants,
         speed: float = TUNED_SPEED,
-        human: HumanGait | None = None,
+        target: HumanGait | None = None,
         *,
         placing: bool = False,
     ):
         sought = {name: value for name, value in asdict(start).items() if placing or name != "swing_place_gain"}
         self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in sought.items()}
-        human = human or human_gait(speed)
-        self._led = {name: LEAD_STEP * np.rad2deg(human.rate(curve, KNOTS)) for name, curve in LED.items()}
+        target = target or human_gait(speed)
+        self._led = {name: LEAD_STEP * np.rad2deg(target.rate(curve, KNOTS)) for name, curve in LED.items()}
         self.names = tuple(name for name, value in self._start.items() for _ in value) + tuple(LED)
         self.size = len(self.names)
 

@@ -126,15 +126,6 @@ class LegTuning(Study):
         Raises `SpringfootError`, with nothing written, for a file of another kind, and for constants to start from that
         are not in it.
         """
-        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward, self.guide)
-        known = read_constants(self.constants)["constants"]
-        if self.start == GENERIC:
-            known = known | {GENERIC: asdict(generic_constants())}
-        if (start := self.start or name) not in known:
-            raise SpringfootError(
-                f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
-            )
-        begin = constants_from(known[start])
         settings = BipedSettings(
             equilibrium=self.equilibrium,
             cadence=self.cadence,
@@ -145,12 +136,21 @@ class LegTuning(Study):
             people_file=self.people_file and str(self.people_file),
             episode_seconds=REFINED_SECONDS + 1,
         )
-        human = reference_walk_at(settings, self.speed, [begin]).human
+        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward, settings.follows_plan)
+        known = read_constants(self.constants)["constants"]
+        if self.start == GENERIC:
+            known = known | {GENERIC: asdict(generic_constants())}
+        if (start := self.start or name) not in known:
+            raise SpringfootError(
+                f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
+            )
+        begin = constants_from(known[start])
+        target = reference_walk_at(settings, self.speed, [begin]).target
         told = ""
         if self.refinements:
             begin, misses = self._refined(begin, settings, lambda better: self._keep(name, better), progress)
             told = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
-        search = Search(begin, self.speed, human, placing=self.guide == "plan")
+        search = Search(begin, self.speed, target, placing=settings.follows_plan)
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
@@ -162,7 +162,7 @@ class LegTuning(Study):
             seed = self.seed + 1000 * generation
             return cost(settings, candidates, seed, self.threads, push, ease, self.foreign, self.pays, self.impact)
 
-        asked = asked_of(self) | {"from": asdict(begin), "style": self._style()}
+        asked = asked_of(self) | {"from": asdict(begin), "style": self._style(settings)}
         for generation, _, paid in generations(strategy, self.generations, price, self.log, asked):
             lines.append([generation + 1, paid.min(), np.median(paid)])
             progress(1)
@@ -173,9 +173,9 @@ class LegTuning(Study):
         text = f"{json.dumps({name: asdict(found)})}\n\n{told}{_told(*lines[-1])}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
-    def _style(self) -> dict[str, Any] | None:
+    def _style(self, settings: BipedSettings) -> dict[str, Any] | None:
         """The style of the plan that is followed; None where people are."""
-        return least_work(self.speed, self.plan_file).to_json() if self.guide == "plan" else None
+        return least_work(self.speed, self.plan_file).to_json() if settings.follows_plan else None
 
     def _refined(
         self,
@@ -189,8 +189,8 @@ class LegTuning(Study):
         Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
         the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
         """
-        human = reference_walk_at(settings, settings.speed, [start]).human
-        search = Search(start, settings.speed, human, placing=self.guide == "plan")
+        target = reference_walk_at(settings, settings.speed, [start]).target
+        search = Search(start, settings.speed, target, placing=settings.follows_plan)
 
         def missed(vectors: NDArray) -> list[NDArray | None]:
             found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)

@@ -40,7 +40,7 @@ FOREIGN, PUSHED_FOREIGN = (UNCHANGING, QUASI, MID_RANGE), (UNCHANGING, QUASI)
 def foreign_springs(settings: BipedSettings) -> tuple[Sequence[NDArray], Sequence[NDArray]]:
     """Springs that nobody tuned, undisturbed and pushed; none where the body follows its plan: they are people's, or
     chosen on people's walk."""
-    return ((), ()) if settings.guide == "plan" else (FOREIGN, PUSHED_FOREIGN)
+    return ((), ()) if settings.follows_plan else (FOREIGN, PUSHED_FOREIGN)
 
 
 def walk(

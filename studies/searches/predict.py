@@ -162,7 +162,7 @@ class Predict(WalkingStudy):
             searches[f"effort-{speed:g}"] = replace(
                 effort,
                 speed=speed,
-                start=constants_name("planned", "people", guide="plan"),
+                start=constants_name("planned", "people", follows_plan=True),
                 pushed_from=OTHER_UNPUSHED,
                 generations=self.other_generations,
                 sigma=OTHER_SPREAD,

@@ -62,7 +62,7 @@ def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
     """The numbers of `PREDICTION` of the plan that `settings` follow, from its own inverse dynamics."""
-    return numbers_of(reference_walk_at(settings, settings.speed).human, reference_gait(settings))
+    return numbers_of(reference_walk_at(settings, settings.speed).target, reference_gait(settings))
 
 
 def people_numbers(settings: BipedSettings) -> dict[str, Any]:

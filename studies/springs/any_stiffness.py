@@ -25,7 +25,7 @@ from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings.settings import BipedSettings, body_of
-from springfoot.envs.task.reward_reference import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
+from springfoot.envs.task.scales import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare

@@ -238,7 +238,7 @@ def test_the_walk_follows_own_data():
     own = {"name": "mine", "strides": 9, "speed": 1.0, "stride_time": 1.25, "step_length": 0.625, "toe_off": 0.65}
     own |= {"mean": {"ankle": [[0.1, 0.0]], "grf_vertical": [1.0]}, "sd": {}}
     plain, biped = Biped(BipedSettings(), 1), Biped(settings_from(human=own), 1)
-    assert biped.plan.speed == pytest.approx(1.2) and biped.plan.human is biped.human
+    assert biped.plan.speed == pytest.approx(1.2) and biped.plan.human is biped.target
     # speed 1.2 for 1.0: step length and rate each take the square root of it
     assert biped.plan.stride_time == pytest.approx(1.25 / np.sqrt(1.2))
     assert biped.plan.step_length == pytest.approx(0.625 * np.sqrt(1.2))

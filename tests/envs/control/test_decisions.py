@@ -84,8 +84,8 @@ def test_training_discounts_by_time():
 
 def test_per_event_each_leg_takes_a_new_action_at_its_events_alone():
     biped, random, names = begun(num=4, decisions="event"), np.random.default_rng(0), ("left", "right")
-    events = gait_events(biped.human)
-    assert (np.diff(events) > 0.03).all() and events[0] == 0.0 and events[-1] == biped.human.toe_off
+    events = gait_events(biped.target)
+    assert (np.diff(events) > 0.03).all() and events[0] == 0.0 and events[-1] == biped.target.toe_off
     before: Any = None
     changes, running = np.zeros((2, 4), int), np.ones(4, bool)
     for _ in range(100):

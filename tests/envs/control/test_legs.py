@@ -74,13 +74,13 @@ def test_knots_are_met_and_periodic():
 
 def test_on_the_plan_the_reference_stiffness_gives_peoples_moment():
     walk = reference_walk_at(BipedSettings(), 1.2)
-    human = walk.human
+    target = walk.target
     plain = {"ankle_knots_deg": (0.0,) * 10, "feedforward": (0.0, 0.0, 1.0)}
     constants = constants_from({**vars(leg_constants("planned", "people")), **plain})
     rest = planned(constants, walk)[:, 0]
-    rate = human.rate("ankle", GRID) / (constants.period_factor * walk.plan.stride_time)
-    torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - human.mean("ankle", GRID) - 0.02 * rate)
-    np.testing.assert_allclose(torque, -63.0 * human.mean("ankle_moment", GRID), atol=1e-9)
+    rate = target.rate("ankle", GRID) / (constants.period_factor * walk.plan.stride_time)
+    torque = plateau_curve(REFERENCE_STIFFNESS) * (rest - target.mean("ankle", GRID) - 0.02 * rate)
+    np.testing.assert_allclose(torque, -63.0 * target.mean("ankle_moment", GRID), atol=1e-9)
 
 
 def test_the_neutral_equilibrium_is_constant():
@@ -96,7 +96,7 @@ def test_plateaus_are_flat():
 
 
 def test_the_swing_hip_turns_with_the_coms_place_over_the_stance_foot():
-    own = leg_constants("planned", "people", guide="plan")
+    own = leg_constants("planned", "people", follows_plan=True)
     variants = [replace(own, swing_place_gain=gain) for gain in (0.0, 0.8)]
     biped = Biped(BipedSettings(guide="plan", height=1.9, mass=80.0), 2, legs=variants, variant=np.arange(2))
     biped.reset(np.arange(2), [3, 3], start=0.25)  # the left foot in mid-stance

@@ -41,7 +41,7 @@ def test_people_scrambled_walk_the_same_bits(noise_file, more):
 @pytest.mark.slow
 @pytest.mark.parametrize("pays", ["likeness", "effort"])
 def test_people_scrambled_cost_a_search_the_same(noise_file, pays):
-    candidates = [generic_constants(), leg_constants("planned", "people", guide="plan")]
+    candidates = [generic_constants(), leg_constants("planned", "people", follows_plan=True)]
     costs = [
         cost(settings_from(**PLAN, people_file=file, episode_seconds=10.0), candidates, 0, 1, 0.0, pays=pays)
         for file in (None, noise_file)
@@ -68,7 +68,7 @@ def test_the_plans_moment_stands_beside_the_springs_whatever_their_stiffness():
     unit = walk.body.total_mass * walk.body.length_scale * walk.constants[0].feedforward[2]
     for side, phase in enumerate((0.3, 0.8)):
         for joint, name in enumerate(("ankle", "toe")):
-            fed = -unit * walk.human.mean(f"{name}_moment", phase)
+            fed = -unit * walk.target.mean(f"{name}_moment", phase)
             assert moment[side, joint] == pytest.approx(fed, abs=0.05 * np.abs(moment).max()), (side, name)
 
 
@@ -92,4 +92,5 @@ def test_settings_that_need_people_are_refused():
         Biped(BipedSettings(guide="plan", cadence="thesis"), 1)
     with pytest.raises(SpringfootError, match="guide must be"):
         settings_from(guide="nobody")
-    assert constants_name("neutral", "people", guide="plan") == constants_name("angle", "people", guide="plan")
+    angle, neutral = (constants_name(name, "people", follows_plan=True) for name in ("angle", "neutral"))
+    assert angle == neutral

@@ -42,7 +42,7 @@ def test_the_search_begins_at_its_start_and_steps_in_the_constants_own_units():
 
 
 def test_only_a_body_that_follows_its_plan_places_its_foot_by_the_com():
-    placed = leg_constants("planned", "people", guide="plan")
+    placed = leg_constants("planned", "people", follows_plan=True)
     search = Search(placed, placing=True)
     assert search.constants(np.zeros(search.size)) == placed
     assert search.size == Search(placed).size + 1

@@ -31,7 +31,7 @@ from springfoot.studies.searches.walk_effort import effort_and_impact, effort_pr
 BODY = Body()
 BARE = Muscle(tissue=0.0, tendon=0.0)
 SETTINGS = BipedSettings(guide="plan", episode_seconds=10.0)
-LEGS = leg_constants("planned", "people", guide="plan")
+LEGS = leg_constants("planned", "people", follows_plan=True)
 
 
 def test_a_moment_at_rest_costs_its_squared_activation_and_rate():

@@ -1,0 +1,84 @@
+"""The target: what the body follows at each phase of the stride, and how far the body is from it.
+
+With the guide `people` the joint angles and forces are people's, and the CoM is that of the plan; with the guide `plan`
+all of it is the plan's.
+"""
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import ANGLES
+from springfoot.gait.people.human import HumanGait
+from springfoot.gait.plan.com_plan import ComPlan
+
+from ..control.phase_table import GRID, read
+from ..physics.kernel import kernel, part
+from ..physics.model import JOINTS, LEFT, RIGHT
+
+FORCE_BAND = 0.5
+"""The range of forces, to either side of their mean [SD]; chosen: at 1 the ankle pushes off with less than
+people's moment."""
+TARGET = np.dtype(
+    [
+        ("pose", float, len(JOINTS)),  # thigh (to the vertical), knee, ankle, toe [rad]
+        ("force", float, 2),  # ground reaction force (forward, up), at the middle of the step [body weights]
+        ("force_band", float, 2),  # how far from it is still in range
+        ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
+        ("zmp", float),  # the plan's ZMP at the middle of the step [m], x as of `com`
+        ("speed", float),  # the plan's forward speed of the CoM [m/s]
+        ("stride_length", float),  # of the plan [m], the same at every phase
+    ]
+)
+"""The target at a phase of one leg's stride; `com`, `zmp`, `speed` are for the leg whose stance began last."""
+
+
+def target_curves(gait: HumanGait, plan: ComPlan, step_seconds: float) -> NDArray:
+    """Return (SAMPLES,) of dtype `TARGET`: the gait and the plan to follow, for steps of `step_seconds` [s]."""
+    curves = np.zeros(len(GRID), TARGET)
+    curves["pose"] = np.stack([gait.mean(name, GRID) for name in ANGLES], -1)
+    middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # a force averaged over a step belongs to its middle
+    for axis, name in enumerate(("grf_forward", "grf_vertical")):
+        curves["force"][:, axis] = gait.mean(name, middle)
+        curves["force_band"][:, axis] = FORCE_BAND * gait.sd(name, middle)
+    step = (2 * GRID) % 1.0
+    x, z = plan.com(step)
+    curves["com"] = np.stack((x - plan.step_length * step, z), -1)
+    earlier = 2 * GRID - 0.5 * step_seconds / plan.step_time  # the middle of the step, which may lie in the step before
+    curves["zmp"] = plan.zmp(earlier) + plan.step_length * (np.floor(earlier) - np.floor(2 * GRID) - step)
+    curves["speed"], _ = plan.com_velocity(step)
+    curves["stride_length"] = 2 * plan.step_length
+    return curves
+
+
+@part
+def targets_at(table, control, curves) -> NDArray:
+    """Return the target at the present phases of both legs, (side,) of `TARGET`; a view of `curves` (side, C)."""
+    for side in range(2):
+        read(table, control.subject.place, control.legs.phase[side], curves[side])
+    return curves.view(TARGET)[:, 0]
+
+
+@part
+def error_of(control, targets, m) -> tuple[float, float, float]:
+    """Return CoM minus target: x [m], z [m], forward speed [m/s].
+
+    The x of the target is from the ankle of the leg whose stance began last.
+    """
+    ratio, phase = control.subject.scale, control.legs.phase
+    leader = LEFT if phase[LEFT] < 0.5 else RIGHT
+    target = targets[leader]
+    target_x = m.ankle[leader, 0] + ratio.length * target.stride_length * phase[leader]
+    target_x += ratio.length * target.com[0]
+    return m.com[0] - target_x, m.com[1] - ratio.length * target.com[1], m.com_velocity[0] - ratio.time * target.speed
+
+
+@kernel
+def track(controls, bodies, table, error) -> None:
+    """Fill `error` (N, 3), CoM minus target: x [m], z [m] and forward speed [m/s].
+
+    `controls` (N,) of `CONTROL_ROW`; `bodies` (N,) of `BODY_ROW`; `table` (R, SAMPLES, 2, C) of `TARGET`.
+    """
+    curves = np.empty((2, table.shape[-1]))
+    for i in range(len(error)):
+        targets = targets_at(table, controls[i], curves)
+        error[i, 0], error[i, 1], error[i, 2] = error_of(controls[i], targets, bodies[i].measured)
