@@ -303,7 +303,7 @@ def plan_file_of(settings: BipedSettings) -> Path | None:
 
 
 def reference_gait(settings: BipedSettings) -> HumanGait:
-    """The walk that the body is held against: people's at its speed and height, or that of `settings.human`."""
+    """Return people's gait at the speed and height of the body, or that of `settings.human`."""
     people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
     if settings.human is None:
         return human_gait(settings.speed, settings.height, people)

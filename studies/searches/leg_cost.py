@@ -232,8 +232,8 @@ def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
 
 @lru_cache(maxsize=16)
 def _target(gait: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
-    """Return what walks are held against: people's mean curves (101,) by the names of `CURVES`, the positive and
-    negative work of their hip, knee and ankle (3, 2) [J/kg], from their mean power, and 1.9 SD of their hip moment."""
+    """Return the numbers of the target: mean curves (101,) by the names of `CURVES`, the positive and
+    negative work of hip, knee and ankle (3, 2) [J/kg], from the mean power, and 1.9 SD of the hip moment."""
     curves = {name: gait.mean(name, PERCENT / 100) for name in CURVES}
     power = [gait.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
     work = [np.concatenate(stride_work(each, np.array([gait.stride_time]))) for each in power]
