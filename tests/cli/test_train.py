@@ -16,7 +16,7 @@ import train
 from springfoot.agents.policies.policy import read_policy
 from springfoot.agents.training.config import PRESETS, TrainingConfig
 from springfoot.cli import train as train_command
-from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
+from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings, settings_to_json
 from springfoot.studies.base.flags import SettingsFlags, given
 
 SCRIPT, RUN = Path(train.__file__), "run.json"
@@ -83,7 +83,8 @@ def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
     own = flagged("--human", f"{tmp_path / 'mean.csv'}:fast")["human"]
     assert own["name"] == "mean.csv:fast" and list(own["mean"]) == ["knee"]
-    assert train_command.configured(PRESETS["walk"], {}, {"human": own}).environment.human.to_json() == own
+    configured = train_command.configured(PRESETS["walk"], {}, {"human": own})
+    assert settings_to_json(configured.environment)["human"] == own
     time = [k / 100 for k in range(500)]
     thigh = [f"{t},{20 * math.cos(2 * math.pi * t)}" for t in time]
     knee = [f"{t},{30 - 30 * math.cos(2 * math.pi * (t - 0.22))}" for t in time]

@@ -113,7 +113,7 @@ def test_thesis_brings_its_schedule_and_its_swing(name, ankle):
 )
 def test_the_thesis_falls_while_its_toe_rests_at_0_in_swing_and_walks_with_it_up(swing, falls):
     lines = thesis_schedule(Body(), swing=swing)
-    settings = BipedSettings(equilibrium="phase", schedule=lines.to_json(), episode_seconds=8.0)
+    settings = BipedSettings(equilibrium="phase", schedule=lines, episode_seconds=8.0)
     assert np.count_nonzero(record(schedule(settings), settings, name="", episodes=4).fall_reason) == falls
 
 
@@ -138,7 +138,7 @@ def test_quasi_stiffness_is_peoples_on_its_plateaus():
 
 def test_schedule_follows_one_that_is_given():
     given = {"ankle": [[0.0, 100.0, 0.0], [0.6, 50.0, 0.0]], "toe": [[0.0, 20.0, 0.0]]}
-    biped = started(BipedSettings(schedule=given), [0.3, 0.8])
+    biped = started(settings_from(schedule=given), [0.3, 0.8])
     stiffness = stiffness_of(
         baseline("schedule", biped.settings)(biped.observe()).reshape(2, 2, 2), biped.settings, Body()
     )

@@ -86,6 +86,7 @@ def test_the_finite_states_of_a_walk_are_a_policy_that_walks(folder):
     played = walked(folder / "finite_states.json", episodes=20, episode_seconds=20.0)
     assert (played.fall_reason == "").all() and played.settings.equilibrium == "phase"
     lines = played.settings.schedule
+    assert lines is not None
     for state, ankle, toe in zip(table["states"], lines.ankle, lines.toe, strict=True):
         assert ankle == pytest.approx(
             (state["phase"], state["ankle"]["stiffness_Nm_per_rad"], np.radians(state["ankle"]["equilibrium_deg"]))
@@ -117,7 +118,8 @@ def test_schedules_scale_with_the_body_and_go_with_flags(folder):
         small, large = (prepare(str(folder / name), {"height": h, "mass": m}) for h, m in ((1.6, 55.0), (1.9, 95.0)))
         assert np.array_equal(small[0](observation), large[0](observation))  # actions are of the body's own range
         assert prepare(str(folder / name), {"equilibrium": "neutral"})[1].equilibrium == "neutral"
-    springs = [settings.schedule.ankle[0] for _, settings in (small, large)]
+    schedules = [settings.schedule for _, settings in (small, large)]
+    springs = [schedule.ankle[0] for schedule in schedules if schedule is not None]
     assert springs[1].stiffness / springs[0].stiffness == pytest.approx(95.0 * 1.9 / (55.0 * 1.6))
 
 

@@ -46,7 +46,7 @@ def simulated_stride():
         ),
         toe=tuple(Segment(start, factor * legs.toe_schedule, toe - shift) for start, factor, shift in rows),
     )
-    settings = BipedSettings(equilibrium="phase", schedule=schedule.to_json(), start=0.2)
+    settings = BipedSettings(equilibrium="phase", schedule=schedule, start=0.2)
     biped, policy = Biped(settings, num_envs=1, legs=[legs]), baseline("schedule", settings)
     ticks = []
     biped.on_tick = ticks.append

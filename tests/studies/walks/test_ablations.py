@@ -43,7 +43,7 @@ def test_every_row_differs_from_the_preset_in_its_flags_and_walks_as_long():
 def test_the_phase_equilibrium_of_the_ablation_is_one_that_can_be_walked():
     own = ablations.phase_schedule(BipedSettings())
     assert len(own.ankle) == len(own.toe) == 10
-    settings = BipedSettings(equilibrium="phase", schedule=own.to_json(), episode_seconds=4.0)
+    settings = BipedSettings(equilibrium="phase", schedule=own, episode_seconds=4.0)
     assert not record(schedule(settings), settings, name="", episodes=3).fall_reason.any()
 
 
