@@ -93,6 +93,7 @@ class Setup:
         task, controls, bodies = self.at(left_phase, measurement)
         controls["decision"]["action"], controls["decision"]["last_action"] = values["action"], values["last_action"]
         controls["springs"]["stiffness"] = values["stiffness"]
+        controls["springs"]["acts"] = 1.0
         terms = np.empty((n, len(TERMS)))
         judge(task.rows, controls, bodies, task.table, task.options, values["force_windows"], terms)
         return dict(zip(TERMS, terms.T, strict=True))
