@@ -2,7 +2,7 @@
 
 import inspect
 import json
-import pickle
+from copy import deepcopy
 from dataclasses import fields, replace
 from math import radians
 
@@ -62,7 +62,7 @@ def test_feet_schedule_and_human_are_objects_whether_given_plain_or_as_objects()
     assert isinstance(settings.schedule, StiffnessSchedule) and isinstance(settings.human, OwnGait)
     assert settings.left_foot.foot.ankle.device == Spring(stiffness=400.0, rest=radians(2.0))
     again = settings_from(schedule=settings.schedule, human=settings.human, left_foot=settings.left_foot)
-    assert again == settings == replace(settings) == pickle.loads(pickle.dumps(settings))
+    assert again == settings == replace(settings) == deepcopy(settings)
     written = settings_to_json(settings)
     assert (written["schedule"], written["left_foot"], written["right_foot"]) == (springs, passive, "intact")
     assert settings != replace(settings, human=OWN | {"strides": 13})
