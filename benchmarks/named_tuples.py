@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.envs import Biped, BipedSettings
-from springfoot.envs.batch.step_kernels import Rows, Tables, begin_window
+from springfoot.envs.batch.step_kernels import EnvironmentRows, Tables, begin_window
 from springfoot.envs.physics.simulation import Physics
 
 CALLS = 2_000
@@ -26,7 +26,7 @@ def main() -> None:
     biped: Any = Biped(BipedSettings(), 1)
     biped.reset(np.arange(1), [0])
     plain = biped._rows, biped._physics, biped._tables
-    named = Rows(*plain[0]), Physics(*plain[1]), Tables(*plain[2])
+    named = EnvironmentRows(*plain[0]), Physics(*plain[1]), Tables(*plain[2])
     rest = biped._springs.options, np.ones(1, bool)
     for name, arrays in (("plain", plain), ("named", named)):
         begin_window(*arrays, *rest)

@@ -106,12 +106,12 @@ def without_stairs() -> Iterator[None]:
     roll, last = Simulation._roll, "_rest_before"
 
     def smooth(self: Simulation, ids: NDArray | None, out: dict[str, NDArray]) -> None:
-        k, drive = np.moveaxis(self.control, -1, 0)
+        k, drive = np.moveaxis(self._control, -1, 0)
         rest = drive / np.maximum(k, 1e-9)
         ramp = k * (rest - getattr(self, last, rest))
         setattr(self, last, rest)
         place = (np.arange(self._substeps) + 0.5) / self._substeps - 0.5
-        control = np.repeat(self.control[:, None], self._substeps, 1)
+        control = np.repeat(self._control[:, None], self._substeps, 1)
         control[..., 1] += ramp[:, None] * place[:, None, None]
         control = control.reshape(self.num, self._substeps, -1)
         who = slice(None) if ids is None else ids

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.walk import walk
+from springfoot.envs.batch.walk import walked_steps
 
 
 def evaluate_returns(
@@ -20,7 +20,7 @@ def evaluate_returns(
     seconds = np.zeros(episodes)
     fell = np.zeros(episodes, bool)
     biped.reset(np.arange(episodes), [seed + k for k in range(episodes)])
-    for active, result in walk(biped, policy):
+    for active, result in walked_steps(biped, policy):
         returns += np.where(active, result.reward, 0.0)
         seconds += np.where(active, biped.dt, 0.0)
         fell |= active & result.terminated

@@ -35,7 +35,7 @@ from ..task.observation import SensorNoise
 from ..task.pushes import Pushes
 from ..task.reward import Task
 from .exact_state import ExactState
-from .step_kernels import Rows, Tables, begin_step, begin_window, end_step, end_window, next_window
+from .step_kernels import EnvironmentRows, Tables, begin_step, begin_window, end_step, end_window, next_window
 from .step_result import StepResult, Tick, empty_outcome, held_control
 
 
@@ -108,7 +108,7 @@ class Biped(ExactState):
         self._no_reason, self._steps = np.broadcast_to(0, num_envs), self._task.rows["steps"]
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._control = np.zeros((num_envs, len(SIDES), len(JOINTS), 2))
-        self._rows = tuple(Rows(self.subjects.rows, self._task.rows, forces, self._control))
+        self._rows = tuple(EnvironmentRows(self.subjects.rows, self._task.rows, forces, self._control))
         self._tables = tuple(
             Tables(
                 rest=self._springs.rest.table,

@@ -27,7 +27,7 @@ from ..task.reward import ALIVE, judge, total
 from .step_result import Outcome, report
 
 
-class Rows(NamedTuple):
+class EnvironmentRows(NamedTuple):
     """The arrays that are kept of each environment."""
 
     controls: NDArray
@@ -51,7 +51,7 @@ class Tables(NamedTuple):
     """(R, SAMPLES, 2, 7) of `leg_curves`."""
     incline: NDArray
     """(1, SAMPLES, 2, 4) of `slope_table`."""
-    feet: tuple[NDArray, NDArray]
+    feet: tuple[NDArray, ...]
     """`FootLines`."""
     target: NDArray
     """(R, SAMPLES, 2, C) of `TARGET`."""
@@ -60,7 +60,7 @@ class Tables(NamedTuple):
 @kernel
 def begin_window(rows, physics, tables, springs, walking) -> None:
     """Begin a control window; arguments as of `begin_step`."""
-    rows, physics, tables = Rows(*rows), Physics(*physics), Tables(*tables)
+    rows, physics, tables = EnvironmentRows(*rows), Physics(*physics), Tables(*tables)
     bodies = physics.bodies
     move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
     drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
@@ -69,7 +69,7 @@ def begin_window(rows, physics, tables, springs, walking) -> None:
 @kernel
 def end_window(rows, physics, window, walking) -> None:
     """End control window number `window` of the step; else as of `begin_step`."""
-    rows, physics = Rows(*rows), Physics(*physics)
+    rows, physics = EnvironmentRows(*rows), Physics(*physics)
     bodies = physics.bodies
     measure_bodies(bodies, physics.state, physics.sensors, physics.warnings)
     advance(rows.controls, bodies, walking)
@@ -86,7 +86,7 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
     """Set the stiffness and begin the first control window.
 
     Args:
-        rows: `Rows`, as a plain tuple.
+        rows: `EnvironmentRows`, as a plain tuple.
         physics: `Physics` of the simulation, as a plain tuple.
         tables: `Tables`, as a plain tuple.
         springs: (1,) of `SPRING_OPTIONS`.
@@ -94,7 +94,15 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
         walking: (N,) bool, environments whose springs and phase move.
         fixed: (N,) bool, those of them that take the fixed stiffness.
     """
-    stiffen(Rows(*rows).controls, Physics(*physics).bodies, Tables(*tables).schedule, springs, factor, walking, fixed)
+    stiffen(
+        EnvironmentRows(*rows).controls,
+        Physics(*physics).bodies,
+        Tables(*tables).schedule,
+        springs,
+        factor,
+        walking,
+        fixed,
+    )
     begin_window(rows, physics, tables, springs, walking)
 
 

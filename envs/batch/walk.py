@@ -19,7 +19,7 @@ class Walked(NamedTuple):
     result: StepResult
 
 
-def walk(biped: Biped, act: Callable[[NDArray], NDArray], steps: int | None = None) -> Iterator[Walked]:
+def walked_steps(biped: Biped, act: Callable[[NDArray], NDArray], steps: int | None = None) -> Iterator[Walked]:
     """Step `biped`, which was reset, until every episode has ended; yield after each step.
 
     Args:

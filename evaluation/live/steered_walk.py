@@ -15,7 +15,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.batch.walk import Walked, walk
+from springfoot.envs.batch.walk import Walked, walked_steps
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
 from springfoot.envs.control.reference_walk import reference_walk_at, rows, tabulated_speeds
@@ -193,13 +193,13 @@ class LiveSession:
             elif changed & {*OFFSETS} or (_offset(asked).any() and "speed" in changed):
                 self._biped = self._make(asked)
                 self._biped.restore(biped.state())
-                self._walk = walk(self._biped, self._action, ENDLESS)
+                self._walk = walked_steps(self._biped, self._action, ENDLESS)
             if "speed" in changed:
                 self._biped.command(np.arange(1), np.array([asked.speed]))
         except SpringfootError:
             self.wishes = before
             self._biped = biped
-            self._walk = walk(biped, self._action, ENDLESS)
+            self._walk = walked_steps(biped, self._action, ENDLESS)
             raise
 
     def push(self, newton: float) -> None:
@@ -211,7 +211,7 @@ class LiveSession:
         """Begin the walk anew, with the wishes as they are."""
         who = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
         self._biped.reset(np.arange(1), [self._seed], None, who)
-        self._walk: Iterator[Walked] = walk(self._biped, self._action, ENDLESS)
+        self._walk: Iterator[Walked] = walked_steps(self._biped, self._action, ENDLESS)
         self._steps = 0
         self._push_steps = self._lying = 0
         still = np.zeros((len(SIDES), len(SPRINGS)))

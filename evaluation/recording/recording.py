@@ -14,7 +14,7 @@ from springfoot.agents.policies.baselines import PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
-from springfoot.envs.batch.walk import walk
+from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.leg_constants import LegConstants
 from springfoot.envs.control.reference_walk import reference_walk_at
@@ -191,7 +191,7 @@ def record(
         )
     seeds = range(seed, seed + episodes)
     kept = record_all(policy, settings, seeds, threads=threads, model=model, legs=legs, progress=progress)
-    course = planned_course(reference_walk_at(settings, settings.speed).plan)
+    course: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
     return Recording(policy=name, settings=settings, seed=seed, **kept.of(slice(None)), **course)
 
 
@@ -223,7 +223,7 @@ def record_each(
     for index in range(episodes):
         body = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
         alone = replace(settings, **body)
-        course = planned_course(reference_walk_at(alone, alone.speed).plan)
+        course: dict[str, Any] = planned_course(reference_walk_at(alone, alone.speed).plan)
         rows = slice(index, index + 1)
         recordings.append(Recording(policy=name, settings=alone, seed=seed + index, **kept.of(rows), **course))
     return recordings
@@ -244,7 +244,7 @@ def record_feet(
     each = [replace(settings, right_foot=foot) for foot in right_feet]
     feet = [own.feet for own in each for _ in range(episodes)]
     seeds = [seed + episode for _ in each for episode in range(episodes)]
-    planned = planned_course(reference_walk_at(settings, settings.speed).plan)
+    planned: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
     kept = record_all(policy, settings, seeds, threads=threads, feet=feet, progress=progress)
     recordings = []
     for index, own in enumerate(each):
@@ -300,7 +300,7 @@ def record_walk(
     """Walk the episodes `rows` of `kept` in `biped`, which was reset, and keep every tick of them.
 
     Everything that is measured of a walk is measured of what this keeps. `act` and `steps` as for
-    `springfoot.envs.batch.walk.walk`; `progress` is told the simulated time [s] after every step.
+    `springfoot.envs.batch.walk.walked_steps`; `progress` is told the simulated time [s] after every step.
     """
     ticks = kept.ticks[rows]
 
@@ -316,7 +316,7 @@ def record_walk(
 
     biped.on_tick = keep
     begun = 0
-    for active, result in walk(biped, act, steps):
+    for active, result in walked_steps(biped, act, steps):
         ended = int(ticks.max())
         kept.series[REWARD][rows, begun:ended][active] = result.values[active, None, _TERMS]
         kept.returns[rows][active] += result.reward[active]

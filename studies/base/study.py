@@ -20,7 +20,7 @@ from springfoot.files.writing import whole_folder
 
 OnProgress = Callable[[float], object]
 """Called with how much more is done: simulated seconds, or what `Study.UNIT` names."""
-REPORT = "report.md"
+REPORT_FILE = "report.md"
 """The file of a study's folder that holds its text."""
 QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
 
@@ -30,7 +30,7 @@ class Answer:
     """The answer of a study."""
 
     text: str
-    """Markdown that the command prints and keeps as `REPORT`; pictures in it are named files."""
+    """Markdown that the command prints and keeps as `REPORT_FILE`; pictures in it are named files."""
     files: Mapping[str, str | Callable[[Path], object]] = field(default_factory=dict)
     """Name of a file in the study's folder -> its text, or a function that writes it at a path."""
     failed: bool = False
@@ -84,7 +84,7 @@ class Study:
                 answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}")
             print(answer.text)
             made = f"\n\nMade by `{without_places(self.command)}`." if self.command else ""
-            files = {REPORT: f"{answer.text}{made}\n", **answer.files}
+            files = {REPORT_FILE: f"{answer.text}{made}\n", **answer.files}
             for file, content in files.items():
                 _write(folder / file, content)
         print(f"\nResults: {out} ({', '.join(files)})")

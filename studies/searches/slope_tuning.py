@@ -20,7 +20,7 @@ from tqdm import tqdm
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.batch.walk import walk as steps_of
+from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.leg_constants import SlopeConstants, slope_constants_from
 from springfoot.envs.settings.settings import BipedSettings
@@ -81,7 +81,7 @@ def walk(
         ticks.clear()
         return action_of(biped.scheduled_stiffness(), settings, biped.body).reshape(num, -1)
 
-    for step, (active, result) in enumerate(steps_of(biped, act, round(seconds / biped.dt))):
+    for step, (active, result) in enumerate(walked_steps(biped, act, round(seconds / biped.dt))):
         lived += active * biped.dt
         reward += result.reward
         if step * biped.dt >= SETTLED:

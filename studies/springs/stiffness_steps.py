@@ -16,7 +16,7 @@ from springfoot.agents.policies.baselines import PolicyFunction, leg_phase
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.batch.walk import walk
+from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.control.equilibrium import PLATEAUS, TOE_OFF
 from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
 from springfoot.envs.physics.model import JOINTS, LEFT, RIGHT, SIDES
@@ -153,7 +153,7 @@ def paired_walks(
 
     stood = np.ones(copies * num, bool)
     longest = ceil((WARM_UP + SLOWEST_STRIDE * (strides + 1)) / biped.dt)
-    for active, result in walk(biped, act, longest):
+    for active, result in walked_steps(biped, act, longest):
         steps += 1
         stood = active & ~result.terminated
         progress(float(stood.sum()) * biped.dt)

@@ -277,7 +277,7 @@ class Compare(WalkingStudy):
             conditions = self._conditions | {"push_newton": push}
             found = [row for name in self.policies for row in with_copy(name, conditions, self.seed, self.threads)]
             if self.springs:
-                springs = springs_beside(self.policies[0], conditions, self.constant, self.factor, self.seed)
+                springs = springs_beside(next(iter(self.policies)), conditions, self.constant, self.factor, self.seed)
                 found += [each for each in springs if each.name not in self.policies]
             rows = [run_row(*each, **self.how, progress=progress) for each in found]
             parts += [f"**{what_ran(self, rows[0])}**", comparison_table(rows), verdict(rows)]

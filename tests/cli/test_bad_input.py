@@ -230,7 +230,7 @@ COMMANDS = [
     (["study", "compare", "schedule", "--seconds", "1e308"], 'springfoot study compare: error: seconds must be a finite number > 0 and <= 1e+09 s, got 1e+308'),
     (["study", "a\x1b[31m"], "springfoot study: error: no study 'a\\x1b[31m'; there are compare, bodies, ablations, agreement, any-stiffness, identify, influence, learning-curves, leg-tuning, plan-tuning, predict, leg-sets, adapt, adapt-all, prosthesis, orthosis, slope-tuning, play"),
     (["a\x1b[31m"], "springfoot: error: no command 'a\\x1b[31m'; there are train, evaluate, live, export and study"),
-    (["export", "schedule", "--to", "onnx", "--out", "a\x1b[31m"], 'springfoot export: error: out must end in .onnx for onnx, got a\\x1b[31m'),
+    (["export", "schedule", "--out", "a\x1b[31m"], 'springfoot export: error: out must end in .onnx, got a\\x1b[31m'),
 ]
 # fmt: on
 

@@ -143,9 +143,9 @@ def test_links_of_the_index_page_lead_to_the_files_of_their_version(version, com
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     back = re.sub(rf"https://example\.org/springfoot/(?:raw|blob)/{commit}/", "", page)
     assert back == readme and len(links_of(page)) == len(links_of(readme)) > 10
-    assert f"](https://example.org/springfoot/blob/{commit}/docs/design.md" in page
+    assert f"](https://example.org/springfoot/blob/{commit}/docs/explanation/design.md" in page
     assert (
-        f"![The walk as a stick figure with ground reaction forces](https://example.org/springfoot/raw/{commit}/"
+        f"![A walk as a stick figure with its ground reaction forces](https://example.org/springfoot/raw/{commit}/"
         in page
     )
     assert (ROOT / "docs" / "walk.gif").is_file()
@@ -208,7 +208,8 @@ def verdict(code, mode, python, folder):
 
 
 def test_no_public_name_is_unknown_to_a_strict_type_checker(users_python, tmp_path):
-    names = {room: import_module(f"springfoot.{room}").__all__ for room in ROOMS}
+    public = [room for room in ROOMS if room not in ("files", "cli")]
+    names = {room: import_module(f"springfoot.{room}").__all__ for room in public}
     imports = [f"from springfoot.{room} import {', '.join(public)}" for room, public in names.items()]
     uses = [f"print({name})" for public in names.values() for name in public]
     assert verdict("\n".join([*imports, *uses]) + "\n", "strict", users_python, tmp_path) == []

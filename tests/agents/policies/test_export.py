@@ -25,7 +25,7 @@ LOW, HIGH = np.array([(entry.low, entry.high) for entry in OBSERVATION]).T
 
 def play_onnx(path):
     session = onnxruntime.InferenceSession(path)
-    return lambda rows: session.run(None, {"observation": rows})
+    return lambda rows: [np.asarray(part) for part in session.run(None, {"observation": rows})]
 
 
 def exported(policy, folder):

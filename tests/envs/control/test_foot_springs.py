@@ -9,7 +9,8 @@ from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.control.legs import slope_table
 from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.control.subjects import Subjects
-from springfoot.envs.physics.measurement import BODY_ROW, PLANT
+from springfoot.envs.physics.measurement import BODY_ROW
+from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.settings.settings import ActionMode, BipedSettings
 from springfoot.gait.body.body import Body
 
@@ -48,9 +49,8 @@ class Springs:
         self.feet = FootSprings(settings, Body(), rest, schedule, subjects)
         self.rows, self.everyone = subjects.rows, np.ones(len(subjects.rows), bool)
         self.bodies = np.zeros(len(self.rows), BODY_ROW)
-        plant = np.zeros((len(self.rows), 1), PLANT)
-        self.state, self.angle = plant.view(float), self.bodies["measured"]["angle"]
-        self.control = plant["control"][:, 0]
+        self.angle = self.bodies["measured"]["angle"]
+        self.control = np.zeros((len(self.rows), len(SIDES), len(JOINTS), 2))
         own = self.rows["springs"]
         self.stiffness, self.equilibrium = own["stiffness"], own["equilibrium"]
         self.work_stiffness, self.work_equilibrium = own["work_stiffness"], own["work_equilibrium"]
@@ -74,7 +74,7 @@ class Springs:
         move(
             self.rows,
             self.bodies,
-            self.state,
+            self.control,
             self.feet.rest.table,
             incline,
             self.feet.feet,

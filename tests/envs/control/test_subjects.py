@@ -16,6 +16,7 @@ from springfoot.envs.control.reference_walk import rows as rows_of
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
+from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation_entries import OBSERVATION
@@ -239,18 +240,21 @@ def test_nothing_jumps_as_the_speed_changes():
     legs.reset(np.arange(1), biped.leg_phase[:, 0])
     rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
     springs = FootSprings(settings, biped.body, rest, stiffness, subjects)
-    bodies, state = simulation.arrays.bodies, simulation.arrays.state
+    bodies = simulation.arrays.bodies
+    control = np.zeros((1, len(SIDES), len(JOINTS), 2))
     for name, values in vars(biped.measurement).items():
         bodies["measured"][name] = values
     rows = []
     for speed in np.linspace(0.8, 1.6, 801):
         subjects.reset(np.arange(1), [np.random.default_rng(0)], given(height=1.7, mass=63.0, speed=speed))
         legs.follow()
-        move(subjects.rows, bodies, state, springs.rest.table, incline, springs.feet, springs.options, np.ones(1, bool))
-        drive(subjects.rows, bodies, state, legs.table.table, incline)
+        move(
+            subjects.rows, bodies, control, springs.rest.table, incline, springs.feet, springs.options, np.ones(1, bool)
+        )
+        drive(subjects.rows, bodies, control, legs.table.table, incline)
         equilibrium = 100 * subjects.rows["springs"]["equilibrium"]
         plan = 100 * task.tracking(bodies)
-        rows.append(np.concatenate([np.moveaxis(simulation.control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
+        rows.append(np.concatenate([np.moveaxis(control, -1, 0).ravel(), equilibrium.ravel(), plan.ravel()]))
     change = np.abs(np.diff(rows, axis=0)).max()  # N m, N m/rad, 0.01 rad, cm or cm/s for 1 mm/s
     assert change < 1.0 and change < 0.6 * np.abs(np.diff(rows[::2], axis=0)).max()  # half as far, half the change
     assert (np.ptp(rows, axis=0) > 0.5).sum() >= 8
