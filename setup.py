@@ -13,7 +13,7 @@ LINK = re.compile(r"(!?)\[([^\]]+)\]\((?!https://)([^)]+)\)")
 
 
 def index_page(source: str | None, version: str) -> str:
-    """The README with its links made absolute by the repository's address `source`, or None: their texts alone.
+    """Return the README with its links made absolute by the repository's address `source`, or None: their texts alone.
 
     A release links to its tag, what comes before it to the newest commit, addressed as GitHub and GitLab do.
     """

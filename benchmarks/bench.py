@@ -74,7 +74,10 @@ def bench(effort: Effort) -> dict[str, Any]:
     walk = record_walk(max(max(effort.sizes), 64), effort.steps)
 
     start = environments.start_over_others(effort.starts)
-    overhead, of_physics, sim_rate, study_rate = {}, {}, 0.0, 0.0
+    overhead = {}
+    of_physics = {}
+    sim_rate = 0.0
+    study_rate = 0.0
     print("Full step of 20 ms beside its physics (mj_step alone, same states and controls), CPU time, one thread")
     for num in OVERHEAD_SIZES:
         spent, apart = step_over_physics(walk, num, effort.rounds * (1 if num == 64 else 4))
@@ -87,7 +90,8 @@ def bench(effort: Effort) -> dict[str, Any]:
             f"same walk within {apart:.0e} rad"
         )
         if num == OVERHEAD_SIZES[0]:
-            sim_rate, study_rate = 1e6 * STEP / full, 1e6 * STEP / study
+            sim_rate = 1e6 * STEP / full
+            study_rate = 1e6 * STEP / study
 
     cases = [environments.batch(walk, num, threads) for num in effort.sizes for threads in THREADS]
     cases += [batch_case(walk, 64, threads) for threads in THREADS]
@@ -122,7 +126,7 @@ def bench(effort: Effort) -> dict[str, Any]:
 
 
 def _run(title: str, cases: list[Case], repeats: int) -> dict[str, Figures]:
-    """Times the cases in turn and prints them."""
+    """Time the cases in turn and print them."""
     found = measure(cases, repeats)
     for case in cases:
         case.close()
@@ -144,7 +148,8 @@ def _best(figures: dict[str, Figures], kind: str) -> float:
 
 def run(flags: Flags) -> None:
     """Bench, print and write."""
-    about, begin = machine(), perf_counter()
+    about = machine()
+    begin = perf_counter()
     versions = ", ".join(f"{name} {number}" for name, number in about["versions"].items())
     print(f"{about['processor']}, {about['processors']} processors, load {load():.2f}; {versions}\n")
     results = bench(QUICK if flags.quick else Effort())

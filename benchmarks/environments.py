@@ -31,7 +31,7 @@ def batch(walk: Walk, num: int, threads: int) -> Case:
 
 
 def adapter(walk: Walk, num: int, threads: int) -> Case:
-    """The same for stable-baselines3."""
+    """Make the same for stable-baselines3."""
     return _sb3_case(
         f"SB3 adapter, N = {num}, {threads} threads", SegmentedFootBipedVecEnv(num, num_threads=threads), walk
     )
@@ -43,17 +43,17 @@ def single(walk: Walk) -> Case:
 
 
 def dummy(walk: Walk, num: int) -> Case:
-    """The same environment, one after the other in this process."""
+    """Make the same environment N times, one after the other in this process."""
     return _sb3_case(f"DummyVecEnv, N = {num}", DummyVecEnv([partial(gym.make, OURS)] * num), walk)
 
 
 def subprocesses(num: int) -> SubprocVecEnv:
-    """The same environment, each in a process of its own. Make them before any thread pool: they are forked."""
+    """Make the same environment N times, each in a process of its own, before any thread pool: they are forked."""
     return SubprocVecEnv([partial(gym.make, OURS)] * num, start_method=FORK)
 
 
 def subproc(walk: Walk, env: SubprocVecEnv) -> Case:
-    """What `subprocesses` made."""
+    """Return the environments of `subprocesses`."""
     workers = [process.pid or 0 for process in env.processes]
     return _sb3_case(f"SubprocVecEnv, N = {env.num_envs}", env, walk, workers)
 

@@ -30,7 +30,8 @@ def start() -> None:
 
     repository = Path(os.environ[REPOSITORY])
     # In memory, and silent: what a test reads from the process stays as it is.
-    within, without = [f"{repository}/*"], [f"{repository}/tests/*"]
+    within = [f"{repository}/*"]
+    without = [f"{repository}/tests/*"]
     coverage = Coverage(data_file=None, config_file=False, include=within, omit=without, messages=False)
     coverage.set_option("run:disable_warnings", ["no-data-collected", "module-not-measured", "already-imported"])
     coverage.start()

@@ -58,7 +58,7 @@ class Found:
 
 
 def drawn_settings(random: np.random.Generator) -> dict[str, Any]:
-    """Settings from anywhere in their ranges, often at their ends; some are refused."""
+    """Draw settings from anywhere in their ranges, often at their ends; some are refused."""
 
     def within(low: float, high: float) -> float:
         return float(random.choice([low, high, random.uniform(low, high)]))
@@ -115,7 +115,8 @@ def walk(settings: dict[str, Any], seed: int, steps: int, found: Found) -> None:
     """Take so many steps in each of `ENVIRONMENTS` and add what was seen; `SpringfootError` for refused settings."""
     random = np.random.default_rng(seed)
     envs = SegmentedFootBipedVector(ENVIRONMENTS, **settings)
-    space, count = envs.single_observation_space, envs.single_action_space.shape
+    space = envs.single_observation_space
+    count = envs.single_action_space.shape
     assert count is not None
     observation, _ = envs.reset(seed=seed)
     for step in range(steps):
@@ -151,14 +152,16 @@ def extremes(steps: int, seed: int = 0, count: int = 0, progress: Any = lambda s
 
     Ends at the first number that is not finite.
     """
-    found, random = Found(), np.random.default_rng(seed)
+    found = Found()
+    random = np.random.default_rng(seed)
     each = -(-steps // (TIMES * count * ENVIRONMENTS)) if count else STEPS
     accepted: list[tuple[dict[str, Any], int]] = []
     while found.steps < steps and not found.wrong:
         if count and len(accepted) == count:
             settings, own_seed = accepted[found.settings % count]
         else:
-            settings, own_seed = drawn_settings(random), int(random.integers(2**31))
+            settings = drawn_settings(random)
+            own_seed = int(random.integers(2**31))
         before = found.steps
         try:
             walk(settings, own_seed, each, found)
@@ -177,7 +180,7 @@ def extremes(steps: int, seed: int = 0, count: int = 0, progress: Any = lambda s
 
 @dataclass(frozen=True, kw_only=True)
 class Flags:
-    """Extreme steps in drawn settings: is everything finite, and the memory flat?"""
+    """Take extreme steps in drawn settings; everything must stay finite, and the memory flat."""
 
     steps: int = 10_000_000
     """Environment steps."""

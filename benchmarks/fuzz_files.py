@@ -130,7 +130,7 @@ def _header() -> dict[str, Any]:
 
 
 def _checkpoint(path: Path) -> None:
-    """What is changed is the header alone: the file is sealed anew."""
+    """Change the header alone: the file is sealed anew."""
     header = read_object(path, "header")
     state = path.with_suffix(".safetensors")
     try:
@@ -175,7 +175,8 @@ def _table(columns: dict[str, Any], head: str = "", separator: str = ",") -> byt
 
 
 def _percent(names: tuple[str, ...] = tuple(COLUMNS)) -> bytes:
-    people, phase = human_gait(1.2), PERCENT / 100
+    people = human_gait(1.2)
+    phase = PERCENT / 100
     return _table({"percent": PERCENT} | {COLUMNS[name]: _shown(name, people.mean(name, phase)) for name in names})
 
 
@@ -188,7 +189,8 @@ def _time() -> Any:
 
 
 def _over_time() -> bytes:
-    people, columns = human_gait(1.2), {"time_s": _time()}
+    people = human_gait(1.2)
+    columns = {"time_s": _time()}
     for side, offset in (("left", 0.2), ("right", 0.7)):
         phase = _time() / people.stride_time + offset
         for name in ("thigh", "knee", "ankle", "grf_vertical", "grf_forward"):
@@ -197,7 +199,8 @@ def _over_time() -> bytes:
 
 
 def _opensim() -> bytes:
-    people, columns = human_gait(1.2), {"time": _time(), "pelvis_tilt": 0 * _time(), "pelvis_tx": 1.2 * _time()}
+    people = human_gait(1.2)
+    columns = {"time": _time(), "pelvis_tilt": 0 * _time(), "pelvis_tx": 1.2 * _time()}
     for side, offset in (("l", 0.2), ("r", 0.7)):
         phase = _time() / people.stride_time + offset
         for name, column in {"thigh": "hip_flexion", "knee": "knee_angle", "ankle": "ankle_angle"}.items():
@@ -210,7 +213,9 @@ def _c3d(folder: Path) -> tuple[bytes, ...]:
         import ezc3d  # an extra
     except ImportError:
         return ()
-    people, points, flat = human_gait(1.2), {}, 0 * _time()
+    people = human_gait(1.2)
+    points = {}
+    flat = 0 * _time()
     for side, offset in (("L", 0.2), ("R", 0.7)):
         phase = _time() / people.stride_time + offset
         for name, label in {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles"}.items():

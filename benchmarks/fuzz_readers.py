@@ -48,7 +48,7 @@ class Found:
 
 
 def changed(content: bytes, random: np.random.Generator) -> bytes:
-    """The content after one to eight changes: bits, bytes, numbers, pieces lost, moved or doubled, an early end."""
+    """Return the content after one to eight changes: bits, bytes, numbers, pieces lost, moved, doubled, an end."""
     data = bytearray(content)
     for _ in range(random.integers(1, 9)):
         if not data:
@@ -77,7 +77,8 @@ def changed(content: bytes, random: np.random.Generator) -> bytes:
 
 def fuzz(reader: Reader, folder: Path, until: float, first_seed: int) -> Found:
     """Read changed files with one reader until that time on the clock; hypothesis chooses what is changed."""
-    found, path = Found(), folder / f"fuzzed{reader.suffix}"
+    found = Found()
+    path = folder / f"fuzzed{reader.suffix}"
 
     @settings(
         max_examples=ROUND,
@@ -153,7 +154,8 @@ def run(flags: Flags, say: Callable[[str], Any] = print) -> int:
         folder = Path(flags.keep or made)
         folder.mkdir(parents=True, exist_ok=True)
         todo = {name: reader for name, reader in readers(Path(made)).items() if not flags.only or name in flags.only}
-        before, each = peak(), flags.seconds / max(len(todo), 1)
+        before = peak()
+        each = flags.seconds / max(len(todo), 1)
         for name, reader in todo.items():
             found = fuzz(reader, folder, time.monotonic() + each, flags.seed)
             failed |= bool(found.failures)

@@ -45,11 +45,12 @@ class Flags:
 
 
 def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
-    """Simulated seconds per second of each round, and the largest difference [rad] from the walk after 20 ms."""
+    """Return simulated seconds per second of each round, and the largest difference [rad] from the walk after 20 ms."""
     wp, warp = _modules()
     model = build_model(Body())
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # C MuJoCo's own search, which Warp has not
-    substeps, copies = round(CONTROL_WINDOW / model.opt.timestep), -(-num // RECORDED)
+    substeps = round(CONTROL_WINDOW / model.opt.timestep)
+    copies = -(-num // RECORDED)
 
     def over_all(values: np.ndarray) -> np.ndarray:
         return np.tile(values, (copies, 1))[:num].astype(np.float32)
@@ -77,7 +78,8 @@ def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
             with wp.ScopedCapture() as capture:
                 advance()
             graph = capture.graph
-        found, apart = [], 0.0
+        found = []
+        apart = 0.0
         for _ in range(flags.repeats + 1):
             begin()
             clock = perf_counter()

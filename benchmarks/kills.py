@@ -38,7 +38,7 @@ CLOCK_SCALARS = ("time/fps",)
 
 
 def begun(words: Sequence[str], log: Path) -> int:
-    """The id of a new process that runs `train` with `words` and tells `log`; forked, as imports take longer."""
+    """Return the id of a new process that runs `train` with `words` and tells `log`; forked, as imports take longer."""
     if process := os.fork():
         return process
     code = 1
@@ -56,7 +56,7 @@ def begun(words: Sequence[str], log: Path) -> int:
 
 
 def ended(process: int) -> int:
-    """The exit code of a process, -N where signal N ended it, once it has ended."""
+    """Return the exit code of a process, -N where signal N ended it, once it has ended."""
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
@@ -84,7 +84,7 @@ def _written(folder: Path) -> int:
 
 
 def differences(one: Path, other: Path) -> list[str]:
-    """What two folders of finished runs do not agree in, clocks left out."""
+    """Return the differences of two folders of finished runs, clocks left out."""
     for folder in (one, other):
         if not (folder / "run.json").is_file():
             return [f"no run in {folder}: {folder.with_suffix('.log').read_text(encoding='utf-8')[-500:]}"]
@@ -141,11 +141,13 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="folder to keep what was trained in")
     flags = parser.parse_args()
     random = np.random.default_rng(flags.seed)
-    different, ends = 0, dict.fromkeys(("SIGKILL", "SIGTERM", "SIGINT"), 0)
+    different = 0
+    ends = dict.fromkeys(("SIGKILL", "SIGTERM", "SIGINT"), 0)
     with tempfile.TemporaryDirectory() as temporary:
         place = flags.out or temporary
         for index in range(flags.trainings):
-            peace, war = Path(place, f"peace-{index}"), Path(place, f"war-{index}")
+            peace = Path(place, f"peace-{index}")
+            war = Path(place, f"war-{index}")
             preset = ("walk", "any-body")[index % 2]
             first = ["--preset", preset, "--seed", str(index), *SHORT, "--threads", "2", "--out"]
             codes = [ended(begun([*first, str(peace)], peace.with_suffix(".log")))]
@@ -153,7 +155,8 @@ def main() -> int:
             for _ in range(flags.kills):
                 words = _resume(war, random) if (war / "run.json").exists() else [*first, str(war)]
                 number = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)[random.integers(4)]
-                written, delay = random.uniform(-0.1, 1.0) * size, random.uniform(0.0, 0.3)
+                written = random.uniform(-0.1, 1.0) * size
+                delay = random.uniform(0.0, 0.3)
                 ends[number.name] += killed(words, war, written, delay, number)
             words = _resume(war, random) if (war / "run.json").exists() else [*first, str(war)]
             codes += [ended(begun(words, war.with_suffix(".log"))) for words in (words, ["--resume", str(war)])]

@@ -34,7 +34,8 @@ from springfoot.files.markdown import table
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples" / "learners"
-EPISODES, SIGNIFICANT = 20, 0.01
+EPISODES = 20
+SIGNIFICANT = 0.01
 SHORT = 8192
 """Steps of a learner that only has to run."""
 TASK = BipedSettings(episode_seconds=10.0, push_newton=150.0)
@@ -59,7 +60,9 @@ def _runs(name: str, packages: tuple[str, ...], example: str, *flags: str) -> Le
     return Learner(name=name, packages=packages, example=example, flags=flags, timesteps=SHORT, must_learn=False)
 
 
-SB3, CONTRIB, TORCHRL = ("stable-baselines3",), ("sb3-contrib",), ("torchrl",)
+SB3 = ("stable-baselines3",)
+CONTRIB = ("sb3-contrib",)
+TORCHRL = ("torchrl",)
 LEARNERS = (
     Learner(name="stable-baselines3 PPO", packages=SB3, example="sb3"),
     Learner(name="CleanRL style PPO", packages=("gymnasium", "torch"), example="cleanrl_ppo"),
@@ -101,9 +104,10 @@ def main() -> int:
 
 
 def result_of(learner: Learner, folder: Path) -> dict[str, Any]:
-    """What is known of a learner: read, or else found out and written."""
+    """Return the result of a learner: read, or else found out and written."""
     slug = "-".join([learner.example, *(flag for flag in learner.flags if not flag.startswith("--"))])
-    path, key = folder / "results" / f"{slug}.json", _key(learner)
+    path = folder / "results" / f"{slug}.json"
+    key = _key(learner)
     if path.is_file() and (kept := json.loads(path.read_text(encoding="utf-8")))["key"] == key:
         return kept
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -149,7 +153,7 @@ def compare(before: NDArray, after: NDArray, must_learn: bool) -> dict[str, Any]
 
 
 def row_of(learner: Learner, result: Mapping[str, Any]) -> list[str]:
-    """A learner's row under `HEAD`."""
+    """Return a learner's row under `HEAD`."""
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
     p = f"{result['p']:.1g}" if learner.must_learn else "not asked"
     numbers = [f"{result['before']:.0f}", f"{result['after']:.0f}", f"{result['better']} of {EPISODES}", p]
@@ -165,7 +169,7 @@ def _returns(policy: PolicyFunction) -> NDArray:
 
 
 def _judge_recurrent(learner: Learner, python: Path, out: Path) -> dict[str, Any]:
-    """A policy with a memory walks where its library is, by its function's name; before, its mean action was near 0."""
+    """Walk a policy with a memory by its function's name where its library is; before, its mean action was near 0."""
     train(learner, python, out)
     given = {"episode_seconds": TASK.episode_seconds, "push_newton": TASK.push_newton}
     code = f"""import json

@@ -64,7 +64,8 @@ def study_training(steps: int = 512) -> Case:
 
 def planning_seconds(repeats: int) -> float:
     """Median time [s] of planning a walk."""
-    settings, taken = PRESETS["walk"].environment, []
+    settings = PRESETS["walk"].environment
+    taken = []
     for _ in range(repeats):
         begin = perf_counter()
         plan_walk(body_of(settings), settings.speed, settings.cadence)
@@ -74,8 +75,10 @@ def planning_seconds(repeats: int) -> float:
 
 def kinematics_over_sine(repeats: int, legs: int = 64_000) -> float:
     """Time of the inverse kinematics of `legs` legs over that of `np.sin` of as many numbers: median of pairs."""
-    body, random = Body(), np.random.default_rng(0)
-    forward, down = random.uniform(-0.4, 0.4, legs), random.uniform(0.6, 0.78, legs)
+    body = Body()
+    random = np.random.default_rng(0)
+    forward = random.uniform(-0.4, 0.4, legs)
+    down = random.uniform(0.6, 0.78, legs)
     ratios = []
     for _ in range(repeats):
         begin = perf_counter()

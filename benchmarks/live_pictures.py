@@ -40,7 +40,8 @@ def main() -> None:
     from playwright.sync_api import sync_playwright  # pyright: ignore[reportMissingImports]
 
     session = LiveSession(words.policy)
-    view, ended = LiveView(session, port=0), threading.Event()
+    view = LiveView(session, port=0)
+    ended = threading.Event()
     walker = threading.Thread(target=lambda: [view.run(0.2) for _ in iter(ended.is_set, True)])
     walker.start()
     with sync_playwright() as playwright:

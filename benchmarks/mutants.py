@@ -1,4 +1,4 @@
-"""Mutants: does a test fail if one sign, comparison or index of gait, envs or agents is wrong?
+"""Mutants: wrong signs, comparisons and indices of gait, envs and agents, each of which a test should notice.
 
 `python -m benchmarks.mutants` (`make mutants`) draws mutants of the newest commit by a seed. Each runs in a copy of the
 repository, never in the repository itself: first the test files that execute its line, the quickest first, until one

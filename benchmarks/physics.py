@@ -55,7 +55,7 @@ def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:
 def walked(
     policy: PolicyFunction, settings: BipedSettings, model: mujoco.MjModel | None, episodes: int, threads: int
 ) -> Gait:
-    """The gait of a policy on a model, the default one if None."""
+    """Return the gait of a policy on a model, the default one if None."""
     return measure(record(policy, settings, name="physics", episodes=episodes, threads=threads, model=model))
 
 
@@ -133,7 +133,8 @@ def _vary_settings(flags: Flags, prepared: dict[str, tuple[PolicyFunction, Biped
     spent = costs(models, record_walk(BODIES, 50), flags.rounds)
     default = spent[list(ROWS).index(DEFAULT)]
     for policy_name, (policy, settings) in prepared.items():
-        lines, reference = [["settings", *COST_HEAD, *HEAD]], None
+        lines = [["settings", *COST_HEAD, *HEAD]]
+        reference = None
         rows = tqdm(ROWS.items(), desc=policy_name, leave=False, disable=None)
         for (name, edit), cost in zip(rows, spent, strict=True):
             gait = walked(policy, settings, edited(edit, body_of(settings)), flags.episodes, flags.threads)
@@ -145,7 +146,8 @@ def _vary_settings(flags: Flags, prepared: dict[str, tuple[PolicyFunction, Biped
 
 def _vary_joints(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSettings]]) -> None:
     for policy_name, (policy, settings) in prepared.items():
-        lines, reference = [["constant", *HEAD]], None
+        lines = [["constant", *HEAD]]
+        reference = None
         for name, change in tqdm(JOINT_ROWS.items(), desc=policy_name, leave=False, disable=None):
             with joint_constant(*change):
                 gait = walked(policy, settings, None, flags.episodes, flags.threads)
@@ -157,12 +159,14 @@ def _vary_joints(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSe
 def _vary_stairs(flags: Flags, prepared: dict[str, tuple[PolicyFunction, BipedSettings]]) -> None:
     for policy_name, (policy, settings) in prepared.items():
         head = ("ankle moment N·m/kg", "ankle work J/kg", "cost of transport")
-        lines, reference = [["rest angles", *HEAD, *head]], None
+        lines = [["rest angles", *HEAD, *head]]
+        reference = None
         for name, context in (("every 10 ms, the default", nullcontext), ("in every physics step", without_stairs)):
             with context():
                 gait = walked(policy, settings, None, flags.episodes, flags.threads)
             reference = reference or gait
-            m, work = gait.metrics, gait.metrics["ankle_work_J_kg"]
+            m = gait.metrics
+            work = gait.metrics["ankle_work_J_kg"]
             more = ([m["moments"]["ankle"]["peak_Nm_kg"]], [work["positive"], work["negative"]])
             costs_ = _text([m["cost_of_transport"]], ".4f")
             lines.append([name, *row(gait, reference), *(_text(each, ".3f") for each in more), costs_])

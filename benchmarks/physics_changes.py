@@ -39,7 +39,9 @@ def _flag(bit: mujoco.mjtDisableBit, disabled: bool) -> Edit:
     return edit
 
 
-_SOLVER, _INTEGRATOR, _DISABLE = mujoco.mjtSolver, mujoco.mjtIntegrator, mujoco.mjtDisableBit
+_SOLVER = mujoco.mjtSolver
+_INTEGRATOR = mujoco.mjtIntegrator
+_DISABLE = mujoco.mjtDisableBit
 DEFAULT = f"**{1e3 * PHYSICS_STEP:g} ms, the default**"
 ROWS: dict[str, Edit] = {
     "0.25 ms (reference)": _timestep(40),
@@ -66,7 +68,8 @@ ROWS: dict[str, Edit] = {
 """What a row changes of the default model; the first one is the reference. 4 ms does not divide a control window."""
 
 
-LEGS, FEET = ("hip", "knee"), ("ankle", "toe")
+LEGS = ("hip", "knee")
+FEET = ("ankle", "toe")
 JOINT_ROWS: dict[str, tuple[str, tuple[str, ...], float]] = {
     "the default": ("DAMPING_TIME", JOINTS, 1.0),
     **{
@@ -103,7 +106,8 @@ def without_stairs() -> Iterator[None]:
 
     Its mean over a control window stays, so that nothing comes earlier or later.
     """
-    roll, last = Simulation._roll, "_rest_before"
+    roll = Simulation._roll
+    last = "_rest_before"
 
     def smooth(self: Simulation, ids: NDArray | None, out: dict[str, NDArray]) -> None:
         k, drive = np.moveaxis(self._control, -1, 0)
@@ -130,7 +134,7 @@ def without_stairs() -> Iterator[None]:
 
 
 def edited(edit: Edit, body: Body | None = None) -> mujoco.MjModel:
-    """The default model with one change."""
+    """Return the default model with one change."""
     model = build_model(body or Body())
     edit(model)
     return model

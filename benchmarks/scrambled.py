@@ -43,8 +43,9 @@ class Scrambled:
 
 
 def scrambled(seed: int = 0) -> dict[str, Any]:
-    """The package's file with noise in place of everything but speeds, step lengths and times."""
-    random, table = np.random.default_rng(seed), json.loads(PEOPLE_FILE.read_text(encoding="utf-8"))
+    """Return the package's file with noise in place of everything but speeds, step lengths and times."""
+    random = np.random.default_rng(seed)
+    table = json.loads(PEOPLE_FILE.read_text(encoding="utf-8"))
 
     def noise(value: Any) -> Any:
         if isinstance(value, list):
@@ -65,9 +66,10 @@ def scrambled(seed: int = 0) -> dict[str, Any]:
 
 
 def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, bytes]:
-    """What is compared, by name."""
+    """Return the values to compare, by name."""
     folder.mkdir()
-    constants, file = folder / "legs.json", people_file and str(people_file)
+    constants = folder / "legs.json"
+    file = people_file and str(people_file)
     write_constants(constants, {"constants": {}, "found_by": {}})
     search = LegTuning(
         guide="plan",
@@ -103,9 +105,11 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
 def main(how: Scrambled) -> int:
     """Compare; 0 if all is equal, else 1."""
     with tempfile.TemporaryDirectory() as place:
-        folder, noise = Path(place), Path(place, "noise.json")
+        folder = Path(place)
+        noise = Path(place, "noise.json")
         noise.write_text(json.dumps(scrambled()), encoding="utf-8")
-        ours, theirs = done(how, folder / "people", None), done(how, folder / "noise", noise)
+        ours = done(how, folder / "people", None)
+        theirs = done(how, folder / "noise", noise)
     for name, values in ours.items():
         print(f"{name}: {len(values):,} bytes, {'equal' if values == theirs[name] else 'DIFFERENT'}")
     return 0 if ours == theirs else 1

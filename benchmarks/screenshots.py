@@ -27,7 +27,8 @@ def main() -> None:
     with sync_playwright() as playwright:
         binary = next(filter(None, map(shutil.which, BROWSERS)), None)
         browser = playwright.chromium.launch(executable_path=binary, args=["--no-sandbox"])
-        size, scheme = {"width": words.width, "height": words.height}, "dark" if words.dark else "light"
+        size = {"width": words.width, "height": words.height}
+        scheme = "dark" if words.dark else "light"
         tab = browser.new_page(viewport=size, color_scheme=scheme)  # type: ignore[arg-type]
         tab.goto(words.page.resolve().as_uri())
         tab.locator("#scrub").evaluate(MOMENT)

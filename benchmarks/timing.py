@@ -54,7 +54,8 @@ def measure(cases: Sequence[Case], repeats: int) -> dict[str, Figures]:
     for repeat in range(repeats + 1):
         for index, case in enumerate(cases):
             case.prepare()
-            cpu_before, wall_before = _cpu_seconds(case.workers), time.perf_counter()
+            cpu_before = _cpu_seconds(case.workers)
+            wall_before = time.perf_counter()
             case.run()
             wall[index, repeat] = (time.perf_counter() - wall_before) / case.samples
             cpu[index, repeat] = (_cpu_seconds(case.workers) - cpu_before) / case.samples
@@ -110,5 +111,5 @@ def processors() -> int:
 
 
 def load() -> float:
-    """Processes that wanted a processor over the last minute, on average; NaN where the system does not say."""
+    """Return processes that wanted a processor over the last minute, on average; NaN where the system does not say."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")

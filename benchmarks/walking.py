@@ -42,10 +42,13 @@ class Walk:
 def record_walk(num: int, steps: int) -> Walk:
     """Let `num` bodies walk `steps` steps; none may fall."""
     env = vector(num)
-    biped, ticks = env.biped, list[Tick]()
+    biped = env.biped
+    ticks = list[Tick]()
     biped.on_tick = ticks.append
     env.reset(seed=SEED)
-    actions, position, velocity = [], [], []
+    actions = []
+    position = []
+    velocity = []
     for _ in range(steps):
         now = biped.measurement
         position.append(np.concatenate([now.base, now.angle.reshape(num, -1)], axis=1))
@@ -80,14 +83,16 @@ class Physics:
     """`mj_step(model, data, nstep)` for the first N bodies of a walk, and nothing else."""
 
     def __init__(self, model: mujoco.MjModel, num: int) -> None:
-        self.model, self.substeps = model, round(CONTROL_WINDOW / model.opt.timestep)
+        self.model = model
+        self.substeps = round(CONTROL_WINDOW / model.opt.timestep)
         self.bodies = [mujoco.MjData(model) for _ in range(num)]
         self._clock = clock_cost()
 
     def place(self, walk: Walk, step: int) -> None:
         """Put all bodies where they were at the beginning of a step of the walk."""
         for index, data in enumerate(self.bodies):
-            data.qpos[:], data.qvel[:] = walk.position[step, index], walk.velocity[step, index]
+            data.qpos[:] = walk.position[step, index]
+            data.qvel[:] = walk.velocity[step, index]
 
     def step(self, walk: Walk, step: int) -> float:
         """Repeat one step from where the bodies are, with the walk's controls; CPU time of the physics [s]."""
@@ -108,7 +113,9 @@ def step_over_physics(walk: Walk, num: int, rounds: int) -> tuple[NDArray, float
     Also the largest difference [m, rad] between the walk of the full step and of its physics alone after a round.
     """
     env = vector(num)
-    ours, study, clock = Physics(env.biped.model, num), Physics(study_model(), num), clock_cost()
+    ours = Physics(env.biped.model, num)
+    study = Physics(study_model(), num)
+    clock = clock_cost()
     spent = np.empty((3, rounds + 1, len(walk.actions)))
     apart = 0.0
     for round_ in range(rounds + 1):
@@ -131,13 +138,15 @@ def step_over_physics(walk: Walk, num: int, rounds: int) -> tuple[NDArray, float
 def batch_case(walk: Walk, num: int, threads: int) -> Case:
     """`mujoco.batch.Batch` alone, stepped through the walk's controls."""
     model = build_model(Body())
-    batch, substeps = Batch(model, num, threads), round(CONTROL_WINDOW / model.opt.timestep)
+    batch = Batch(model, num, threads)
+    substeps = round(CONTROL_WINDOW / model.opt.timestep)
     position, velocity, control = (batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
     controls = walk.controls[:, :, :num].reshape(-1, num, model.nu)
 
     def prepare() -> None:
         batch.reset(np.arange(num), stage=mujoco.mjtStage.mjSTAGE_NONE)
-        position[:], velocity[:] = walk.position[0, :num], walk.velocity[0, :num]
+        position[:] = walk.position[0, :num]
+        velocity[:] = walk.velocity[0, :num]
 
     def run() -> None:
         for window in controls:

@@ -106,7 +106,8 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
 
     free = Path("runs", f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
     with whole_folder(flags.out, free) as (folder, out):
-        walks, written = [], set[str]()
+        walks = []
+        written = set[str]()
         for label, (policy, environment) in zip(labels, prepared, strict=True):
             with _bar(label, flags.episodes * environment.episode_seconds) as bar:
                 episodes = recording.record(
@@ -149,7 +150,10 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
 
 
 def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
-    """A bar with the time left, gone at its end, and not there for `delay` [s]; nothing where there is no terminal."""
+    """Return a bar with the time left, gone at its end, and not there for `delay` [s].
+
+    Nothing where there is no terminal.
+    """
     return tqdm(
         total=total,
         desc=words,
@@ -172,13 +176,15 @@ def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """What results call the policies: no two the same, in capitals or not, and none as the page beside them."""
+    """Return the names of the policies in results: no two the same, in capitals or not, and none as the page beside
+    them."""
     from springfoot.evaluation.recording.policies import policy_label
 
     labels: list[str] = []
     taken = {"report.html"}
     for label in map(policy_label, names):
-        number, free = 2, label
+        number = 2
+        free = label
         while free.casefold() in taken:
             number, free = number + 1, f"{label}-{number}"
         taken.add(free.casefold())

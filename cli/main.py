@@ -131,13 +131,13 @@ def study_main(arguments: Sequence[str]) -> int:
 
 
 def study_class(name: str) -> "type[Study]":
-    """The class of one of `STUDIES`."""
+    """Return the class of one of `STUDIES`."""
     module, _, found = STUDIES[name][0].rpartition(".")
     return getattr(import_module(f"springfoot.studies.{module}"), found)
 
 
 def study_help() -> str:
-    """What there is to study."""
+    """Return the help text of the studies."""
     width = max(map(len, STUDIES))
     lines = (f"  {name:<{width}}  {question}" for name, (_, question) in STUDIES.items())
     return "\n".join(

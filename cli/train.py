@@ -90,7 +90,8 @@ def run_training(flags: TrainFlags) -> int:
         )
 
         end_in_order()
-        folder, record = flags.resume, training.resume(flags.resume, **settings)
+        folder = flags.resume
+        record = training.resume(flags.resume, **settings)
     else:
         assert flags.out is not None
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
@@ -99,8 +100,10 @@ def run_training(flags: TrainFlags) -> int:
         from springfoot.agents.training import training
 
         end_in_order()
-        folder, record = flags.out, training.train(config, flags.out)
-    interrupted, best = record["status"] == "interrupted", record["best"]
+        folder = flags.out
+        record = training.train(config, flags.out)
+    interrupted = record["status"] == "interrupted"
+    best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
     if best:
         falls = f"{best['falls']} of {best['episodes']} episodes fell"
@@ -130,17 +133,17 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
 
 
 def _likewise(words: str, folders: Sequence[Path]) -> str:
-    """A command of the first of some folders, and the names of the others."""
+    """Return a command of the first of some folders, and the names of the others."""
     others = ", ".join(folder.name for folder in folders[1:])
     return f"{words} {_word(folders[0])}" + (f", then so with {others}" if others else "")
 
 
 def _word(folder: Path) -> str:
-    """The name of a folder as a shell reads it, spaces and all."""
+    """Return the name of a folder as a shell reads it, spaces and all."""
     return shlex.quote(str(folder))
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
-    """The preset, with the values given on the command line in place of its own."""
+    """Return the preset, with the values given on the command line in place of its own."""
     settings = settings_from(**settings_to_json(preset.environment) | environment)
     return dataclasses.replace(preset, **training, environment=settings)

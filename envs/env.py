@@ -277,7 +277,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         if action.shape != self.action_space.shape:
             raise SpringfootError(f"action must have shape {self.action_space.shape}, got {action.shape}")
         result = self.biped.step(action[None])
-        terminated, truncated = bool(result.terminated[0]), bool(result.truncated[0])
+        terminated = bool(result.terminated[0])
+        truncated = bool(result.truncated[0])
         self._over = terminated or truncated
         if self.render_mode == "human":
             self.render()
@@ -285,7 +286,10 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         return result.observation[0], float(result.reward[0]), terminated, truncated, info
 
     def render(self) -> Any:
-        """A frame, uint8 (480, 640, 3), or None after drawing the window ("human"); `SpringfootError` without GL."""
+        """Return a frame, uint8 (480, 640, 3), or None after drawing the window ("human").
+
+        `SpringfootError` without GL.
+        """
         return self._camera_for().show(self.biped.data(0), self.biped.model_of(0))
 
     def close(self) -> None:

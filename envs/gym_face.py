@@ -47,7 +47,10 @@ class Face:
         return self.__dict__ | {"_camera": None}
 
     def _camera_for(self) -> Camera:
-        """The camera, opened at its first use; raises `SpringfootError` without a render mode, or without OpenGL."""
+        """Return the camera, opened at its first use.
+
+        Raise `SpringfootError` without a render mode, or without OpenGL.
+        """
         if self.render_mode is None:
             modes = " or ".join(map(repr, RENDER_MODES))
             raise SpringfootError(f"make the environment with render_mode {modes} to render")
@@ -62,13 +65,15 @@ class Face:
 
 def spaces_of(biped: Biped) -> tuple[Box, Box]:
     """Observation and action space of one environment."""
-    low, high = biped.observation_low, biped.observation_high
+    low = biped.observation_low
+    high = biped.observation_high
     return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
 
 
 def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The options of a reset; raises `SpringfootError` for an unknown one or a bad start."""
-    options, allowed = {} if options is None else options, ("start", *DRAWN, *more)
+    """Return the options of a reset; raise `SpringfootError` for an unknown one or a bad start."""
+    options = {} if options is None else options
+    allowed = ("start", *DRAWN, *more)
     if not isinstance(options, Mapping):
         raise SpringfootError(f"reset options must be a dictionary, got {quoted(options)}")
     for name in options:
@@ -95,7 +100,7 @@ def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
 
 
 def check_render_mode(mode: str | None) -> str | None:
-    """The render mode; raises `SpringfootError` for an unknown one."""
+    """Return the render mode; raise `SpringfootError` for an unknown one."""
     if mode is not None and not (isinstance(mode, str) and mode in RENDER_MODES):
         raise SpringfootError(f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {quoted(mode)}")
     return mode

@@ -94,7 +94,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         given = bodies_and_speeds(chosen, self.num_envs)
         mask = self._reset_mask(chosen.get("reset_mask"))
         ids = np.flatnonzero(mask)
-        seeds, generators = self._spread(seed), self.biped.generators
+        seeds = self._spread(seed)
+        generators = self.biped.generators
         for index in ids.tolist():
             if seeds[index] is not None or generators[index] is None:
                 generators[index], self._seeds[index] = seeding.np_random(seeds[index])
@@ -107,7 +108,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Hold the stiffnesses that `actions` (N, 4) stand for during a step, 20 ms by default."""
         self._check_running()
-        resetting, same_step = self._over, self.autoreset_mode is AutoresetMode.SAME_STEP
+        resetting = self._over
+        same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         result = self.biped.step(actions, active=~resetting if np.count_nonzero(resetting) else None)
         ended = result.terminated | result.truncated
         if same_step:
@@ -121,14 +123,16 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
             values = np.where(resetting[:, None], self._start_values(), result.values)
             infos = _infos(values, np.where(resetting, 0, result.termination)) | final
         else:
-            observation, infos = result.observation, _infos(result.values, result.termination.copy())
+            observation = result.observation
+            infos = _infos(result.values, result.termination.copy())
         if self.render_mode == "human":
             self.render()
         return observation, result.reward, result.terminated, result.truncated, infos
 
     def render(self) -> Any:
-        """A tuple of N frames, uint8 (480, 640, 3); "human" draws the first environment and gives None."""
-        camera, biped = self._camera_for(), self.biped
+        """Return a tuple of N frames, uint8 (480, 640, 3); "human" draws the first environment and gives None."""
+        camera = self._camera_for()
+        biped = self.biped
         if self.render_mode == "human":
             return camera.show(biped.data(0), biped.model_of(0))
         return tuple(camera.show(biped.data(index), biped.model_of(index)) for index in range(self.num_envs))
@@ -159,7 +163,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self._started = True
 
     def _spread(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        """One seed for each environment."""
+        """Return one seed for each environment."""
         if seed is None:
             return [None] * self.num_envs
         if not isinstance(seed, (Sequence, np.ndarray)) or isinstance(seed, str):
@@ -190,7 +194,9 @@ def _infos(values: NDArray, termination: NDArray, mask: NDArray | None = None) -
     if mask is None:
         mask = np.ones(len(values), bool)
     else:
-        values, termination, mask = np.where(mask[:, None], values, 0.0), np.where(mask, termination, 0), mask.copy()
+        values = np.where(mask[:, None], values, 0.0)
+        termination = np.where(mask, termination, 0)
+        mask = mask.copy()
     mask.flags.writeable = False  # all names share it
     infos: dict[str, Any] = dict.fromkeys(_MASKS, mask)
     infos.update(zip(_NAMES, (*values.T, termination), strict=True))
@@ -219,7 +225,7 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> BipedSettings:
-    """Settings with the limit in them, as Gymnasium puts no TimeLimit around a vector entry point."""
+    """Return settings with the limit in them, as Gymnasium puts no TimeLimit around a vector entry point."""
     if max_episode_steps is None:
         return settings
     limit = require_count("max_episode_steps", max_episode_steps) * settings.step_seconds

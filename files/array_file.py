@@ -56,7 +56,10 @@ def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArra
 
 
 def _array(content: bytes) -> NDArray:
-    """The array in an .npy file's content; `ValueError` for what says it is larger than it is, and for objects."""
+    """Return the array in an .npy file's content.
+
+    `ValueError` for what says it is larger than it is, and for objects.
+    """
     file = io.BytesIO(content)
     read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))
     if read is None:

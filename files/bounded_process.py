@@ -15,7 +15,7 @@ chosen. A measured walk of ten minutes takes a tenth of them."""
 
 
 def in_process(code: str, *words: str) -> bytes | None:
-    """What Python `code` writes to standard output in a new process, None where that is ended or fails.
+    """Return the standard output of Python `code` in a new process, None where that is ended or fails.
 
     It calls `bound_resources` once it has imported what it needs; `words` are its arguments.
     """

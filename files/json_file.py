@@ -15,12 +15,15 @@ MOST_JSON_BYTES = 2**23
 
 
 def sealed_object(values: Mapping[str, Any]) -> bytes:
-    """The values as a JSON file's content, with a digest (`seal`)."""
+    """Return the values as a JSON file's content, with a digest (`seal`)."""
     return sealed(json.dumps({**values, SEAL: BLANK}, indent=2) + "\n").encode()
 
 
 def read_object(path: Path, what: str) -> dict[str, Any]:
-    """The object in a JSON file, without its digest; else `SpringfootError`, which says that the file is no `what`."""
+    """Return the object in a JSON file, without its digest.
+
+    Else `SpringfootError`, which says that the file is no `what`.
+    """
     content = read_bytes(path, MOST_JSON_BYTES)
     require_whole(path, content)
     try:
@@ -33,7 +36,7 @@ def read_object(path: Path, what: str) -> dict[str, Any]:
 
 
 def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object's keys and values as a dictionary; ValueError for a key that stands twice."""
+    """Return a JSON object's keys and values as a dictionary; ValueError for a key that stands twice."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:
@@ -43,7 +46,7 @@ def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def json_fault(error: Exception) -> str:
-    """What is wrong with a text that is not JSON, in a few words."""
+    """Return the fault of a text that is not JSON, in a few words."""
     if isinstance(error, json.JSONDecodeError):
         return f"line {error.lineno}, column {error.colno}: {error.msg[0].lower()}{error.msg[1:]}"
     if isinstance(error, UnicodeDecodeError):

@@ -50,7 +50,8 @@ def owned(folder: Path) -> Iterator[None]:
     made: list[Path] = []
     try:
         handle, locked = _locked(path, made)
-        mine, over = True, threading.Event()
+        mine = True
+        over = threading.Event()
         try:
             former = _read(path)
             if former and (former.get("host") != socket.gethostname() or (not locked and _runs(former))):
@@ -81,7 +82,7 @@ def owned(folder: Path) -> Iterator[None]:
 
 
 def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
-    """A handle of the file at `path`, and whether it is locked, as it is where there are locks.
+    """Return a handle of the file at `path`, and whether it is locked, as it is where there are locks.
 
     The folders that it takes are made, and told in `made`.
     """
@@ -129,7 +130,7 @@ def _live(path: Path, over: threading.Event) -> None:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Who owns; empty for nobody, and for who has only just locked it."""
+    """Return who owns; empty for nobody, and for who has only just locked it."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -138,7 +139,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _runs(owner: dict[str, Any]) -> bool:
-    """Whether there is a process of that id on this host."""
+    """Return whether there is a process of that id on this host."""
     try:
         os.kill(int(owner["pid"]), 0)
     except (ProcessLookupError, KeyError, TypeError, ValueError, OverflowError):

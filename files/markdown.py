@@ -6,16 +6,19 @@ MISSING = "–"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A markdown table."""
+    """Return a markdown table."""
     return "\n".join("| " + " | ".join(line) + " |" for line in (head, ("---",) * len(head), *rows))
 
 
 def text_of(value: float | None, pattern: str) -> str:
-    """A number in a table, `MISSING` for None."""
+    """Return a number in a table, `MISSING` for None."""
     return MISSING if value is None else format(value, pattern)
 
 
 def plus_minus(spread: Mapping[str, float | None], pattern: str, *, alone: bool = True) -> str:
-    """A spread of `mean_sd` as "mean ± SD"; where there is no SD the mean `alone`, or else with `MISSING` for it."""
+    """Return a spread of `mean_sd` as "mean ± SD".
+
+    Where there is no SD the mean `alone`, or else with `MISSING` for it.
+    """
     mean, sd = (text_of(spread[name], pattern) for name in ("mean", "sd"))
     return mean if alone and spread["sd"] is None else f"{mean} ± {sd}"

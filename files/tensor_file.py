@@ -39,7 +39,7 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
 def read_tensors(
     path: Path, key: str, what: str, entries: AbstractSet[str], finite: bool = True, sealed: bool = False
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """The JSON under `key` of a .safetensors header, and the tensors, all finite; else `SpringfootError`.
+    """Return the JSON under `key` of a .safetensors header, and the tensors, all finite; else `SpringfootError`.
 
     `what` it is called in messages, and `entries` are those that its JSON may have. Unless `finite`, numbers may be of
     any kind, infinite ones and NaN too. A file without a digest, of an earlier version, is read without that check;
@@ -85,7 +85,7 @@ def _text(header: Mapping[str, Any]) -> str:
 
 
 def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
-    """The digest of a JSON header and arrays: of their names, types, shapes and bytes, in whatever order."""
+    """Return the digest of a JSON header and arrays: of their names, types, shapes and bytes, in whatever order."""
     found = sha256(_text(header).encode())
     for name in sorted(tensors):
         found.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())

@@ -32,11 +32,11 @@ class Table:
     """Line number in the file, cells."""
 
     def has(self, column: str) -> bool:
-        """Whether there is such a column, not all empty."""
+        """Return whether there is such a column, not all empty."""
         return column in self.columns and any(cells[self.columns.index(column)].strip() for _, cells in self.rows)
 
     def numbers(self, column: str) -> NDArray:
-        """A column's cells, all finite numbers, or `SpringfootError`."""
+        """Return a column's cells, all finite numbers; raise `SpringfootError` for others."""
         at = self.columns.index(column)
         return np.array([self._number(line, column, cells[at]) for line, cells in self.rows])
 
@@ -49,7 +49,7 @@ class Table:
         return values
 
     def error(self, line: int, column: str, what: str) -> SpringfootError:
-        """The error that says in one line what is wrong with a cell."""
+        """Return the error that names the fault of a cell in one line."""
         return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
 
     def _number(self, line: int, column: str, cell: str) -> float:
@@ -65,14 +65,17 @@ class Table:
 
 
 def existing(path: Path) -> Path:
-    """The path of a file that is there, or `SpringfootError`."""
+    """Return the path of a file that is there, or `SpringfootError`."""
     if not path.is_file():
         raise SpringfootError(f"no file {path}")
     return path
 
 
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
-    """What a file holds; `SpringfootError` if there is none, or more than `most` bytes, which are then not read."""
+    """Return the content of a file; raise `SpringfootError` if there is none, or more than `most` bytes.
+
+    More bytes are not read.
+    """
     with existing(path).open("rb") as file:
         size = path.stat().st_size
         content = file.read(most + 1) if size <= most else b""
@@ -82,7 +85,7 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
 
 
 def read_csv(path: Path) -> Table:
-    """A CSV file: header, then rows of as many cells. Raises `SpringfootError` for anything else."""
+    """Return a CSV file: header, then rows of as many cells. Raises `SpringfootError` for anything else."""
     try:
         return make_table(path.name, enumerate(csv.reader(text_lines(path), strict=True), 1))
     except csv.Error as error:
@@ -90,7 +93,7 @@ def read_csv(path: Path) -> Table:
 
 
 def text_lines(path: Path) -> Iterator[str]:
-    """The lines of a text file, whole if it is sealed; `SpringfootError` for any other file."""
+    """Return the lines of a text file, whole if it is sealed; `SpringfootError` for any other file."""
     content = read_bytes(path)
     require_whole(path, content)
     if b"\0" in content:

@@ -80,7 +80,8 @@ def require_new_files(paths: Iterable[Path]) -> None:
 
 @contextmanager
 def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
-    """A folder to write into, and the new folder that it becomes where the block ends well; elsewhere it vanishes.
+    """Return a folder to write into, and the new folder that it becomes where the block ends well; elsewhere it
+    vanishes.
 
     That one is `out`, or if None the first of `free`-1, `free`-2, … that neither exists nor is being made. What a
     process that was killed had written for it is removed. Raises `SpringfootError` for an `out` that is taken.
@@ -100,7 +101,10 @@ def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
 
 @contextmanager
 def _part(out: Path) -> Iterator[Path]:
-    """The hidden folder that becomes `out`; raises `TakenError` where `out` exists or another process makes it."""
+    """Return the hidden folder that becomes `out`.
+
+    Raises `TakenError` where `out` exists or another process makes it.
+    """
     part = out.parent / f".{out.name}.part"
     try:
         with owned(part):
@@ -145,7 +149,7 @@ def _empty(folder: Path) -> None:
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A CSV file: numbers to six significant digits, nothing for None and for what is not finite."""
+    """Return a CSV file: numbers to six significant digits, nothing for None and for what is not finite."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)

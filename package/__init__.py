@@ -1,4 +1,6 @@
-"""How stiff should ankles and toes be? A laboratory of five rooms, each imported by its name:
+"""Walking with segmented feet whose ankle and toe stiffness is learned.
+
+Each room is imported by its name:
 
 - `springfoot.gait`: the science of walking;
 - `springfoot.envs`: the walking body as Gymnasium environments;

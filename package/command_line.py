@@ -31,7 +31,7 @@ _OURS = {
 
 
 def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flags:
-    """The flags on the command line, `words` or those of the process; help on standard output ends with 0.
+    """Return the flags on the command line, `words` or those of the process; help on standard output ends with 0.
 
     Bad flags end with 2, after one line on standard error that says what is wrong with which.
     """
@@ -46,7 +46,7 @@ def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flag
 
 
 def _of_box(text: str) -> str:
-    """What a box of tyro says, in one line: its first part, and the first flag that it thinks was meant."""
+    """Return the text of a box of tyro in one line: its first part, and the first flag that it suggests."""
     lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
     parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))
     if not text.startswith("╭"):  # where there is no UTF-8, the title is above a line of its own
@@ -107,12 +107,12 @@ def _terminate(_number: int, _frame: object) -> None:
 
 
 def stopped_by(record: dict[str, Any]) -> int:
-    """The exit code of a training that a signal ended in good order."""
+    """Return the exit code of a training that a signal ended in good order."""
     return TERMINATED if record.get("signal") == "SIGTERM" else INTERRUPTED
 
 
 def _told(error: Exception) -> str:
-    """What happened, and where files cannot be written what of them is safe."""
+    """Return the message of an error, and which files are safe where some cannot be written."""
     if isinstance(error, MemoryError):
         return "not enough memory; results are written whole or not at all"
     if isinstance(error, UnicodeEncodeError):
@@ -126,6 +126,6 @@ def _told(error: Exception) -> str:
 
 
 def _in_a_line(text: str) -> str:
-    """A line for a terminal, in which no word, as names of files are, is longer than `LONGEST_WORD`."""
+    """Return a line for a terminal, in which no word, as names of files are, is longer than `LONGEST_WORD`."""
     half = LONGEST_WORD // 2 - 2
     return re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: f"{word[0][:half]}...{word[0][-half:]}", printable(text))

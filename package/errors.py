@@ -22,7 +22,7 @@ def printable(text: str) -> str:
 
 
 def quoted(value: object, most: int = 60) -> str:
-    """What a message quotes of a bad value: its `repr`, or the beginning of it where it is longer than `most`."""
+    """Return the quotation of a bad value in a message: its `repr`, or the beginning of it beyond `most` letters."""
     try:
         text = repr(value)
     except ValueError:  # a whole number of thousands of digits
@@ -31,7 +31,7 @@ def quoted(value: object, most: int = 60) -> str:
 
 
 def as_float(value: object) -> float:
-    """A number as a float, infinite if too large for one; NaN for what is no number."""
+    """Return a number as a float, infinite if too large for one; NaN for what is no number."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return nan
     try:

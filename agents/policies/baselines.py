@@ -38,7 +38,7 @@ _SIN, _COS, _SPEED = (
 
 
 def leg_phase(observation: NDArray) -> NDArray:
-    """(N, side) stride phase of each leg in [0, 1), 0 at its heel strike, read from observations (N, D)."""
+    """Return (N, side) stride phase of each leg in [0, 1), 0 at its heel strike, read from observations (N, D)."""
     left = np.arctan2(observation[:, _SIN], observation[:, _COS], dtype=float) / (2 * np.pi) % 1.0
     return leg_phases(left)
 
@@ -53,7 +53,7 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
 
 
 def untrained(settings: BipedSettings) -> PolicyFunction:
-    """What training starts from: mean action 0, mid-range on the log scale, or in residual mode the fixed schedule."""
+    """Act as training starts: mean action 0, mid-range on the log scale, or in residual mode the fixed schedule."""
     return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
 
 
@@ -64,12 +64,13 @@ def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
 
 
 def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
-    """A fixed stiffness over the stride, times `factor`: that of `settings.schedule`, or that of the leg tuning.
+    """Return a fixed stiffness over the stride, times `factor`: that of `settings.schedule`, or that of the leg tuning.
 
     The tuned one goes with the speed that is commanded at each moment, and each leg has its own where a person has
     adapted to a foot. Both scale with the body.
     """
-    body, speeds = body_of(settings), tabulated_speeds(settings)
+    body = body_of(settings)
+    speeds = tabulated_speeds(settings)
     if settings.schedule is not None:
         stiffness = settings.schedule.at(GRID)[0]
         return follow(factor * stiffness[None], speeds[:1], settings, body)
@@ -79,7 +80,7 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
 
 
 def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
-    """(speeds, samples, (ankle, toe)) stiffness of the leg tuning [N m/rad]."""
+    """Return (speeds, samples, (ankle, toe)) stiffness of the leg tuning [N m/rad]."""
     return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.target.foot.plateaus) for walk in walks])
 
 
@@ -92,20 +93,22 @@ def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
 
 
 def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
-    """The policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
+    """Return the policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
 
     Where the legs have their own it is (speeds, samples, side, (ankle, toe)). Phase and Froude speed are read from the
     observation; between two of `speeds` [m/s, of `body`] it is linear.
     """
     require_absolute(settings)
-    froude, own = np.array([body.froude_speed(speed) for speed in speeds]), np.arange(len(SIDES))
+    froude = np.array([body.froude_speed(speed) for speed in speeds])
+    own = np.arange(len(SIDES))
     each = stiffness if stiffness.ndim == 4 else np.stack([stiffness] * len(SIDES), 2)
     table = PhaseTable(each.reshape(*each.shape[:2], -1))
 
     def policy(observation: NDArray) -> NDArray:
         spot = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
         place = np.zeros(len(spot), PLACE)
-        place["row"], place["weight"] = spot, spot % 1.0
+        place["row"] = spot
+        place["weight"] = spot % 1.0
         curves = table.at(leg_phase(observation), place).reshape(-1, *2 * [len(SIDES)], each.shape[-1])
         action = action_of(curves[:, own, own], settings, body)
         return action.reshape(len(observation), -1).astype(np.float32)
@@ -132,7 +135,7 @@ SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
 
 
 def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
-    """A baseline by name, in the environment of `settings`; `seed` is that of `random`."""
+    """Return a baseline by name, in the environment of `settings`; `seed` is that of `random`."""
     kind, colon, numbers = name.partition(":")
     if kind not in BASELINES:
         raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
@@ -152,23 +155,23 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
 
 
 def has_feedback(name: str) -> bool:
-    """Whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop copy, nor a
-    schedule in a file."""
+    """Return whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop
+    copy, nor a schedule in a file."""
     return name.partition(":")[0] not in (*BASELINES, FROZEN) and not is_schedule_file(name)
 
 
 def is_schedule_file(name: str) -> bool:
-    """Whether a policy of that name is a schedule in a file (`springfoot.agents.policies.schedules`)."""
+    """Return whether a policy of that name is a schedule in a file (`springfoot.agents.policies.schedules`)."""
     return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
 
 
 def and_copy(name: str) -> tuple[str, ...]:
-    """What a table that judges a policy walks: the policy and, unless it has no feedback, its open-loop copy."""
+    """Return the policies of a table that judges one: the policy and, unless it has no feedback, its open-loop copy."""
     return (name, f"{FROZEN}:{name}") if has_feedback(name) else (name,)
 
 
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
-    """The environment settings that a baseline needs, for the body and speed of `settings`.
+    """Return the environment settings that a baseline needs, for the body and speed of `settings`.
 
     What is stiffness in N m/rad acts absolutely; `untrained` and `random` act as `settings` say. The thesis's lines
     bring the springs between gait events, their rest angles included.

@@ -44,7 +44,7 @@ def policy_from_mlp(
     observation_clip: float | None = None,
     variance_floor: float = VARIANCE_FLOOR,
 ) -> Policy:
-    """A policy from the weights of a multilayer perceptron that gives the mean action.
+    """Return a policy from the weights of a multilayer perceptron that gives the mean action.
 
     Args:
         layers: weight (outputs, inputs) and bias (outputs,) of each layer, torch's way round; a bias may be None.
@@ -71,10 +71,13 @@ def policy_from_mlp(
         require_number("observation_clip", observation_clip, 0, above=True)
     width = len(biped.observation_names)
     if observation_mean is None:
-        observation_mean, observation_variance, variance_floor = np.zeros(width), np.ones(width), 0.0
+        observation_mean = np.zeros(width)
+        observation_variance = np.ones(width)
+        variance_floor = 0.0
     require_number("variance_floor", variance_floor, 0)
     weights, biases = _checked_layers(layers, width, len(biped.action_names))
-    mean, variance = _array("observation_mean", observation_mean), _array("observation_variance", observation_variance)
+    mean = _array("observation_mean", observation_mean)
+    variance = _array("observation_variance", observation_variance)
     for name, value in (("observation_mean", mean), ("observation_variance", variance)):
         if value.shape != (width,):
             raise SpringfootError(f"{name} must be ({width},), is {value.shape}")
@@ -101,7 +104,7 @@ def policy_from_sb3(
     *,
     ignore_unvaried: bool = False,
 ) -> Policy:
-    """The mean action of a stable-baselines3 model with an MLP policy: of PPO, A2C, TRPO, SAC, TQC, TD3 or DDPG.
+    """Return the mean action of a stable-baselines3 model with an MLP policy: of PPO, A2C, TRPO, SAC, TQC, TD3 or DDPG.
 
     Args:
         model: the model; its environment, where it has one, knows `settings` and `normalizer`.
@@ -123,7 +126,8 @@ def policy_from_sb3(
                 "the model has no environment of springfoot's: give settings, and the VecNormalize if it had one"
             ) from None
     normalizer = model.get_vec_normalize_env() if normalizer is None else normalizer
-    low, high = model.action_space.low, model.action_space.high
+    low = model.action_space.low
+    high = model.action_space.high
     if not ((low == -1).all() and (high == 1).all()):
         raise SpringfootError("the model acts on another range than [-1, 1]: a wrapper rescales the actions")
     layers, activation, output = actor_of(model.policy)
@@ -137,7 +141,7 @@ def policy_from_sb3(
 
 
 def ignoring_unvaried(policy: Policy) -> Policy:
-    """The policy without the entries of the observation that never varied in training."""
+    """Return the policy without the entries of the observation that never varied in training."""
     variance = np.where(policy.observation_variance < NEVER_VARIED, IGNORED, policy.observation_variance)
     return replace(policy, observation_variance=variance)
 
@@ -158,9 +162,11 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
     leaves = [leaf for part in parts for leaf in part.modules() if not list(leaf.children())]
     kinds = [type(leaf).__name__ for leaf in leaves]
     if not hasattr(actor, "latent_pi") and output == "tanh" and kinds[-1:] == ["Tanh"]:
-        leaves, kinds = leaves[:-1], kinds[:-1]  # the output, a module of its own there
+        leaves = leaves[:-1]
+        kinds = kinds[:-1]  # the output, a module of its own there
     names = {kind: name for name, kind in TORCH_NAMES.items()}
-    linear, between = kinds[::2], set(kinds[1::2]) or {"Tanh"}
+    linear = kinds[::2]
+    between = set(kinds[1::2]) or {"Tanh"}
     if len(kinds) % 2 == 0 or set(linear) != {"Linear"} or len(between) > 1 or not between <= set(names):
         raise SpringfootError(
             f"its actor is {', '.join(kinds)}: no layers with one activation between them, of {', '.join(ACTIVATIONS)}"
@@ -172,7 +178,10 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
 
 
 def statistics_of(normalizer: Any) -> dict[str, Any]:
-    """How a `VecNormalize` normalises observations, as keyword arguments of `policy_from_mlp`; {} if it does not."""
+    """Return how a `VecNormalize` normalises observations, as keyword arguments of `policy_from_mlp`.
+
+    {} if it does not.
+    """
     if normalizer is None or not normalizer.norm_obs:
         return {}
     return {
@@ -185,7 +194,9 @@ def statistics_of(normalizer: Any) -> dict[str, Any]:
 
 def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDArray, ...], tuple[NDArray, ...]]:
     """Weights and biases as arrays; raises `SpringfootError` where they do not lead from observation to action."""
-    weights, biases, inputs = [], [], width
+    weights = []
+    biases = []
+    inputs = width
     for index, (weight, bias) in enumerate(layers):
         name = f"layer {index}"
         w = _array(f"{name}: weight", weight)
@@ -204,7 +215,7 @@ def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDA
 
 
 def _array(name: str, value: Any) -> NDArray:
-    """A copy of an array or of a torch tensor, float32 or float64; `SpringfootError` if it is not finite."""
+    """Return a copy of an array or of a torch tensor, float32 or float64; `SpringfootError` if it is not finite."""
     try:
         array = np.array(value.detach().cpu().numpy() if hasattr(value, "detach") else value)
         array = array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)

@@ -93,7 +93,7 @@ class Scale(NamedTuple):
 
 
 def scale_of(settings: BipedSettings) -> Scale:
-    """What the actions of a policy with these settings set."""
+    """Return the scale that the actions of a policy with these settings set."""
     joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
         return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
@@ -111,8 +111,10 @@ def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def contract_of(policy: Policy) -> dict[str, Any]:
-    """The contract of a policy, as plain JSON values; docs/how-to/policies.md explains each of them."""
-    settings, scale, header = policy.settings, scale_of(policy.settings), policy.header
+    """Return the contract of a policy, as plain JSON values; docs/how-to/policies.md explains each of them."""
+    settings = policy.settings
+    scale = scale_of(policy.settings)
+    header = policy.header
     bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
     contract = {
         "contract_version": CONTRACT_VERSION,
@@ -154,7 +156,9 @@ def contract_of(policy: Policy) -> dict[str, Any]:
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
-    """What a residual action multiplies, at each percent of the leg's stride, by speed; of the body of the contract.
+    """Return the schedule that a residual action multiplies, at each percent of the leg's stride, by speed.
+
+    It is of the body of the contract.
 
     `right` is the right leg's, where a person has adapted to a foot; the rest is then the left leg's.
     """

@@ -29,7 +29,8 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     planned place of the CoM counts where a gain reads it.
     Numbers count to six significant digits, so that compilers and processors agree.
     """
-    model, probe = biped.model, np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
+    model = biped.model
+    probe = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
     numbers: list[Any] = []
     for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
         read = slice(None) if legs.swing_place_gain else slice(PLANNED_PLACE)
@@ -46,7 +47,7 @@ def fingerprint(biped: Biped) -> dict[str, str]:
 
 
 def _used(legs: LegConstants) -> dict[str, Any]:
-    """The constants; a `swing_place_gain` of 0 is none, so that policies from before there was one walk on."""
+    """Return the constants; a `swing_place_gain` of 0 is none, so that policies from before there was one walk on."""
     return {name: value for name, value in asdict(legs).items() if value or name != "swing_place_gain"}
 
 

@@ -31,7 +31,7 @@ CONTRACT_KEY = "springfoot"
 
 
 def contract_path(path: Path) -> Path:
-    """The contract that stands beside a file: walk.onnx.json beside walk.onnx."""
+    """Return the contract that stands beside a file: walk.onnx.json beside walk.onnx."""
     return path.with_name(f"{path.name}.json")
 
 
@@ -79,7 +79,8 @@ class ForeignPolicy:
 
 
 def onnx_policy(path: Path) -> ForeignPolicy:
-    """The policy in an ONNX file, run by onnxruntime: one input, the raw observation; `action` or the first output.
+    """Return the policy in an ONNX file, run by onnxruntime: one input, the raw observation; `action` or the first
+    output.
 
     The input is (N, D), (1, D) or (D,), of float32 or float64. Its settings are those of the contract beside it, else
     of the contract inside it (exported policies carry theirs), else the defaults. Raises `SpringfootError`, one line,
@@ -91,7 +92,8 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     except ModuleNotFoundError as error:
         raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
     session, fails = onnx_session(path, len(OBSERVATION))
-    inputs, outputs = session.get_inputs(), [output.name for output in session.get_outputs()]
+    inputs = session.get_inputs()
+    outputs = [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
         names = ", ".join(each.name for each in inputs) or "none"
         raise SpringfootError(f"{path} has the inputs {names}; a policy has one, the observation")
@@ -104,7 +106,8 @@ def onnx_policy(path: Path) -> ForeignPolicy:
         raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, given.shape))})")
     if fails:
         raise SpringfootError(f"{path} fails on observations (2, {width}): {fails}")
-    output, dtype = "action" if "action" in outputs else outputs[0], INPUT_TYPES[given.type]
+    output = "action" if "action" in outputs else outputs[0]
+    dtype = INPUT_TYPES[given.type]
 
     def act(observation: NDArray) -> Any:
         return session.run([output], {given.name: np.ascontiguousarray(observation, dtype)})[0]
@@ -113,12 +116,12 @@ def onnx_policy(path: Path) -> ForeignPolicy:
 
 
 def is_function(name: str) -> bool:
-    """Whether a policy's name is of the form `module:function`, and no file's."""
+    """Return whether a policy's name is of the form `module:function`, and no file's."""
     return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name) is not None and not Path(name).exists()
 
 
 def function_policy(name: str) -> ForeignPolicy:
-    """The function that `module:function` names, of observations (N, D), (1, D) or (D,); imports the module.
+    """Return the function that `module:function` names, of observations (N, D), (1, D) or (D,); imports the module.
 
     The module is one that Python finds, else one in the current folder. An attribute `settings` of the function, a
     mapping or `BipedSettings`, says what it was made for. Raises `SpringfootError`, one line, where module or function
@@ -145,7 +148,10 @@ def function_policy(name: str) -> ForeignPolicy:
 
 
 def _asked_by(path: Path, inside: str | None) -> Biped:
-    """The environment that the contract beside the file asks for, else the one inside it; the default one without."""
+    """Return the environment that the contract beside the file asks for, else the one inside it.
+
+    The default one without.
+    """
     beside = contract_path(path)
     if inside is None and not beside.is_file():
         return Biped(BipedSettings(), 1)
@@ -163,14 +169,17 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
 
 
 def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
-    """The policy that `act` is; which of (N, D), (1, D) and (D,) it takes is tried on two first observations."""
+    """Return the policy that `act` is; which of (N, D), (1, D) and (D,) it takes is tried on two first observations."""
 
     def first(seed: int) -> NDArray:
         biped.reset(np.array([0]), [seed])
         return biped.observe()[0]
 
-    probe, count = np.stack([first(0), first(1)]), len(biped.action_names)
-    width, wrong, failed = probe.shape[1], "", ""
+    probe = np.stack([first(0), first(1)])
+    count = len(biped.action_names)
+    width = probe.shape[1]
+    wrong = ""
+    failed = ""
     for take, given, wanted in (
         (act, probe, (2, count)),
         (lambda rows: np.concatenate([act(row[None]) for row in rows]), probe[:1], (1, count)),

@@ -21,7 +21,8 @@ def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
         bounds = _bounds(name)
         if bounds is not None and values.size:
             low, high = bounds
-            least, most = float(values.min()), float(values.max())
+            least = float(values.min())
+            most = float(values.max())
             if not low <= least <= most <= high:
                 wrong = least if not least >= low else most
                 raise SpringfootError(f"{path}: {name} must be in [{low:g}, {high:g}], has {wrong:.4g}")

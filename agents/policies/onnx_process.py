@@ -20,7 +20,7 @@ _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
 
 def onnx_session(path: Path, width: int) -> tuple[Any, str]:
-    """The session that runs a file, and why it runs for no observations of `width` entries, nothing if it does.
+    """Return the session that runs a file, and why it runs for no observations of `width` entries, nothing if it does.
 
     Raises `SpringfootError` for a file that onnxruntime does not take, or not within the bounds.
     """
@@ -47,7 +47,7 @@ def _session(path: Path) -> Any:
 
 
 def main() -> None:
-    """The child: open the file that the command line names, run it once, say on standard output what failed."""
+    """Run the child: open the file that the command line names, run it once, say on standard output if it failed."""
     import onnxruntime  # noqa: F401  # before the bounds
 
     out = os.dup(1)
@@ -65,7 +65,8 @@ def main() -> None:
 
 def _fails(session: Any, width: int) -> str:
     """Why it takes neither two observations nor one, nothing if it does."""
-    inputs, failed = session.get_inputs(), ""
+    inputs = session.get_inputs()
+    failed = ""
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:
         return failed  # the parent says so
     for shape in ((2, width), (1, width), (width,)):
@@ -79,6 +80,6 @@ def _fails(session: Any, width: int) -> str:
 
 
 def one_line(error: Exception) -> str:
-    """An error as a part of a message."""
+    """Return an error as a part of a message."""
     text = " ".join(str(error).split())
     return text if isinstance(error, SpringfootError) else f"{type(error).__name__}: {text[:300]}"

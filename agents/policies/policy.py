@@ -47,7 +47,10 @@ Output = Literal["clip", "tanh"]
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
 SHIPPED = {"pretrained": "walk.safetensors", "predicted": "predicted.safetensors"}
-"""Name of a policy of this package -> its file in `pretrained/`: of preset `walk` (mixed), and of preset `predict`."""
+"""Name of a policy of this package -> its file in `pretrained/`: of `PRETRAINED_BY`, and of preset
+`predict`."""
+PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
+"""The command that made `pretrained` from nothing."""
 RUN = "run.json"
 """Name of a run folder's record: configuration, evaluations, status."""
 
@@ -135,7 +138,10 @@ def save_policy(path: str | Path, policy: Policy) -> None:
 
 
 def find_policy(name: str | Path) -> Path:
-    """The file that a path, a run folder (its best) or one of `SHIPPED` means; `SpringfootError` if there is none."""
+    """Return the file that a path, a run folder (its best) or one of `SHIPPED` means.
+
+    `SpringfootError` if there is none.
+    """
     path = Path(name)
     if str(name) in SHIPPED:
         path = Path(str(resources.files("springfoot.agents") / "pretrained" / SHIPPED[str(name)]))
@@ -156,7 +162,8 @@ _NUMBERS = ("observation_clip", "variance_floor")
 
 
 def load_policy(name: str | Path) -> Policy | ForeignPolicy:
-    """The policy in a file, a run folder (its best), one of `SHIPPED`, or the function that `module:function` names.
+    """Return the policy in a file, a run folder (its best), one of `SHIPPED`, or the function that `module:function`
+    names.
 
     A .safetensors file is read by `read_policy`, an .onnx file by `onnx_policy`; neither executes anything. Only a
     `name` that is a text of the form `module:function` runs code: `function_policy` imports that module.
@@ -168,7 +175,8 @@ def load_policy(name: str | Path) -> Policy | ForeignPolicy:
 
 
 def read_policy(name: str | Path) -> Policy:
-    """The policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, checked against this springfoot.
+    """Return the policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, checked against this
+    springfoot.
 
     Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of
     another format version, incomplete or not finite, or made for other spaces, another model or other legs than
@@ -181,9 +189,12 @@ def read_policy(name: str | Path) -> Policy:
             f"{name} has policy format {header.get('format_version')!r}, this version reads {FORMAT_VERSION}"
         )
     try:
-        network, values = header["network"], header["settings"]
+        network = header["network"]
+        values = header["settings"]
         clip, floor = (None if network[key] is None else float(network[key]) for key in _NUMBERS)
-        activation, output, sizes = network["activation"], network.get("output", "clip"), list(network["layer_sizes"])
+        activation = network["activation"]
+        output = network.get("output", "clip")
+        sizes = list(network["layer_sizes"])
         stored = dict(header["fingerprint"])
         settings = settings_from(**values)
         biped = Biped(settings, 1)

@@ -35,7 +35,7 @@ SAME_BETA = 1e-4
 def schedule_file(
     name: str, conditions: BipedSettings
 ) -> tuple[dict[str, Any], Callable[[BipedSettings], PolicyFunction]]:
-    """What a schedule file asks for.
+    """Return the settings that a schedule file asks for.
 
     Returns: the settings it needs, for the body of `conditions` (absolute actions, and the equilibrium that goes with
     it), and what makes its policy in an environment of that body. Raises `SpringfootError` for another file.
@@ -51,7 +51,7 @@ def schedule_file(
 
 
 def _scale(height: float | None, mass: float | None, settings: BipedSettings) -> float:
-    """How many times stiffer the body of `settings` is than one of `height` [m] and `mass`, load and all [kg]."""
+    """Return the stiffness of the body of `settings` over that of a body of `height` [m] and `mass` with load [kg]."""
     height = require_number("height_m", REFERENCE_HEIGHT if height is None else height, 0.0, unit="m", above=True)
     mass = require_number("mass_kg", REFERENCE_MASS if mass is None else mass, 0.0, unit="kg", above=True)
     return body_of(settings).stiffness_scale / (mass / REFERENCE_MASS * height / REFERENCE_HEIGHT)
@@ -82,7 +82,7 @@ def _columns(table: Table, what: str) -> list[list[str]]:
 
 
 def _curves(table: Table, what: str) -> NDArray:
-    """(SAMPLES, side, joint) of the columns with `what`, on `GRID`; linear and periodic between the rows."""
+    """Return (SAMPLES, side, joint) of the columns with `what`, on `GRID`; linear and periodic between the rows."""
     if not table.has("percent"):
         raise SpringfootError(f"{table.name}, line 1: needs a column percent, of the leg's stride")
     percent = table.ascending("percent")
@@ -111,8 +111,8 @@ def _stiffness(table: Table) -> NDArray:
 
 
 def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
-    """The setting that the file's column `equilibrium` names, `planned` without one; with `phase` also the schedule
-    of its rest angles, constant over each percent and the same for both legs."""
+    """Return the setting that the file's column `equilibrium` names, `planned` without one; with `phase` also the
+    schedule of its rest angles, constant over each percent and the same for both legs."""
     kinds = get_args(Equilibrium)
     kind = "planned"
     if table.has("equilibrium"):
@@ -133,11 +133,12 @@ def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
 
 
 def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
-    """The springs of a finite-state table, for the body of `settings`."""
+    """Return the springs of a finite-state table, for the body of `settings`."""
     table = read_object(path, STATES_FILE)
     try:
         states = table["states"]
-        height, mass = table.get("height_m"), table.get("mass_kg")
+        height = table.get("height_m")
+        mass = table.get("mass_kg")
         entries = [
             [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
         ]
@@ -146,7 +147,8 @@ def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
             f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
             f"toe, and these {', '.join(SPRING_KEYS)}"
         ) from None
-    beta, scale = damping_times(body_of(settings))[FEET], _scale(height, mass, settings)
+    beta = damping_times(body_of(settings))[FEET]
+    scale = _scale(height, mass, settings)
     time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))
     lines = []
     for column, (joint, own) in enumerate(zip(SPRINGS, beta, strict=True)):

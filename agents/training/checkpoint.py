@@ -39,7 +39,7 @@ class Header(TypedDict):
 
 
 def checkpoints(out: Path) -> list[Path]:
-    """The checkpoints in a folder, the newest, that of the most timesteps, first."""
+    """Return the checkpoints in a folder, the newest, that of the most timesteps, first."""
     found = {path: _NAME.fullmatch(path.name) for path in out.iterdir()}
     return sorted((path for path, match in found.items() if match), key=_timesteps, reverse=True)
 

@@ -118,14 +118,14 @@ PRESETS: dict[str, TrainingConfig] = {
 
 
 def config_to_json(config: TrainingConfig) -> dict[str, Any]:
-    """A configuration as a dictionary of plain JSON values; `config_from_json` is its inverse."""
+    """Return a configuration as a dictionary of plain JSON values; `config_from_json` is its inverse."""
     values = {item.name: getattr(config, item.name) for item in dataclasses.fields(config)}
     values = {name: int(value) if isinstance(value, Integral) else value for name, value in values.items()}
     return values | {"hidden": list(config.hidden), "environment": settings_to_json(config.environment)}
 
 
 def config_from_json(values: dict[str, Any]) -> TrainingConfig:
-    """The configuration that `config_to_json` wrote; raises `SpringfootError` for anything else."""
+    """Return the configuration that `config_to_json` wrote; raise `SpringfootError` for anything else."""
     names = [item.name for item in dataclasses.fields(TrainingConfig)]
     if unknown := sorted(set(values) - set(names)):
         raise SpringfootError(f"unknown training setting {unknown[0]!r}; valid: {', '.join(names)}")

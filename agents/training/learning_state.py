@@ -48,8 +48,9 @@ class Learning(TypedDict):
 def learning_state(
     learner: Learner, environments: SegmentedFootBipedVecEnv
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """All that learning changes, copies: JSON values, and arrays by name."""
-    ppo, normalized = learner.ppo, learner.normalized
+    """Return all that learning changes, copies: JSON values, and arrays by name."""
+    ppo = learner.ppo
+    normalized = learner.normalized
     assert ppo._last_obs is not None and ppo._last_episode_starts is not None and ppo.ep_info_buffer is not None
     simulation = environments.state()
     generators = simulation.pop("generators")
@@ -90,7 +91,8 @@ def restore_learning(
 
     Raises `SpringfootError` if it does not fit this learner. `logged` is checked, and left to the caller.
     """
-    ppo, normalized = learner.ppo, learner.normalized
+    ppo = learner.ppo
+    normalized = learner.normalized
     learner.restore({name: array for name, array in arrays.items() if name.startswith(_LEARNER)})
     try:
         simulation = {name: array for name, array in arrays.items() if name.startswith(_SIMULATION)}

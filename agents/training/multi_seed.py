@@ -92,7 +92,7 @@ def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
 
 
 def is_finished(folder: Path) -> bool:
-    """Whether the folder holds a training that ran to its end."""
+    """Return whether the folder holds a training that ran to its end."""
     return (folder / RUN).is_file() and read_record(folder).get("status") == "finished"
 
 
@@ -104,7 +104,8 @@ def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]
 
 def training_table(record: dict[str, Any]) -> str:
     """Markdown: one row a seed, and the mean ± SD over those that finished."""
-    head, lines = ["seed", "status", "steps", "seconds", "best return", "falls", "after steps"], []
+    head = ["seed", "status", "steps", "seconds", "best return", "falls", "after steps"]
+    lines = []
     for row in record["seeds"]:
         falls = MISSING if row["falls"] is None else f"{row['falls']} of {row['episodes']}"
         patterns = {"timesteps": ",d", "seconds": ".0f", "return_mean": ".1f", "best_timesteps": ",d"}
@@ -186,7 +187,10 @@ def _block(blocked: bool) -> None:
 
 
 def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
-    """The row of results of one seed, from its run.json; its status is `without` where that file is not complete."""
+    """Return the row of results of one seed, from its run.json.
+
+    Its status is `without` where that file is not complete.
+    """
     row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
     record = read_record(folder) if (folder / RUN).is_file() else {}
     best = record.get("best") or {}

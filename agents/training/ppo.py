@@ -33,7 +33,8 @@ class Learner:
         torch.set_num_threads(1)  # more compete with the threads of the physics, and are up to 200 times slower
         self._environment = config.environment
         share = config.environment.step_seconds / ACTION_STEP
-        gamma, gae_lambda = config.gamma**share, config.gae_lambda**share
+        gamma = config.gamma**share
+        gae_lambda = config.gae_lambda**share
         self.normalized = VecNormalize(environments, gamma=gamma)
         self.rollout_steps = config.update_steps // config.num_envs
         samples = self.rollout_steps * config.num_envs
@@ -59,7 +60,7 @@ class Learner:
             )
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
-        """The actor's mean actions as they are now, with the observation statistics as they are now."""
+        """Return the actor's mean actions as they are now, with the observation statistics as they are now."""
         layers, _, _ = actor_of(self.ppo.policy)
         # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         seen = self._statistics()["observation"]
@@ -96,7 +97,8 @@ class Learner:
             self.ppo.policy.load_state_dict(
                 {name.removeprefix("network."): torch.from_numpy(value) for name, value in network.items()}
             )
-            optimizer, parameters = self.ppo.policy.optimizer, list(self.ppo.policy.parameters())
+            optimizer = self.ppo.policy.optimizer
+            parameters = list(self.ppo.policy.parameters())
             moments: dict[int, dict[str, torch.Tensor]] = {}
             for name, value in arrays.items():
                 if name.startswith("adam."):

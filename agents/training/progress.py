@@ -22,7 +22,10 @@ class Progress:
             dynamic_ncols=True,
             disable=not sys.stderr.isatty(),
         )
-        self._total, self._first, self._done, self._state = total, done, done, ""
+        self._total = total
+        self._first = done
+        self._done = done
+        self._state = ""
         self._began = self._last_line = monotonic()
 
     def advance(self, steps: int) -> None:

@@ -11,7 +11,7 @@ from springfoot.envs.batch.walk import walked_steps
 def evaluate_returns(
     biped: Biped, policy: Callable[[np.ndarray], np.ndarray], seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run one episode in each environment of `biped`, seeded `seed`, `seed` + 1, …
+    """Run one episode in each environment of `biped`, seeded `seed`, `seed` + 1 and so on.
 
     Returns: (N,) return [-], length [s], and whether the episode ended in a fall.
     """

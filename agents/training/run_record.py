@@ -17,7 +17,7 @@ EVENTS = "events.out.tfevents.*"
 
 
 def read_record(out: Path) -> dict[str, Any]:
-    """The record in a run's folder; raises `SpringfootError` where it is none."""
+    """Return the record in a run's folder; raise `SpringfootError` where it is none."""
     record = read_object(out / RUN, "record of a run")
     try:
         if not isinstance(record["config"], dict):
@@ -59,7 +59,7 @@ def write_record(out: Path, record: Mapping[str, Any]) -> None:
 
 
 def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The best evaluation, the first of several; None before the first.
+    """Return the best evaluation, the first of several; None before the first.
 
     A session that measured the best anew, as its task was another, compares it with what came after only.
     """
@@ -72,7 +72,7 @@ def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def same_source(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether two sessions ran the same code, of the same versions."""
+    """Return whether two sessions ran the same code, of the same versions."""
     return all(one.get(name) == other.get(name) for name in ("commit", "modified", "versions"))
 
 

@@ -30,7 +30,8 @@ class SegmentedFootBipedVecEnv(VecEnv):
         super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
         self.step_info: dict[str, np.ndarray] = {}
         self._actions = np.zeros((num_envs, len(ACTIONS)), np.float32)
-        self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, int)
+        self._returns = np.zeros(num_envs)
+        self._lengths = np.zeros(num_envs, int)
 
     def reset(self) -> np.ndarray:
         """First observations (N, D) of new episodes, with the seeds given to `seed` since the last reset."""
@@ -38,7 +39,8 @@ class SegmentedFootBipedVecEnv(VecEnv):
         observation, _ = self.env.reset(seed=self._seeds, options=options or None)
         self._reset_seeds()
         self._reset_options()
-        self._returns[:], self._lengths[:] = 0.0, 0
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
         return observation
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -62,11 +64,12 @@ class SegmentedFootBipedVecEnv(VecEnv):
                     "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
                     "episode": {"r": float(self._returns[i]), "l": int(self._lengths[i])},
                 }
-            self._returns[done], self._lengths[done] = 0.0, 0
+            self._returns[done] = 0.0
+            self._lengths[done] = 0
         return observation, reward.copy(), done, infos  # PPO adds bootstrapped values to the rewards in place
 
     def state(self) -> dict[str, Any]:
-        """The exact state between two steps: that of the batch (see `Biped.state`), and of the running episodes."""
+        """Return the exact state between two steps: of the batch (see `Biped.state`) and of the running episodes."""
         episodes = {"episode.return": self._returns.copy(), "episode.length": self._lengths.copy()}
         return self.env.biped.state() | episodes
 
@@ -77,18 +80,19 @@ class SegmentedFootBipedVecEnv(VecEnv):
                 raise SpringfootError(f"the state does not fit: {name!r} must be {own.shape}")
         self.reset()  # so that an episode is running everywhere; nothing of it is left
         self.env.biped.restore({name: values for name, values in state.items() if not name.startswith("episode.")})
-        self._returns[:], self._lengths[:] = state["episode.return"], state["episode.length"]
+        self._returns[:] = state["episode.return"]
+        self._lengths[:] = state["episode.length"]
 
     def close(self) -> None:
         """Free the simulation and any window."""
         self.env.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """One picture of each environment."""
+        """Return one picture of each environment."""
         return list(self.env.render() or [None] * self.num_envs)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The batch's attribute, once for each of `indices`: all environments share it."""
+        """Return the batch's attribute, once for each of `indices`: all environments share it."""
         value = getattr(self.env, attr_name)
         return [value for _ in self._get_indices(indices)]
 
@@ -105,7 +109,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """False for each of `indices`: nothing wraps an environment inside the batch."""
+        """Return False for each of `indices`: nothing wraps an environment inside the batch."""
         return [False for _ in self._get_indices(indices)]
 
     def _require_all(self, indices: VecEnvIndices, what: str) -> None:
@@ -114,7 +118,10 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
 
 def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The options of one reset, from those of each environment; only bodies and speeds may differ between them."""
+    """Return the options of one reset, from those of each environment.
+
+    Only bodies and speeds may differ between them.
+    """
     options, *others = ({name: value for name, value in own.items() if name not in DRAWN} for own in each)
     if any(other != options for other in others):
         raise SpringfootError(f"reset options other than {', '.join(DRAWN)} must be the same for all environments")
@@ -128,5 +135,5 @@ def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:
-    """A vector environment's info without the masks and the last observations and infos."""
+    """Return a vector environment's info without the masks and the last observations and infos."""
     return {name: values for name, values in info.items() if not name.startswith(("_", "final_"))}

@@ -55,7 +55,10 @@ class Session(BaseCallback):
         callbacks: Sequence[Onlooker] = (),
     ) -> None:
         super().__init__()
-        self._config, self._out, self._record, self._found = config, out, record, found
+        self._config = config
+        self._out = out
+        self._record = record
+        self._found = found
         threads = threads or config.threads or processors()
         settings = settings_to_json(config.environment)
         self._environments = SegmentedFootBipedVecEnv(config.num_envs, num_threads=threads, **settings)
@@ -63,9 +66,13 @@ class Session(BaseCallback):
         self._fingerprint = fingerprint(self._evaluation)
         seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)  # below EVALUATION_SEED
         self.learner = Learner(config, self._environments, seed)
-        self._stopping, self._began, self._written = Stopping(), monotonic(), (0.0, 0.0)
+        self._stopping = Stopping()
+        self._began = monotonic()
+        self._written = (0.0, 0.0)
         self._first, self._seconds_before = (found[0]["timesteps"], found[0]["seconds"]) if found else (0, 0.0)
-        self._trained, self._kept, self._policy = self._first, found, None
+        self._trained = self._first
+        self._kept = found
+        self._policy = None
         self._best = found[1][BEST_FILE].tobytes() if found and BEST_FILE in found[1] else b""
         self._onlookers = callbacks
         self._sums: dict[str, np.ndarray] = {}
@@ -79,7 +86,8 @@ class Session(BaseCallback):
         return self._record
 
     def _learn(self) -> None:
-        ppo, session = self.learner.ppo, {"from_timesteps": self._first, **source(PACKAGES)}
+        ppo = self.learner.ppo
+        session = {"from_timesteps": self._first, **source(PACKAGES)}
         logged = self._go_on(session)
         self._write_record("running")
         ppo.set_logger(configure(str(self._out), ["tensorboard"]))
@@ -129,7 +137,8 @@ class Session(BaseCallback):
                     f"The best policy returns {again['return_mean']:.1f} in this task now", file=sys.stderr, flush=True
                 )
         settings = json.loads(json.dumps(config_to_json(self._config)))
-        before, now = header["config"].get("environment", {}), settings["environment"]
+        before = header["config"].get("environment", {})
+        now = settings["environment"]
         if changed := {name: value for name, value in before.items() if now.get(name) != value}:
             session["changed_from"] = changed
         same = {**header["config"], "threads": 0} == {**settings, "threads": 0}
@@ -147,7 +156,9 @@ class Session(BaseCallback):
         return bool(past) and past[-1]["timesteps"] == self._trained >= self._config.timesteps
 
     def _on_rollout_start(self) -> None:
-        self._sums, self._ended, self._whole = {}, [], False
+        self._sums = {}
+        self._ended = []
+        self._whole = False
         self._keep()
         past = self._record["evaluations"]
         due = not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval
@@ -200,7 +211,8 @@ class Session(BaseCallback):
         }
         if self._best:
             arrays[BEST_FILE] = np.frombuffer(self._best, np.uint8)
-        self._kept, self._policy = (header, arrays), self.learner.policy(self._fingerprint)
+        self._kept = (header, arrays)
+        self._policy = self.learner.policy(self._fingerprint)
 
     def _evaluate(self) -> None:
         """Evaluate the policy on the fixed seeds, keep it if it is the best so far, and save."""
@@ -221,7 +233,7 @@ class Session(BaseCallback):
             self._stopping.ask()
 
     def _returns(self, policy: Policy) -> dict[str, Any]:
-        """What an evaluation on the fixed seeds tells of a policy."""
+        """Return the numbers of an evaluation of a policy on the fixed seeds."""
         returns, seconds, fell = evaluate_returns(self._evaluation, policy, EVALUATION_SEED)
         return {
             "return_mean": float(returns.mean()),

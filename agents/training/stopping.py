@@ -17,7 +17,9 @@ class Stopping:
         self._before: dict[int, Any] = {}
 
     def _stop(self, number: int, _frame: Any) -> None:
-        first, self.signal, self.asked = self.signal is None, signal.Signals(number), True
+        first = self.signal is None
+        self.signal = signal.Signals(number)
+        self.asked = True
         if not first:
             self._restore()  # the third is as if nobody handled it
             raise KeyboardInterrupt

@@ -95,7 +95,7 @@ def _require_shape(out: Path, trained: Mapping[str, Any], asked: Mapping[str, An
 
 
 def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:
-    """Whether a run that has done its timesteps has all that its last checkpoint says, in its other files."""
+    """Return whether a run that has done its timesteps has all that its last checkpoint says, in its other files."""
     header, arrays = found
     told = all(record.get(name) == value for name, value in header["record"].items())
     evaluated = [entry["timesteps"] for entry in record["evaluations"]][-1:] == [header["timesteps"]]

@@ -74,7 +74,8 @@ class Biped(ExactState):
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
         self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
         self._arguments["right_legs"] = right_legs
-        self.settings, self.num_envs = settings, num_envs
+        self.settings = settings
+        self.num_envs = num_envs
         self.dt = settings.step_seconds
         """Time of one step [s]."""
         self.windows_per_step = round(self.dt / CONTROL_WINDOW)
@@ -82,8 +83,12 @@ class Biped(ExactState):
         self.on_tick: Callable[[Tick], None] | None = None
         self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
         own = next(walk for walk in self.walks if walk.speed == settings.speed)
-        self.body, self.target, self.plan, self.constants = own.body, own.target, own.plan, own.constants
-        table, right = list(rows(self.walks)), list(rows(self.right_walks))
+        self.body = own.body
+        self.target = own.target
+        self.plan = own.plan
+        self.constants = own.constants
+        table = list(rows(self.walks))
+        right = list(rows(self.right_walks))
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant)
         feet = feet or [settings.feet] * num_envs
@@ -102,10 +107,13 @@ class Biped(ExactState):
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
         self._pushes = Pushes(settings, self.subjects, self._task.rows)
         self.observation_names = self._task.names
-        self.observation_low, self.observation_high = self._task.low, self._task.high
+        self.observation_low = self._task.low
+        self.observation_high = self._task.high
         self._random: list[np.random.Generator | None] = [None] * num_envs
-        self._everyone, self._nobody = np.ones(num_envs, bool), np.zeros(num_envs, bool)
-        self._no_reason, self._steps = np.broadcast_to(0, num_envs), self._task.rows["steps"]
+        self._everyone = np.ones(num_envs, bool)
+        self._nobody = np.zeros(num_envs, bool)
+        self._no_reason = np.broadcast_to(0, num_envs)
+        self._steps = self._task.rows["steps"]
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._control = np.zeros((num_envs, len(SIDES), len(JOINTS), 2))
         self._rows = tuple(EnvironmentRows(self.subjects.rows, self._task.rows, forces, self._control))
@@ -129,7 +137,7 @@ class Biped(ExactState):
         return self._simulation.model
 
     def model_of(self, index: int) -> MjModel:
-        """The compiled model of environment `index`'s body."""
+        """Return the compiled model of environment `index`'s body."""
         return self._simulation.models[index]
 
     @property
@@ -153,11 +161,11 @@ class Biped(ExactState):
         return np.full(self.num_envs, WALKING) if self._standing is None else self._standing.mode.copy()
 
     def data(self, index: int) -> MjData:
-        """A copy of environment `index`'s state, to render or to inspect."""
+        """Return a copy of environment `index`'s state, to render or to inspect."""
         return self._simulation.data(index)
 
     def scheduled_stiffness(self) -> NDArray:
-        """(N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
+        """Return (N, side, 2) ankle and toe stiffness of the schedule at the present phases [N m/rad]."""
         return self._springs.scheduled(self._legs.phase)
 
     def command(self, ids: NDArray, speed: NDArray) -> None:
@@ -192,7 +200,8 @@ class Biped(ExactState):
             raise SpringfootError(
                 f"a reset can start 'standing' where the setting start is 'standing' too, got {self.settings.start!r}"
             )
-        phase, noise = np.empty(len(ids)), np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
+        phase = np.empty(len(ids))
+        noise = np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
         randoms: list[np.random.Generator] = []
         for row, (index, seed) in enumerate(zip(ids, seeds, strict=True)):
             random = self._random[index]
@@ -210,7 +219,8 @@ class Biped(ExactState):
         self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
         self._noise.draw(ids, randoms)
         self._decisions.reset(ids)
-        self._steps[ids], self._task.rows["force"][ids] = 0, 0.0
+        self._steps[ids] = 0
+        self._task.rows["force"][ids] = 0.0
         posture = walking_posture(self._start, self.subjects, ids, phase)
         if self._standing is not None:
             posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing") or posture
@@ -229,7 +239,7 @@ class Biped(ExactState):
         self._fit(self.subjects.embody(ids, height, mass))
 
     def observe(self) -> NDArray:
-        """(N, D) float32 observation at this moment."""
+        """Return (N, D) float32 observation at this moment."""
         return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
@@ -248,9 +258,11 @@ class Biped(ExactState):
 
     def _decode(self, actions: NDArray, active: NDArray | None) -> "_Step":
         """Begin a step: the environments that run, and the factors that their actions make of the stiffness."""
-        running, ids = self._everyone, None
+        running = self._everyone
+        ids = None
         if active is not None and not active.all():
-            running, ids = active, np.flatnonzero(active)
+            running = active
+            ids = np.flatnonzero(active)
         action = real_numbers("actions", actions)
         if action.shape != (self.num_envs, len(ACTIONS)):
             raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")

@@ -33,7 +33,7 @@ class ExactState(ABC):
         return self._random
 
     def state(self, ids: NDArray | None = None) -> dict[str, Any]:
-        """The exact state of environments `ids` (K,), of all if None, between two steps.
+        """Return the exact state of environments `ids` (K,), of all if None, between two steps.
 
         Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values.
         """
@@ -75,13 +75,13 @@ class ExactState(ABC):
         return _made_anew, (type(self), self._arguments, self.state())
 
     def _numbers(self) -> Iterator[tuple[str, NDArray]]:
-        """Names and views of all numbers that change."""
+        """Return names and views of all numbers that change."""
         for name, rows in self._kept.items():
             yield from _fields(name, rows)
 
 
 def _fields(name: str, rows: NDArray) -> Iterator[tuple[str, NDArray]]:
-    """The numbers in an array of records, to the last level; `name` leads to them."""
+    """Return the numbers in an array of records, to the last level; `name` leads to them."""
     if rows.dtype.names is None:
         yield name, rows
     for field in rows.dtype.names or ():
@@ -89,7 +89,7 @@ def _fields(name: str, rows: NDArray) -> Iterator[tuple[str, NDArray]]:
 
 
 def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
-    """A generator in this state: the present one if it is of that kind, else a new one."""
+    """Return a generator in this state: the present one if it is of that kind, else a new one."""
     if state is None:
         return None
     kind = getattr(np.random, state["bit_generator"])

@@ -60,7 +60,9 @@ class Tables(NamedTuple):
 @kernel
 def begin_window(rows, physics, tables, springs, walking) -> None:
     """Begin a control window; arguments as of `begin_step`."""
-    rows, physics, tables = EnvironmentRows(*rows), Physics(*physics), Tables(*tables)
+    rows = EnvironmentRows(*rows)
+    physics = Physics(*physics)
+    tables = Tables(*tables)
     bodies = physics.bodies
     move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
     drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
@@ -69,7 +71,8 @@ def begin_window(rows, physics, tables, springs, walking) -> None:
 @kernel
 def end_window(rows, physics, window, walking) -> None:
     """End control window number `window` of the step; else as of `begin_step`."""
-    rows, physics = EnvironmentRows(*rows), Physics(*physics)
+    rows = EnvironmentRows(*rows)
+    physics = Physics(*physics)
     bodies = physics.bodies
     measure_bodies(bodies, physics.state, physics.sensors, physics.warnings)
     advance(rows.controls, bodies, walking)
@@ -127,9 +130,12 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     Returns whether an episode is terminated.
     """
     controls, tasks, forces, _ = rows
-    bodies, target, outcome = Physics(*physics).bodies, Tables(*tables).target, Outcome(*outcome)
+    bodies = Physics(*physics).bodies
+    target = Tables(*tables).target
+    outcome = Outcome(*outcome)
     end_window(rows, physics, len(forces) - 1, walking)
-    terms, any_terminated = np.empty((len(running), len(task[0].weights))), False
+    terms = np.empty((len(running), len(task[0].weights)))
+    any_terminated = False
     judge(tasks, controls, bodies, target, task, forces, terms)
     total(terms, task, outcome.reward)
     average(tasks, forces, running)

@@ -65,8 +65,12 @@ def report(rows, controls, bodies, terms, options, values) -> None:
     """
     reports = values.view(REPORT)
     for i in range(len(rows)):
-        row, springs, feet, m = reports[i, 0], controls[i].springs, controls[i].feet, bodies[i].measured
-        row.time, row.speed = options[0].seconds * rows[i].steps, m.com_velocity[0]
+        row = reports[i, 0]
+        springs = controls[i].springs
+        feet = controls[i].feet
+        m = bodies[i].measured
+        row.time = options[0].seconds * rows[i].steps
+        row.speed = m.com_velocity[0]
         for term in range(terms.shape[1]):
             row.reward[term] = terms[i, term]
         for side in range(2):
@@ -169,5 +173,7 @@ def report_start(m: Measurement, leg_phase: NDArray, controlled: NDArray) -> NDA
     """
     values = np.zeros((len(leg_phase), len(INFO)))
     rows = values.view(REPORT)[:, 0]
-    rows["phase"], rows["speed"], rows["controlled"] = leg_phase, m.com_velocity[:, 0], controlled
+    rows["phase"] = leg_phase
+    rows["speed"] = m.com_velocity[:, 0]
+    rows["controlled"] = controlled
     return values

@@ -14,7 +14,7 @@ from .phase_table import GRID
 
 
 def gait_events(target: HumanGait) -> NDArray:
-    """(4,) stride phases of the target's heel strike, foot flat, heel-off and toe-off, from its angle curves."""
+    """Return (4,) stride phases of the target's heel strike, foot flat, heel-off and toe-off, from its angle curves."""
     ankle = ankle_events(GRID, target.mean("ankle", GRID), target.toe_off)
     toe = toe_events(GRID, target.mean("toe", GRID), target.toe_off)
     return np.array([ankle["heel_strike"], ankle["foot_flat"], toe["heel_off"], target.toe_off])
@@ -37,7 +37,8 @@ def _take(actions, running, events, rows):
             if running[i] and not isfinite(actions[i, k]):
                 return False
     for i in range(len(actions)):
-        own, phase = rows[i].decision, rows[i].legs.phase
+        own = rows[i].decision
+        phase = rows[i].legs.phase
         for side in range(2):
             now = 0
             for event in events:
@@ -77,9 +78,10 @@ class DecisionTimes:
 
     def reset(self, ids: NDArray) -> None:
         """Let the next actions of bodies `ids` (K,) take effect whatever the phase."""
-        self._own["stage"][ids], self._own["last_action"][ids] = -1, 0.0
+        self._own["stage"][ids] = -1
+        self._own["last_action"][ids] = 0.0
 
     def take(self, actions: NDArray, running: NDArray) -> NDArray | None:
-        """The actions that take effect, (N, 4): those given, clipped to [-1, 1]; legs at no event and bodies not
+        """Return the actions that take effect, (N, 4): those given, clipped to [-1, 1]; legs at no event and bodies not
         `running` (N,) keep their last ones. None, leaving all state unchanged, for a number that is not finite."""
         return self.action if _take(actions, running, self._events, self._rows) else None

@@ -27,14 +27,15 @@ FOOT_FLAT, TOE_OFF = _PEOPLES.toe_flat, _PEOPLES.toe_off
 
 
 def plateau_curve(values: tuple[float, ...], plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
-    """(SAMPLES,) curve on `GRID` that has these five values on the plateaus; periodic, linear between them."""
+    """Return (SAMPLES,) curve on `GRID` that has these five values on the plateaus; periodic, linear between them."""
     return np.interp(GRID, plateaus, np.repeat(values, 2), period=1.0)
 
 
 def foot_curves(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> tuple[NDArray, NDArray]:
-    """(SAMPLES, 2) equilibrium [rad] and scheduled stiffness [N m/rad] of ankle and toe, as `settings` ask for."""
+    """Return (SAMPLES, 2) rest angles [rad] and scheduled stiffness [N m/rad] of ankle and toe for the `settings`."""
     if settings.schedule is None:
-        stiffness, rest = fixed_stiffness(constants, walk.body, walk.target.foot.plateaus), neutral(constants)
+        stiffness = fixed_stiffness(constants, walk.body, walk.target.foot.plateaus)
+        rest = neutral(constants)
     else:
         stiffness, rest = settings.schedule.at(GRID)
     match settings.equilibrium:
@@ -48,9 +49,10 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
 
 
 def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> tuple[NDArray, NDArray]:
-    """(R, SAMPLES, 2 or 4) equilibrium and, where fed, torques behind it (`foot_feed`), and (R, SAMPLES, 2) scheduled
-    stiffness, for each row of the tables."""
-    rests, stiffnesses = [], []
+    """Return (R, SAMPLES, 2 or 4) equilibrium and, where fed, torques behind it (`foot_feed`), and (R, SAMPLES, 2)
+    scheduled stiffness, for each row of the tables."""
+    rests = []
+    stiffnesses = []
     for constants, walk in rows:
         rest, stiffness = foot_curves(settings, constants, walk)
         feed = foot_feed(settings, constants, walk)
@@ -60,13 +62,15 @@ def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, Refe
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
-    """(SAMPLES, 2) ankle and toe stiffness [N m/rad] of the fixed schedule, which was tuned together with the legs."""
+    """Return (SAMPLES, 2) ankle and toe stiffness [N m/rad] of the fixed schedule, which was tuned together with the
+    legs."""
     toe = np.full(len(GRID), constants.toe_schedule)
     return np.stack([plateau_curve(constants.ankle_schedule, plateaus), toe], axis=-1) * body.stiffness_scale
 
 
 def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad] that follows the target's ankle and feeds a moment forward through its K_ref.
+    """Return (SAMPLES, 2) equilibrium [rad] that follows the target's ankle and feeds a moment forward through its
+    K_ref.
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
     times the moment M of the walk (plantarflexion positive). The toe's equilibrium is the tuned angle from foot flat to
@@ -76,7 +80,8 @@ def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     body = walk.body
     target = walk.target
     foot = target.foot
-    beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
+    beta = damping_times(body)
+    period = constants.period_factor * walk.plan.stride_time
     if foot.ankle_quasi_stiffness is None:
         flat = np.interp(GRID, [*foot.toe_flat, *foot.toe_off], [0.0, 1.0, 1.0, 0.0])
         shifts = knot_curve(constants.ankle_knots_deg), flat * np.deg2rad(constants.toe_flat_deg)
@@ -90,8 +95,8 @@ def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
 
 
 def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> NDArray | None:
-    """(SAMPLES, 2) torque [N m], dorsiflexion positive, that acts beside the springs of ankle and toe whatever their K;
-    None where none is asked for."""
+    """Return (SAMPLES, 2) torque [N m], dorsiflexion positive, that acts beside the springs of ankle and toe whatever
+    their K; None where none is asked for."""
     if settings.equilibrium != "planned" or walk.target.foot.ankle_quasi_stiffness is not None:
         return None
     unit = walk.body.total_mass * walk.body.length_scale
@@ -100,15 +105,16 @@ def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceW
 
 
 def angle(target: HumanGait) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad]: the target's ankle angle alone, and the planned toe."""
+    """Return (SAMPLES, 2) equilibrium [rad]: the target's ankle angle alone, and the planned toe."""
     return np.stack([target.mean("ankle", GRID), _toe(target.foot, 0.0)], axis=-1)
 
 
 def neutral(constants: LegConstants) -> NDArray:
-    """(SAMPLES, 2) equilibrium [rad]: constant."""
+    """Return (SAMPLES, 2) equilibrium [rad]: constant."""
     return np.tile(np.deg2rad(constants.neutral_deg), (len(GRID), 1))
 
 
 def _toe(foot: FootHabits, flat_deg: float) -> NDArray:
-    corners, swing = [*foot.toe_flat, *foot.toe_off], foot.toe_swing_deg
+    corners = [*foot.toe_flat, *foot.toe_off]
+    swing = foot.toe_swing_deg
     return np.deg2rad(np.interp(GRID, corners, [swing, flat_deg, flat_deg, swing]))

@@ -33,12 +33,14 @@ def device(row, feet, theta, side, joint) -> Any:
     """
     (lines, curves), foot = feet, row.feet
     if foot.line[side, joint] >= 0:
-        line, at = lines[foot.line[side, joint]], 0
+        line = lines[foot.line[side, joint]]
+        at = 0
         while at < len(line) - 2 and theta >= line[at + 1, 0]:
             at += 1
         return line[at, 2], line[at, 1] + line[at, 2] * line[at, 0]
     if foot.curve[side] >= 0:
-        place, values = np.zeros(1, PLACE)[0], np.empty(4)
+        place = np.zeros(1, PLACE)[0]
+        values = np.empty(4)
         place.row = foot.curve[side]
         read(curves, place, row.legs.phase[side], values)
         return values[joint], values[joint] * values[2 + joint]
@@ -46,8 +48,9 @@ def device(row, feet, theta, side, joint) -> Any:
 
 
 def foot_lines(feet: Sequence[Feet]) -> FootLines:
-    """The tables of N pairs of feet."""
-    tables, schedules = _tables(feet), _schedules(feet)
+    """Return the tables of N pairs of feet."""
+    tables = _tables(feet)
+    schedules = _schedules(feet)
     lines = np.full((max(len(tables), 1), max([2, *map(len, tables)]), 3), np.inf)
     for line, table in zip(lines, tables, strict=False):
         angle, torque = np.array(table).T
@@ -67,9 +70,12 @@ def _schedules(feet: Sequence[Feet]) -> list[StiffnessSchedule]:
 
 
 def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
-    """(N,) of `FOOT` for N pairs of feet."""
-    rows, tables, schedules = np.zeros(len(feet), FOOT), _tables(feet), _schedules(feet)
-    rows["line"], rows["curve"] = -1, -1
+    """Return (N,) of `FOOT` for N pairs of feet."""
+    rows = np.zeros(len(feet), FOOT)
+    tables = _tables(feet)
+    schedules = _schedules(feet)
+    rows["line"] = -1
+    rows["curve"] = -1
     decided = [settings.stiffness_joints in ("both", name) for name in ("ankle", "toe")]
     for row, pair in zip(rows, feet, strict=True):
         for side, foot in enumerate(pair):
@@ -80,7 +86,8 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
                 row["controlled"][side, index] = decided[index] and joint.device is None
                 row["in_swing"][side, index] = joint.acts_in_swing
                 rest = joint.device.rest if joint.device else joint.rest
-                row["rests"][side, index], row["rest"][side, index] = rest is not None, rest or 0.0
+                row["rests"][side, index] = rest is not None
+                row["rest"][side, index] = rest or 0.0
                 row["stiffness"][side, index] = joint.device.stiffness if joint.device else 0.0
                 if joint.device and joint.device.table:
                     row["line"][side, index] = tables.index(joint.device.table)
@@ -89,5 +96,5 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
 
 
 def controlled_joints(settings: BipedSettings) -> NDArray:
-    """(side, 2) whether actions set the stiffness of ankle and toe; others are read as 0."""
+    """Return (side, 2) whether actions set the stiffness of ankle and toe; others are read as 0."""
     return foot_rows(settings, [settings.feet])["controlled"][0].astype(bool)

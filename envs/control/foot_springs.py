@@ -46,7 +46,10 @@ def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
 
 
 def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDArray:
-    """The action in [-1, 1] that gives a stiffness (..., 2) [N m/rad]; beyond the range, that of the nearer end."""
+    """Return the action in [-1, 1] that gives a stiffness (..., 2) [N m/rad].
+
+    Beyond the range, that of the nearer end.
+    """
     low, high = stiffness_ranges(settings, body)
     value = np.clip(np.asarray(stiffness, float), low, high)
     return 2.0 * np.log(value / low) / np.log(high / low) - 1.0
@@ -86,9 +89,12 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
         walking: (N,) bool; the springs of the others do not change.
         fixed: (N,) bool, the bodies that take the schedule in place of the action's stiffness.
     """
-    scheduled, option = np.empty(2), options[0]
+    scheduled = np.empty(2)
+    option = options[0]
     for i in range(len(rows)):
-        own, subject, angle = rows[i].springs, rows[i].subject, bodies[i].measured.angle
+        own = rows[i].springs
+        subject = rows[i].subject
+        angle = bodies[i].measured.angle
         for side in range(2):
             read(schedule[side * rows[i].legs.right :], subject.place, rows[i].legs.phase[side], scheduled)
             own.rest_phase[side] = rows[i].legs.phase[side]
@@ -100,7 +106,8 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                 share = 1.0 if fixed[i] else factor[i, 2 * side + joint]
                 if not rows[i].feet.muscles[side, joint]:
                     share = 0.0
-                before, after = own.stiffness[side, joint], middle * subject.scale.torque * share
+                before = own.stiffness[side, joint]
+                after = middle * subject.scale.torque * share
                 deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
                 own.requests[0, side, joint] = after
                 if own.fresh:
@@ -116,7 +123,8 @@ def _arrive(own, angle):
     """Let the request of `delay` windows ago act, and shift the past requests by one window."""
     for side in range(2):
         for joint in range(2):
-            before, after = own.stiffness[side, joint], own.requests[own.delay, side, joint]
+            before = own.stiffness[side, joint]
+            after = own.requests[own.delay, side, joint]
             deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
             own.stiffness[side, joint] = after
             own.work_stiffness[side, joint] += own.acts[side, joint] * 0.5 * (after - before) * deflection**2
@@ -126,7 +134,7 @@ def _arrive(own, angle):
 
 @part
 def _swings(row, force, side):
-    """Whether a leg swings: past mid-stride and unloaded."""
+    """Return whether a leg swings: past mid-stride and unloaded."""
     load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]
     return row.legs.phase[side] > 0.5 and load < row.legs.gains.touchdown
 
@@ -172,11 +180,15 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         options: (1,) of `SPRING_OPTIONS`.
         walking: (N,) bool; the springs of the others do not change.
     """
-    wanted, inclined, option = np.empty(rest.shape[-1]), np.empty(4), options[0]
+    wanted = np.empty(rest.shape[-1])
+    inclined = np.empty(4)
+    option = options[0]
     feeds = rest.shape[-1] > 2
     level = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
-        own, foot, subject = rows[i].springs, rows[i].feet, rows[i].subject
+        own = rows[i].springs
+        foot = rows[i].feet
+        subject = rows[i].subject
         angle = bodies[i].measured.angle
         if walking[i] and own.delay > 0:
             _arrive(own, angle)
@@ -188,7 +200,8 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
                 read(incline, level, own.rest_phase[side], inclined)
                 wanted[0] += subject.slope * inclined[ANKLE]
             for joint in range(2):
-                k, theta = own.stiffness[side, joint], angle[side, ANKLE + joint]
+                k = own.stiffness[side, joint]
+                theta = angle[side, ANKLE + joint]
                 if walking[i]:
                     acted = acts = own.acts[side, joint]
                     if not foot.in_swing[side, joint]:
@@ -197,7 +210,8 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
                     aim = foot.rest[side, joint] if foot.rests[side, joint] else wanted[joint]
                     if feeds and foot.muscles[side, joint] and not foot.rests[side, joint]:
                         aim += subject.scale.torque * wanted[2 + joint] / k
-                    before, after = own.equilibrium[side, joint] - theta, aim - theta
+                    before = own.equilibrium[side, joint] - theta
+                    after = aim - theta
                     own.equilibrium[side, joint] = aim
                     if not own.fresh:
                         own.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
@@ -218,15 +232,21 @@ def _hold(rows, bodies, control, feet, held):
     for i in range(len(rows)):
         if not held[i]:
             continue
-        own, foot, angle = rows[i].springs, rows[i].feet, bodies[i].measured.angle
+        own = rows[i].springs
+        foot = rows[i].feet
+        angle = bodies[i].measured.angle
         for side in range(2):
             for joint in range(2):
-                k, drive = control[i, side, ANKLE + joint, 0], control[i, side, ANKLE + joint, 1]
+                k = control[i, side, ANKLE + joint, 0]
+                drive = control[i, side, ANKLE + joint, 1]
                 rest = foot.rest[side, joint] if foot.rests[side, joint] else drive / k
                 k = k if foot.muscles[side, joint] else 0.0
-                theta, before = angle[side, ANKLE + joint], own.acts[side, joint] * own.stiffness[side, joint]
-                old, new = own.equilibrium[side, joint] - theta, rest - theta
-                own.stiffness[side, joint], own.equilibrium[side, joint] = k, rest
+                theta = angle[side, ANKLE + joint]
+                before = own.acts[side, joint] * own.stiffness[side, joint]
+                old = own.equilibrium[side, joint] - theta
+                new = rest - theta
+                own.stiffness[side, joint] = k
+                own.equilibrium[side, joint] = rest
                 own.acts[side, joint] = 1.0
                 own.requests[:, side, joint] = k
                 if not own.fresh:
@@ -259,17 +279,22 @@ class FootSprings:
         feet: Sequence[Feet] | None = None,
     ):
         feet = feet or [settings.feet] * len(subjects.rows)
-        subjects.rows["feet"], self.feet = foot_rows(settings, feet), tuple(foot_lines(feet))
+        subjects.rows["feet"] = foot_rows(settings, feet)
+        self.feet = tuple(foot_lines(feet))
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)
         self._factor = np.tile(factor, 2)
         fixed = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
-        follows, held = settings.equilibrium in ("planned", "angle"), settings.equilibrium == "phase"
+        follows = settings.equilibrium in ("planned", "angle")
+        held = settings.equilibrium == "phase"
         self.options = np.array([(middle, fixed, follows, held)], SPRING_OPTIONS)
         """(1,) of `SPRING_OPTIONS`."""
-        self.rest, self.schedule = PhaseTable(equilibrium), PhaseTable(schedule)
-        self._subjects, self._own = subjects, subjects.rows["springs"]
-        self._own["fresh"], self._own["acts"] = 1, 1.0
+        self.rest = PhaseTable(equilibrium)
+        self.schedule = PhaseTable(schedule)
+        self._subjects = subjects
+        self._own = subjects.rows["springs"]
+        self._own["fresh"] = 1
+        self._own["acts"] = 1.0
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
         """Begin an episode of springs `ids` (K,).
@@ -277,10 +302,12 @@ class FootSprings:
         Their next change does no work and acts at once, as if it had been requested long before. Later changes act
         `delay` (K,) control windows after their request.
         """
-        self._own["fresh"][ids], self._own["delay"][ids], self._own["acts"][ids] = 1, delay, 1.0
+        self._own["fresh"][ids] = 1
+        self._own["delay"][ids] = delay
+        self._own["acts"][ids] = 1.0
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
-        """(N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
+        """Return (N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
         right = self._subjects.place.copy()
         right["row"] += self._subjects.rows["legs"]["right"]
         places = zip(np.moveaxis(leg_phase, -1, 0), (self._subjects.place, right), strict=True)
@@ -288,7 +315,7 @@ class FootSprings:
         return np.stack(curves, 1) * self._subjects.scale["torque"][:, None, None]
 
     def factor(self, action: NDArray) -> NDArray:
-        """What actions (N, 4) make of the stiffness: factors (N, 4) on that at action 0, or on the schedule.
+        """Return the factors (N, 4) of actions (N, 4) on the stiffness at action 0, or on the schedule.
 
         By NumPy, not in a kernel: its powers have other last bits than those of numba.
         """

@@ -103,7 +103,7 @@ def leg_constants(
     follows_plan: bool = False,
     file: Path | None = None,
 ) -> LegConstants:
-    """The constants for a setting at `speed` [m/s at 1.70 m], the committed ones or those of `file`.
+    """Return the constants for a setting at `speed` [m/s at 1.70 m], the committed ones or those of `file`.
 
     They are linear between the speeds of the sets there; beyond those speeds the nearest set holds. Raises
     `SpringfootError` for a setting without a set.
@@ -117,7 +117,8 @@ def leg_constants(
             f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s "
             "moments; equilibrium 'neutral' needs cadence 'people'"
         )
-    prefix, unit = f"{name}, ", " m/s"
+    prefix = f"{name}, "
+    unit = " m/s"
     others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]
     names = {TUNED_SPEED: name} | {float(other.removeprefix(prefix).removesuffix(unit)): other for other in others}
     return constants_at({each: constants_from(table[found]) for each, found in names.items()}, speed)
@@ -127,10 +128,12 @@ def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstan
     """Constants at `speed` [m/s], linear between the `sets` by speed; beyond them, those of the nearest set."""
     speeds = sorted(sets)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
-    lower, weight = sets[speeds[int(place)]], place - int(place)
+    lower = sets[speeds[int(place)]]
+    weight = place - int(place)
     if weight == 0.0:
         return lower
-    upper, values = sets[speeds[int(place) + 1]], {}
+    upper = sets[speeds[int(place) + 1]]
+    values = {}
     for field in fields(LegConstants):
         low, high = (np.array(getattr(each, field.name), float) for each in (lower, upper))
         values[field.name] = (low + weight * (high - low)).tolist()
@@ -143,7 +146,7 @@ def constants_from(values: dict[str, Any]) -> LegConstants:
 
 
 def slope_constants() -> SlopeConstants:
-    """The committed constants for slopes."""
+    """Return the committed constants for slopes."""
     return slope_constants_from(_file()["slope"]["constants"])
 
 

@@ -46,20 +46,21 @@ HOLD = 0.001
 
 
 def knot_curve(knots_deg: Sequence[float]) -> NDArray:
-    """A tuned correction [rad] on `GRID`: the periodic cubic spline through `KNOTS`."""
+    """Return a tuned correction [rad] on `GRID`: the periodic cubic spline through `KNOTS`."""
     return np.deg2rad(CubicSpline(np.append(KNOTS, 1.0), [*knots_deg, knots_deg[0]], bc_type="periodic")(GRID))
 
 
 def slope_table(constants: SlopeConstants) -> PhaseTable:
-    """What a slope adds to hip, knee, ankle and held trunk pitch over the stride, per radian of slope: (SAMPLES, 4)."""
-    cosine, sine = np.cos(2 * np.pi * GRID), np.sin(2 * np.pi * GRID)
+    """Return the slope's share in hip, knee, ankle and held trunk pitch over the stride, per radian: (SAMPLES, 4)."""
+    cosine = np.cos(2 * np.pi * GRID)
+    sine = np.sin(2 * np.pi * GRID)
     joints = [a + b * cosine + c * sine for a, b, c in (constants.hip, constants.knee, constants.ankle)]
     return PhaseTable(np.stack([*joints, np.full(len(GRID), constants.trunk)], -1))
 
 
 @part
 def _between(low, high, weight):
-    """The number, or array, at `weight` in [0, 1] of the way from `low` to `high`."""
+    """Return the number, or array, at `weight` in [0, 1] of the way from `low` to `high`."""
     return low + weight * (high - low)
 
 
@@ -67,9 +68,13 @@ def _between(low, high, weight):
 def _follow(constants, rows):
     """Scale the constants of the tables' rows, (R,) of `GAINS`, to the bodies of `rows`, (N,) of `CONTROL_ROW`."""
     for i in range(len(rows)):
-        subject, gain = rows[i].subject, rows[i].legs.gains
-        row, weight, scale = subject.place.row, subject.place.weight, subject.scale
-        low, high = constants[row], constants[row + 1 if weight > 0.0 else row]
+        subject = rows[i].subject
+        gain = rows[i].legs.gains
+        row = subject.place.row
+        weight = subject.place.weight
+        scale = subject.scale
+        low = constants[row]
+        high = constants[row + 1 if weight > 0.0 else row]
         gain.touchdown = scale.mass * _between(low.touchdown, high.touchdown, weight)
         gain.rate = _between(low.rate, high.rate, weight) / scale.time
         gain.rate_gain = _between(low.rate_gain, high.rate_gain, weight) / scale.time
@@ -99,10 +104,15 @@ def drive(rows, bodies, control, table, incline) -> None:
         table: (R, SAMPLES, 2, 7) of `leg_curves`, of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) of `slope_table`.
     """
-    curves, inclined, level = np.empty((2, table.shape[-1])), np.empty(4), np.zeros(1, PLACE)[0]
+    curves = np.empty((2, table.shape[-1]))
+    inclined = np.empty(4)
+    level = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
-        subject, legs, m = rows[i].subject, rows[i].legs, bodies[i].measured
-        gain, torque = legs.gains, subject.scale.torque
+        subject = rows[i].subject
+        legs = rows[i].legs
+        m = bodies[i].measured
+        gain = legs.gains
+        torque = subject.scale.torque
         for side in range(2):
             read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
@@ -110,7 +120,9 @@ def drive(rows, bodies, control, table, incline) -> None:
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
         on_trunk = trunk + gain.speed_torque * too_fast
         for side in range(2):
-            stance, hip, knee = curves[side, 0], torque * curves[side, 1], torque * curves[side, 2]
+            stance = curves[side, 0]
+            hip = torque * curves[side, 1]
+            knee = torque * curves[side, 2]
             ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
             aim = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
             own = stance * on_trunk + (1.0 - stance) * hip * aim
@@ -145,8 +157,10 @@ def advance(rows, bodies, walking) -> None:
     for i in range(len(rows)):
         if not walking[i]:
             continue
-        legs, m = rows[i].legs, bodies[i].measured
-        gain, left = legs.gains, legs.phase[LEFT]
+        legs = rows[i].legs
+        m = bodies[i].measured
+        gain = legs.gains
+        left = legs.phase[LEFT]
         rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(m, rows[i]))
         waiting = (0.5 if left < 0.5 else 1.0) - HOLD
         left = min(left + max(rate, 0.0), max(waiting, left))
@@ -155,7 +169,8 @@ def advance(rows, bodies, walking) -> None:
             left = 0.0
         elif right > TOUCHDOWN_PHASE and _load(m.force[RIGHT]) > gain.touchdown:
             left = 0.5
-        legs.phase[LEFT], legs.phase[RIGHT] = left, (left + 0.5) % 1.0
+        legs.phase[LEFT] = left
+        legs.phase[RIGHT] = (left + 0.5) % 1.0
 
 
 class LegController:
@@ -192,8 +207,10 @@ class LegController:
 
 
 def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
-    body, stride_time = walk.body, walk.plan.stride_time
-    scale, time_scale = body.stiffness_scale, sqrt(body.length_scale)
+    body = walk.body
+    stride_time = walk.plan.stride_time
+    scale = body.stiffness_scale
+    time_scale = sqrt(body.length_scale)
     return (
         TOUCHDOWN_LOAD * body.total_mass * GRAVITY,
         CONTROL_WINDOW / (c.period_factor * stride_time),
@@ -209,12 +226,14 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """(SAMPLES, 7) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], the planned CoM's
-    forward speed over its mean, and how far it is ahead of the other leg's ankle [m]."""
-    body, target = walk.body, walk.target
+    """Return (SAMPLES, 7) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], the planned
+    CoM's forward speed over its mean, and how far it is ahead of the other leg's ankle [m]."""
+    body = walk.body
+    target = walk.target
     fall_from, fall_to = STANCE_FALL
     stance = np.interp(GRID, [0.0, constants.trunk_rise, fall_from, fall_to], [0.0, 1.0, 1.0, 0.0])
-    beta, period = damping_times(body), constants.period_factor * walk.plan.stride_time
+    beta = damping_times(body)
+    period = constants.period_factor * walk.plan.stride_time
     columns = [stance]
     drives = []
     for joint, name, knots, (in_stance, in_swing) in (

@@ -43,7 +43,7 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
 
 
 def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
-    """The constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
+    """Return the constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
     asked = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
     tuned = leg_constants(*asked, plan_file_of(settings))
     adapted = adapted_foot(settings)
@@ -66,7 +66,7 @@ def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
 def _moved(
     tuned: LegConstants, sets: Mapping[float, Mapping[str, LegConstants]], leg: str, speed: float
 ) -> LegConstants:
-    """The constants `tuned` at `speed`, moved by how far the adapted ones are from those tuned at their speeds."""
+    """Return the constants `tuned` at `speed`, moved by the adapted ones' distance from those tuned at their speeds."""
     speeds = sorted(sets)
     if speed in sets:
         own = asdict(sets[speed][leg])

@@ -15,7 +15,7 @@ GRID = np.arange(SAMPLES) / SAMPLES
 
 
 def leg_phases(left: NDArray) -> NDArray:
-    """(N,) stride phase of the left leg -> (N, side) of both, half a stride apart, in [0, 1)."""
+    """Return (N,) stride phase of the left leg -> (N, side) of both, half a stride apart, in [0, 1)."""
     return np.stack([left, (left + 0.5) % 1.0], axis=-1)
 
 

@@ -61,7 +61,7 @@ class ReferenceWalk:
 def walks_of_legs(
     settings: BipedSettings, left: Sequence[LegConstants] | None = None, right: Sequence[LegConstants] | None = None
 ) -> tuple[tuple[ReferenceWalk, ...], tuple[ReferenceWalk, ...]]:
-    """The walks of both legs, and those of the right leg where it has constants of its own, else none.
+    """Return the walks of both legs, and those of the right leg where it has constants of its own, else none.
 
     `left` and `right` are leg constants in place of the committed ones, as in `reference_walks`.
     """
@@ -72,7 +72,8 @@ def walks_of_legs(
 def reference_walks(
     settings: BipedSettings, legs: Sequence[LegConstants] | None = None, side: int = LEFT
 ) -> tuple[ReferenceWalk, ...]:
-    """The walks of the settings' body at the speeds of `tabulated_speeds`, slowest first, with the leg of `side`.
+    """Return the walks of the settings' body at the speeds of `tabulated_speeds`, slowest first, with the leg of
+    `side`.
 
     `legs` are leg constants in place of the committed ones, and the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
@@ -83,7 +84,7 @@ def reference_walks(
 def reference_walk_at(
     settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None, side: int = LEFT
 ) -> ReferenceWalk:
-    """The walk of the settings' body at `speed` [m/s]."""
+    """Return the walk of the settings' body at `speed` [m/s]."""
     body = body_of(settings)
     settings = replace(settings, speed=speed)
     people = reference_gait(settings)
@@ -110,13 +111,14 @@ def reference_walk_at(
 
 
 def _moments_of(gait: HumanGait, body: Body) -> NDArray:
-    """(SAMPLES, 3) `ReferenceWalk.moments` as they are in a gait."""
+    """Return (SAMPLES, 3) `ReferenceWalk.moments` as they are in a gait."""
     moments = [gait.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
 
 def _plans_moments(plan: WalkPlan) -> NDArray:
-    """(SAMPLES, 3) `ReferenceWalk.moments` from inverse dynamics of the plan, smoothed where feet land and leave."""
+    """Return (SAMPLES, 3) `ReferenceWalk.moments` from inverse dynamics of the plan, smoothed where feet land and
+    leave."""
     by_joint = planned_moments(plan, GRID)
     waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
     waves[FED_HARMONICS + 1 :] = 0.0
@@ -124,32 +126,36 @@ def _plans_moments(plan: WalkPlan) -> NDArray:
 
 
 def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, ReferenceWalk]]:
-    """The rows of a table over variants and speeds, in order: speeds within variants."""
+    """Return the rows of a table over variants and speeds, in order: speeds within variants."""
     for variant, walk in product(range(len(walks[0].constants) if walks else 0), walks):
         yield walk.constants[variant], walk
 
 
 def tabulated_speeds(settings: BipedSettings) -> NDArray:
-    """(G,) ascending speeds [m/s] of the settings' body, up to the Froude equals of all that the settings can ask for.
+    """Return (G,) ascending speeds [m/s] of the settings' body, up to the Froude equals of all that the settings can
+    ask for.
 
     Without ranges that is the settings' speed alone. With ranges it is the multiples of `SPACING` that enclose them,
     and the settings' speed.
     """
-    height, speed = settings.height, settings.speed
+    height = settings.height
+    speed = settings.speed
     lowest, highest = (sqrt(height / other) for other in reversed(settings.height_range or (height, height)))
     slow, fast = settings.speed_range or (speed, speed)
-    slow, fast = min(slow * lowest, speed), max(fast * highest, speed)
+    slow = min(slow * lowest, speed)
+    fast = max(fast * highest, speed)
     unit = sqrt(body_of(settings).length_scale)
     if settings.start == "standing" or settings.stop_at is not None:
         slow = min(slow, SLOW_SPEED * unit)
     if slow == fast:
         return np.array([speed])
-    first, last = floor(slow / unit / SPACING + 1e-9), ceil(fast / unit / SPACING - 1e-9)
+    first = floor(slow / unit / SPACING + 1e-9)
+    last = ceil(fast / unit / SPACING - 1e-9)
     grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
     return np.array(sorted({*grid, speed}))
 
 
 @lru_cache(maxsize=256)
 def _plan(body: Body, speed: float, cadence: Cadence) -> WalkPlan:
-    """The plan with people's steps, cached, as planning takes a tenth of a second."""
+    """Return the plan with people's steps, cached, as planning takes a tenth of a second."""
     return plan_walk(body, speed, cadence)

@@ -83,15 +83,19 @@ def _switch(rows, bodies, running, time, stop_at):
     """
     changed = False
     for i in range(len(rows)):
-        body, subject, phase = rows[i].held, rows[i].subject, rows[i].legs.phase
+        body = rows[i].held
+        subject = rows[i].subject
+        phase = rows[i].legs.phase
         if not running[i]:
             continue
-        before, slow = body.mode, SLOW_SPEED * body.time
+        before = body.mode
+        slow = SLOW_SPEED * body.time
         if before == STANDING and time[i] >= body.begin:
             share = min((time[i] - body.begin) / (LEAN_SECONDS * body.time), 1.0)
             body.place = body.length * (STAND_COM + LEAN * share)
             if bodies[i].measured.com_velocity[0] > OFF_SPEED * body.time:
-                body.mode, body.begin = STARTING, time[i]
+                body.mode = STARTING
+                body.begin = time[i]
         elif (
             before == STARTING and time[i] >= body.begin + EARLY_SECONDS * body.time and subject.speed == subject.target
         ):
@@ -130,7 +134,8 @@ def _drive(rows, bodies, control, standing):
     for i in range(len(rows)):
         if not standing[i]:
             continue
-        body, m = rows[i].held, bodies[i].measured
+        body = rows[i].held
+        m = bodies[i].measured
         if body.mode == STOPPED:
             _draw(body, m)
         ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - body.place
@@ -138,7 +143,8 @@ def _drive(rows, bodies, control, standing):
         for side in range(2):
             front = 1.0 if m.ankle[side, 0] > m.ankle[1 - side, 0] else -1.0
             for joint in range(4):
-                k, rest = STANDING_STIFFNESS[joint], body.rest[side, joint]
+                k = STANDING_STIFFNESS[joint]
+                rest = body.rest[side, joint]
                 if joint == ANKLE:
                     rest -= BALANCE * ahead / body.length
                 if joint == HIP:
@@ -189,7 +195,8 @@ class Standing:
         if not standing:
             return None
         held["rest"][ids, :, ANKLE] += slope[:, None]
-        angle, pitch = held["rest"][ids], held["pitch"][ids]
+        angle = held["rest"][ids]
+        pitch = held["pitch"][ids]
         held["rest"][ids, :, HIP] += (1.0 - TRUNK_FREE) * pitch[:, None]
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
@@ -198,7 +205,8 @@ class Standing:
 
         Returns (N,) the bodies that run and walk, and (N,) those of them that walk with the fixed schedule.
         """
-        mode, before = self._held["mode"], self._held["mode"].copy()
+        mode = self._held["mode"]
+        before = self._held["mode"].copy()
         if _switch(self._subjects.rows, physics.bodies, running, time, self._stop_at):
             self._told(before, Measurement.of(physics.bodies["measured"]))
         scheduled = running & ((mode == STARTING) | (mode == STOPPING))
@@ -206,7 +214,8 @@ class Standing:
 
     def _told(self, before: NDArray, m: Measurement) -> None:
         """Do what follows from a change of mode since `before` (N,)."""
-        held, subjects = self._held, self._subjects
+        held = self._held
+        subjects = self._subjects
         new = [np.flatnonzero((before != held["mode"]) & (held["mode"] == mode)) for mode in range(5)]
         for ids, tell in ((new[STARTING], subjects.begin), (new[STOPPING], subjects.end)):
             tell(ids, np.minimum(subjects.speed[ids], SLOW_SPEED * held["time"][ids]))
@@ -227,8 +236,9 @@ class Standing:
 
 
 def steady_walk(settings: BipedSettings) -> tuple[float, float]:
-    """Times [s] between which a body walks at the settings' speed, neither setting off nor stopping."""
-    begin, end = 0.0, inf if settings.stop_at is None else settings.stop_at
+    """Return times [s] between which a body walks at the settings' speed, neither setting off nor stopping."""
+    begin = 0.0
+    end = inf if settings.stop_at is None else settings.stop_at
     if settings.start == "standing":
         time_scale = sqrt(body_of(settings).length_scale)
         faster = max(settings.speed - SLOW_SPEED * time_scale, 0.0)

@@ -58,8 +58,10 @@ def _locate(ids, speeds, first, subjects):
         if last > 0:
             weight = min(max((equal - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
         if weight == 1.0:
-            lower, weight = lower + 1, 0.0
-        subjects[i].place.row, subjects[i].place.weight = first[i] + lower, weight
+            lower = lower + 1
+            weight = 0.0
+        subjects[i].place.row = first[i] + lower
+        subjects[i].place.weight = weight
 
 
 class Subjects:
@@ -89,9 +91,12 @@ class Subjects:
         """(N,) speed commanded now, and that to which it goes [m/s]; time of the next target drawn [s]."""
         self.slope = own["slope"]
         """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
-        own["height"], own["mass"], self.scale[:] = self._home.height, self._home.mass, 1.0
+        own["height"] = self._home.height
+        own["mass"] = self._home.mass
+        self.scale[:] = 1.0
         self.speed[:] = self.target[:] = settings.speed
-        self.slope[:], self._change[:] = radians(settings.slope_deg), np.inf
+        self.slope[:] = radians(settings.slope_deg)
+        self._change[:] = np.inf
         self._changing = False
         self._everyone = np.arange(num)
         self._locate(self._everyone)
@@ -132,7 +137,8 @@ class Subjects:
             if body != self.bodies[index]:
                 others.append(index)
                 self.bodies[index] = body
-                length, mass = body.height / self._home.height, body.mass / self._home.mass
+                length = body.height / self._home.height
+                mass = body.mass / self._home.mass
                 self.scale[index] = length, sqrt(length), mass, mass * length
                 self.rows["subject"][["height", "mass"]][index] = body.height, body.mass
         return others
@@ -151,7 +157,8 @@ class Subjects:
 
     def end(self, ids: NDArray, speed: NDArray) -> None:
         """Let the commanded speed of environments `ids` (K,) go to `speed` (K,) [m/s], and then stay there."""
-        self.target[ids], self._change[ids] = speed, np.inf
+        self.target[ids] = speed
+        self._change[ids] = np.inf
         self._changing = True
 
     def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
@@ -198,7 +205,8 @@ class Subjects:
 
     def _check(self, body: Body, speed: float) -> None:
         time_scale = sqrt(body.height / self._home.height)
-        low, high = self._speeds[0] * time_scale, self._speeds[-1] * time_scale
+        low = self._speeds[0] * time_scale
+        high = self._speeds[-1] * time_scale
         if not low - 1e-9 <= speed <= high + 1e-9:
             raise SpringfootError(
                 f"speed of a body of {body.height:.4g} m must be in [{low:.4g}, {high:.4g}] m/s, got {speed:.4g}; "

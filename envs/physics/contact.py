@@ -31,12 +31,12 @@ SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}
 
 
 def geom_name(contact: str, side: str) -> str:
-    """Name of a foot's contact sphere."""
+    """Return name of a foot's contact sphere."""
     return f"{contact}_{side}"
 
 
 def ground_name(side: str) -> str:
-    """Name of the ground below a foot: a plane, moved from outside (mocap)."""
+    """Return name of the ground below a foot: a plane, moved from outside (mocap)."""
     return f"ground_{side}"
 
 

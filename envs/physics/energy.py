@@ -49,7 +49,7 @@ RECORDED = ("qvel", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
 
 
 def ledger_entries() -> tuple[str, ...]:
-    """Names of the numbers of `LEDGER` in order, `stiffness_changes/ankle` for one of an array over joints."""
+    """Return names of the numbers of `LEDGER` in order, `stiffness_changes/ankle` for one of an array over joints."""
     arrays = {name for name in LEDGER.names or () if LEDGER[name].shape}
     return tuple(
         entry
@@ -107,7 +107,7 @@ PARTS = np.dtype(
 
 
 def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
-    """(1,) of `PARTS`."""
+    """Return (1,) of `PARTS`."""
     parts = np.zeros(1, PARTS)
     parts["upper"]["mass"] = body.trunk_mass, body.carried_mass
     parts["upper"]["inertia"] = body.trunk_inertia, body.carried_inertia
@@ -140,7 +140,9 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
     """
     count = steps.velocity.shape[1]
     for i in range(len(parts)):
-        own, entry, pitch = parts[i], energy[i], steps.pitch[i]
+        own = parts[i]
+        entry = energy[i]
+        pitch = steps.pitch[i]
         for step in range(count):
             before = steps.before[i] if step == 0 else steps.velocity[i, step - 1]
             after = steps.velocity[i, step]
@@ -174,13 +176,16 @@ def _sum_changes(parts, control, held, angle, energy):
     for i in range(len(energy)):
         for side in range(2):
             for joint in range(4):
-                k, k_before = control[i, side, joint, 0], held[i, side, joint, 0]
+                k = control[i, side, joint, 0]
+                k_before = held[i, side, joint, 0]
                 if (
                     k + k_before > 0.0 and not parts[i].table[side, joint]
                 ):  # neither at the start of an episode (NaN) nor without a spring
-                    old, new = held[i, side, joint, 1] / k_before, control[i, side, joint, 1] / k
+                    old = held[i, side, joint, 1] / k_before
+                    new = control[i, side, joint, 1] / k
                     old, new = old if k_before > 0.0 else new, new if k > 0.0 else old  # a slack spring has no rest
-                    before, after = old - angle[i, side, joint], new - angle[i, side, joint]
+                    before = old - angle[i, side, joint]
+                    after = new - angle[i, side, joint]
                     energy[i].stiffness_changes[joint] += 0.5 * (k - k_before) * before * before
                     energy[i].equilibrium_changes[joint] += 0.5 * k * (after * after - before * before)
 
@@ -188,8 +193,10 @@ def _sum_changes(parts, control, held, angle, energy):
 @part
 def _part_energy(part, x, z, x_rate, z_rate, turn, spin):
     """Kinetic and potential energy [J] of one part whose joint is at (x, z), turned up-forward by `turn`."""
-    forward, up = part.com[0], part.com[1]
-    along, above = forward * cos(turn) - up * sin(turn), forward * sin(turn) + up * cos(turn)
+    forward = part.com[0]
+    up = part.com[1]
+    along = forward * cos(turn) - up * sin(turn)
+    above = forward * sin(turn) + up * cos(turn)
     speed = (x_rate - above * spin) ** 2 + (z_rate + along * spin) ** 2
     return part.mass * (0.5 * speed + GRAVITY * (z + above)) + 0.5 * part.inertia * spin**2
 
@@ -201,21 +208,33 @@ def _add_mechanical(parts, position, rate, energy):
     `parts` (N,) of `PARTS`; `position` and `rate` (N, 11), MuJoCo's coordinates [m, rad] and their rates.
     """
     for i in range(len(energy)):
-        own, total = parts[i], 0.0
-        q, v = position[i], rate[i]
+        own = parts[i]
+        total = 0.0
+        q = position[i]
+        v = rate[i]
         for piece in range(2):
             total += _part_energy(own.upper[piece], q[0], q[1], v[0], v[1], -q[2], -v[2])
         for side in range(2):
-            x, z, x_rate, z_rate, turn, spin = q[0], q[1], v[0], v[1], -q[2], -v[2]
+            x = q[0]
+            z = q[1]
+            x_rate = v[0]
+            z_rate = v[1]
+            turn = -q[2]
+            spin = -v[2]
             for joint in range(4):
                 sign = -1.0 if joint == KNEE else 1.0
                 dof = 3 + 4 * side + joint
-                turn, spin = turn + sign * q[dof], spin + sign * v[dof]
+                turn = turn + sign * q[dof]
+                spin = spin + sign * v[dof]
                 total += _part_energy(own.leg[side, joint], x, z, x_rate, z_rate, turn, spin)
                 total += 0.5 * own.armature[joint] * v[dof] ** 2
                 forward, up = own.end[joint]
-                along, above = forward * cos(turn) - up * sin(turn), forward * sin(turn) + up * cos(turn)
-                x, z, x_rate, z_rate = x + along, z + above, x_rate - above * spin, z_rate + along * spin
+                along = forward * cos(turn) - up * sin(turn)
+                above = forward * sin(turn) + up * cos(turn)
+                x = x + along
+                z = z + above
+                x_rate = x_rate - above * spin
+                z_rate = z_rate + along * spin
         energy[i].mechanical = total
 
 
@@ -242,7 +261,8 @@ def window_work(
         timestep: of the physics [s].
     """
     num = len(parts)
-    torque, work = np.zeros((num, len(SIDES), len(JOINTS))), np.zeros((num, len(SIDES), len(JOINTS), 2))
+    torque = np.zeros((num, len(SIDES), len(JOINTS)))
+    work = np.zeros((num, len(SIDES), len(JOINTS), 2))
     energy = np.zeros(num, LEDGER)
     _sum_work(parts, steps, control, push, timestep, torque, work, energy)
     _sum_changes(parts, control, held, angle, energy)

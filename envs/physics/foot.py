@@ -94,7 +94,7 @@ class LegSegments:
 
 
 def leg_segments(body: Body, foot: Foot) -> LegSegments:
-    """The segments of the leg of `body` that ends in `foot`."""
+    """Return the segments of the leg of `body` that ends in `foot`."""
     forward, below = body.foot_com
     return LegSegments(
         mass=(

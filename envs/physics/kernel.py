@@ -56,7 +56,7 @@ class _KernelCache(FunctionCache):
         self._cache_file: Any = _DigestedFile(self._cache_file)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What is kept, or None where there is nothing or its files are damaged; those begin anew."""
+        """Return the kept kernel, or None where there is none or its files are damaged; those begin anew."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # what is cut short ends in any exception of pickle
@@ -76,7 +76,8 @@ class _DigestedFile:
     """A file of numba's cache whose kernels have a digest each: machine code that is damaged must not run."""
 
     def __init__(self, file: Any) -> None:
-        self.flush, self._file = file.flush, file
+        self.flush = file.flush
+        self._file = file
 
     def save(self, key: Any, data: Any) -> None:
         """Keep a kernel."""
@@ -84,7 +85,7 @@ class _DigestedFile:
         self._file.save(key, (sha256(content).digest(), content))
 
     def load(self, key: Any) -> Any:
-        """What is kept, or None; raises `ValueError` for damage, and what pickle and unpacking raise."""
+        """Return the kept kernel, or None; raise `ValueError` for damage, and what pickle and unpacking raise."""
         found = self._file.load(key)
         if found is None:
             return None

@@ -106,7 +106,7 @@ class Measurement:
 
     @classmethod
     def of(cls, measured: NDArray) -> "Measurement":
-        """The measurement in rows (N,) of `MEASURED`; its arrays are views of them."""
+        """Return the measurement in rows (N,) of `MEASURED`; its arrays are views of them."""
         return cls(**{name: measured[name] for name in MEASURED.names or ()})
 
 
@@ -118,7 +118,8 @@ def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
     the position of that end.
     """
     toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
-    offsets, mass = contact_offsets(body), total_mass(body, feet)
+    offsets = contact_offsets(body)
+    mass = total_mass(body, feet)
     segments = np.zeros(1, SEGMENTS)
     segments["trunk"] = np.array(body.upper_moment) / mass
     for side, own in enumerate(feet):
@@ -139,13 +140,14 @@ def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
     segments["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
     segments["contact"] = [(forward, up) for forward, up, _ in offsets.values()]
     segments["radius"] = [radius for *_, radius in offsets.values()]
-    segments["beta"], segments["torque"] = damping_times_of(body, feet), torque_ranges(body, feet)
+    segments["beta"] = damping_times_of(body, feet)
+    segments["torque"] = torque_ranges(body, feet)
     return segments
 
 
 @part
 def _turned(offset, c, s):
-    """The offset (u, w) [m] in the world, (x, z), of a segment turned by an angle of cosine `c` and sine `s`."""
+    """Return the offset (u, w) [m] in the world, (x, z), of a segment turned by an angle of cosine `c` and sine `s`."""
     return offset[0] * c - offset[1] * s, offset[0] * s + offset[1] * c
 
 
@@ -157,29 +159,44 @@ def _locate(segments, position, rate, m):
     A segment is turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its
     frame is then (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world, and moves at ds/dt (-z, x).
     """
-    hip_x, hip_z, pitch = position[0], position[1], position[2]
+    hip_x = position[0]
+    hip_z = position[1]
+    pitch = position[2]
     x, z = _turned(segments.trunk, cos(-pitch), sin(-pitch))
-    com_x, com_z = hip_x + x, hip_z + z
-    com_rate_x, com_rate_z = rate[0] + z * rate[2], rate[1] - x * rate[2]
+    com_x = hip_x + x
+    com_z = hip_z + z
+    com_rate_x = rate[0] + z * rate[2]
+    com_rate_z = rate[1] - x * rate[2]
     for side in range(2):
-        joint_x, joint_z, turn, spin = hip_x, hip_z, -pitch, -rate[2]
+        joint_x = hip_x
+        joint_z = hip_z
+        turn = -pitch
+        spin = -rate[2]
         for joint in range(4):
             sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
             turn += sign * position[3 + 4 * side + joint]
             spin += sign * rate[3 + 4 * side + joint]
-            c, s = cos(turn), sin(turn)
+            c = cos(turn)
+            s = sin(turn)
             x, z = _turned(segments.part[side, joint], c, s)
-            com_x, com_z = com_x + x, com_z + z
-            com_rate_x, com_rate_z = com_rate_x - z * spin, com_rate_z + x * spin
+            com_x = com_x + x
+            com_z = com_z + z
+            com_rate_x = com_rate_x - z * spin
+            com_rate_z = com_rate_z + x * spin
             if joint == ANKLE:
-                m.ankle[side, 0], m.ankle[side, 1] = joint_x, joint_z
+                m.ankle[side, 0] = joint_x
+                m.ankle[side, 1] = joint_z
             for k in range(3):
                 if joint == (ANKLE if k == 0 else TOE):  # the heel is on the foot
                     x, z = _turned(segments.contact[k], c, s)
                     m.contact[side, k, 0], m.contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
             x, z = _turned(segments.end[joint], c, s)
-            joint_x, joint_z = joint_x + x, joint_z + z
-    m.com[0], m.com[1], m.com_velocity[0], m.com_velocity[1] = com_x, com_z, com_rate_x, com_rate_z
+            joint_x = joint_x + x
+            joint_z = joint_z + z
+    m.com[0] = com_x
+    m.com[1] = com_z
+    m.com_velocity[0] = com_rate_x
+    m.com_velocity[1] = com_rate_z
 
 
 @part
@@ -202,13 +219,17 @@ def _read_joints(segments, plant, m):
 
     The torque is the spring's, within the limits of `segments`, at the state of `plant`, of `PLANT`.
     """
-    beta, torque = segments.beta, segments.torque
+    beta = segments.beta
+    torque = segments.torque
     for side in range(2):
         for joint in range(4):
-            theta, theta_rate = plant.qpos[3 + 4 * side + joint], plant.qvel[3 + 4 * side + joint]
-            stiffness, drive = plant.control[side, joint, 0], plant.control[side, joint, 1]
+            theta = plant.qpos[3 + 4 * side + joint]
+            theta_rate = plant.qvel[3 + 4 * side + joint]
+            stiffness = plant.control[side, joint, 0]
+            drive = plant.control[side, joint, 1]
             spring = drive - stiffness * (theta + beta[side, joint] * theta_rate)
-            m.angle[side, joint], m.velocity[side, joint] = theta, theta_rate
+            m.angle[side, joint] = theta
+            m.velocity[side, joint] = theta_rate
             m.torque[side, joint] = min(max(spring, torque[side, joint, 0]), torque[side, joint, 1])
 
 
@@ -222,7 +243,8 @@ def _average(sensors, force):
             for step in range(steps):
                 forward += sensors[step, side, contact, 0]
                 up += sensors[step, side, contact, 2]
-            force[side, contact, 0], force[side, contact, 1] = forward / steps, up / steps
+            force[side, contact, 0] = forward / steps
+            force[side, contact, 1] = up / steps
 
 
 @part
@@ -242,7 +264,9 @@ def measure_bodies(bodies, state, sensors, warnings) -> None:
         warnings: (N, kinds) how often MuJoCo has warned of each kind.
     """
     for i in range(len(bodies)):
-        segments, m, plant = bodies[i].segments, bodies[i].measured, plant_of(state, i)
+        segments = bodies[i].segments
+        m = bodies[i].measured
+        plant = plant_of(state, i)
         m.time = plant.time
         for k in range(3):
             m.base[k], m.base_velocity[k] = plant.qpos[k], plant.qvel[k]

@@ -69,13 +69,14 @@ def torque_limits(body: Body) -> np.ndarray:
 
 
 def joints_of(foot: Foot) -> tuple[FootJoint, ...]:
-    """The four joints of the leg that ends in `foot`, in the order of `JOINTS`; hip and knee are sound."""
+    """Return the four joints of the leg that ends in `foot`, in the order of `JOINTS`; hip and knee are sound."""
     return INTACT.ankle, INTACT.ankle, *foot.joints
 
 
 def damping_times_of(body: Body, feet: Feet) -> NDArray:
     """Beta [s] of the actuators of both legs, (side, joint)."""
-    sound, times = damping_times(body), []
+    sound = damping_times(body)
+    times = []
     for foot in feet:
         own = [joint.device and joint.device.damping_time for joint in joints_of(foot)]
         times.append([usual if time is None else time for usual, time in zip(sound, own, strict=True)])
@@ -106,11 +107,13 @@ def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray
 
 
 def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mujoco.MjSpec:
-    """The model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force sensors.
+    """Return the model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force
+    sensors.
 
     Either foot has a ground of its own, a plane that is moved from outside (mocap).
     """
-    length, mass = body.length_scale, body.mass_scale
+    length = body.length_scale
+    mass = body.mass_scale
     spec = mujoco.MjSpec()
     spec.modelname = "springfoot"
     spec.option.timestep = PHYSICS_STEP
@@ -125,7 +128,8 @@ def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mu
 
     world = spec.worldbody
     trunk = _segment(world, "trunk", (0, 0, 0), body.trunk_mass, (0, body.trunk_com_above_hip), body.trunk_inertia)
-    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    slide = mujoco.mjtJoint.mjJNT_SLIDE
+    hinge = mujoco.mjtJoint.mjJNT_HINGE
     for name, kind, axis in zip(BASE, (slide, slide, hinge), ((1, 0, 0), (0, 0, 1), (0, 1, 0)), strict=True):
         trunk.add_joint(name=name, type=kind, axis=axis)
     trunk.add_camera(
@@ -172,7 +176,7 @@ def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mu
 
 
 def build_model(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mujoco.MjModel:
-    """The compiled model of `body` with these feet."""
+    """Return the compiled model of `body` with these feet."""
     return build_spec(body, friction, feet).compile()
 
 
@@ -195,7 +199,9 @@ def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
         (body.ankle_to_toe_joint, 0, -drop),
     )
     worn = feet[SIDES.index(side)]
-    own, segments, parent = leg_segments(body, worn), [], trunk
+    own = leg_segments(body, worn)
+    segments = []
+    parent = trunk
     colour = FLESH if worn.kind == "intact" else DEVICE
     for index, (name, place) in enumerate(zip(("thigh", "shank", "foot", "toe"), places, strict=True)):
         parent = _segment(parent, f"{name}_{side}", place, own.mass[index], own.com[index], own.inertia[index])
@@ -227,7 +233,8 @@ def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
     """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with the orthosis that is worn there."""
     which = SIDES.index(side)
     low, high = torque_ranges(body, feet)[which, index].tolist()
-    joint, damping = JOINTS[index], float(passive_damping(body)[index])
+    joint = JOINTS[index]
+    damping = float(passive_damping(body)[index])
     hinge = segment.add_joint(
         name=f"{joint}_{side}",
         type=mujoco.mjtJoint.mjJNT_HINGE,
@@ -243,10 +250,8 @@ def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
         time = orthosis.damping_time
         beta = float(damping_times(body)[index]) if time is None else time
         hinge.springref = orthosis.rest
-        hinge.stiffness[0], hinge.damping[0] = (
-            orthosis.stiffness,
-            damping + beta * orthosis.stiffness,
-        )  # no higher powers
+        hinge.stiffness[0] = orthosis.stiffness
+        hinge.damping[0] = damping + beta * orthosis.stiffness  # no higher powers
 
 
 def _add_spring(spec: mujoco.MjSpec, joint: str, beta: float) -> None:

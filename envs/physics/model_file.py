@@ -28,7 +28,7 @@ LIMITS = {"range": "jnt_range", "actuatorfrcrange": "jnt_actfrcrange"}
 
 
 def model_text(spec: mujoco.MjSpec) -> str:
-    """The MJCF text of a specification, in which MuJoCo itself would keep six digits of each number."""
+    """Return the MJCF text of a specification, in which MuJoCo itself would keep six digits of each number."""
     model = spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     world = _found(root, "worldbody")

@@ -62,7 +62,7 @@ class Camera:
         atexit.register(_close, weakref.ref(self))  # runs before what ends OpenGL, as that was registered earlier
 
     def show(self, data: mujoco.MjData, model: mujoco.MjModel | None = None) -> NDArray | None:
-        """One frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time.
+        """Return one frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time.
 
         `model` is that of `data`; None stands for the model of the last frame. Another model opens a new window.
         """
@@ -108,7 +108,7 @@ def _renderer(model: mujoco.MjModel) -> Any:
 
 
 def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Any, list[threading.Thread]]:
-    """A window, and the thread that draws it, where it has one of its own."""
+    """Return a window, and the thread that draws it, where it has one of its own."""
     others = threading.enumerate()
     try:
         import glfw

@@ -8,7 +8,8 @@ FLESH, DEVICE = (0.25, 0.45, 0.70), (0.42, 0.40, 0.30)
 
 def add_scene(spec: mujoco.MjSpec) -> None:
     """Add sky, light and the material of the ground, `tiles`."""
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 960, 720
+    spec.visual.global_.offwidth = 960
+    spec.visual.global_.offheight = 720
     spec.add_texture(
         name="tiles",
         type=mujoco.mjtTexture.mjTEXTURE_2D,

@@ -83,10 +83,12 @@ class Simulation:
         if len(built) > 1:
             self._batch.set_models(self.models)
         state = self._batch.state
-        self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        self._qpos = self._batch.bind("qpos")
+        self._qvel = self._batch.bind("qvel")
         self._control = self._batch.bind("ctrl").reshape(num, len(SIDES), len(JOINTS), 2)
         self._push = self._batch.bind("xfrc_applied")[:, self.model.body("trunk").id]
-        self._position, self._turn = self._batch.bind("mocap_pos"), self._batch.bind("mocap_quat")
+        self._position = self._batch.bind("mocap_pos")
+        self._turn = self._batch.bind("mocap_quat")
         bodies = np.zeros(num, BODY_ROW)
         bodies["segments"] = np.concatenate([segments_of(body, pair) for pair in self.feet])
         self._parts = np.concatenate([parts_of(body, pair) for pair in self.feet])
@@ -130,9 +132,12 @@ class Simulation:
             angle: (K, side, joint) joint angles [rad].
             velocity: (K, side, joint) joint velocities [rad/s].
         """
-        position, turn = self._position[ids], self._turn[ids]  # MuJoCo's reset would put the ground back to level
+        position = self._position[ids]
+        turn = self._turn[ids]  # MuJoCo's reset would put the ground back to level
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
-        self._position[ids], self._turn[ids], self._held[ids] = position, turn, np.nan
+        self._position[ids] = position
+        self._turn[ids] = turn
+        self._held[ids] = np.nan
         self._qpos[ids, :3], self._qpos[ids, 3:] = base, angle.reshape(len(ids), -1)
         self._qvel[ids, :3], self._qvel[ids, 3:] = base_velocity, velocity.reshape(len(ids), -1)
         for state, given in ((self._qpos, base), (self._qvel, base_velocity)):
@@ -181,7 +186,9 @@ class Simulation:
         held = self._held.copy()
         if ids is not None:
             still = np.setdiff1d(np.arange(self.num), ids)
-            held[still], steps.before[still], push[still] = np.nan, 0.0, 0.0
+            held[still] = np.nan
+            steps.before[still] = 0.0
+            push[still] = 0.0
         self.work = window_work(self._parts, steps, self._control, held, angle, push, state, timestep)
         self._held[:] = self._control
 
@@ -199,14 +206,14 @@ class Simulation:
                 values[ids] = found[name]
 
     def measure(self, ids: NDArray | slice = slice(None)) -> Measurement:
-        """The measurement right after a reset of `ids`: their state as it stands, no torques or contact forces."""
+        """Return the measurement after a reset of `ids`: their state as it stands, no torques or contact forces."""
         self.arrays.sensors[ids] = 0.0
         measure_bodies(*self.arrays)
         self.now.torque[ids] = 0.0
         return self.now
 
     def data(self, index: int) -> MjData:
-        """A copy of the state of simulation `index` after `mj_forward`, to render or to inspect."""
+        """Return a copy of the state of simulation `index` after `mj_forward`, to render or to inspect."""
         data = self._batch.get_data(index)
         mujoco.mj_forward(self.models[index], data)
         return data

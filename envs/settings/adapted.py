@@ -46,12 +46,12 @@ def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[st
 
 
 def committed_feet() -> dict[str, dict[str, Any]]:
-    """Name -> the committed foot, a setting with its `adapted` people."""
+    """Return name -> the committed foot, a setting with its `adapted` people."""
     return _file()["feet"]
 
 
 def without_person(foot: Mapping[str, Any]) -> dict[str, Any]:
-    """A foot's dictionary without its `adapted`."""
+    """Return a foot's dictionary without its `adapted`."""
     return {key: value for key, value in foot.items() if key != ADAPTED}
 
 

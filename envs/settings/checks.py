@@ -73,8 +73,9 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
 
 
 def refusing_unknown(settings: type[Settings]) -> type[Settings]:
-    """A dataclass of settings, made to refuse what is none of its fields as `check_names` does."""
-    made, names = settings.__init__, [item.name for item in fields(settings)]  # type: ignore[arg-type]
+    """Make a dataclass of settings refuse a name that is none of its fields, as `check_names` does."""
+    made = settings.__init__
+    names = [item.name for item in fields(settings)]  # type: ignore[arg-type]
 
     @wraps(made)
     def checked(self: Any, *given: Any, **named: Any) -> None:
@@ -93,12 +94,12 @@ def check_start(start: Any) -> None:
 
 
 def check_seed(seed: Any) -> int | None:
-    """A seed as a whole number, or None; refuse all else."""
+    """Return a seed as a whole number, or None; refuse all else."""
     return None if seed is None else require_count("seed", seed, 0, 2**63 - 1)
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a finite number."""
+    """Return whether a value is a finite number."""
     return isfinite(as_float(value))
 
 

@@ -179,7 +179,7 @@ def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
 
 
 def _table(name: str, value: Any) -> list[list[float]]:
-    """A torque-angle line: at least two points [deg, N m], of ascending angle and falling torque."""
+    """Return a torque-angle line: at least two points [deg, N m], of ascending angle and falling torque."""
     points = [list(point) if isinstance(point, (list, tuple)) else [] for point in _listed(value)]
     if not 2 <= len(points) <= MOST_POINTS or any(len(point) != 2 for point in points):
         raise SpringfootError(f"{name} must be a list of 2 to {MOST_POINTS} pairs [deg, N m], got {value!r:.60}")
@@ -209,7 +209,7 @@ def _listed(value: Any) -> Sequence[Any]:
 def _numbers(
     name: str, owner: str, given: Mapping[Any, Any], known: Mapping[str, Number], more: tuple[str, ...] = ()
 ) -> dict[str, float]:
-    """The numbers that are given, as floats, in the order in which they are known."""
+    """Return the numbers that are given, as floats, in the order in which they are known."""
     for key in given:
         if key not in known:
             raise SpringfootError(f"{name}: {owner} has no {key!r:.40}; valid: {', '.join([*known, *more])}")
@@ -249,7 +249,7 @@ def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
 
 
 def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
-    """Settings of which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
+    """Return settings of which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
 
     Returns the settings with the first foot of each list, and the feet of each environment; None without lists.
     """
@@ -277,7 +277,8 @@ def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
     """Springs at ankle and toe from the values of `SPRING_NUMBERS`."""
 
     def spring(joint: str) -> Spring:
-        rest, table = radians(value[f"{joint}_deg"]), value.get(f"{joint}_table", ())
+        rest = radians(value[f"{joint}_deg"])
+        table = value.get(f"{joint}_table", ())
         points = tuple((radians(angle), torque) for angle, torque in table)
         time = value["damping_time"]
         if points:

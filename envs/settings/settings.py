@@ -279,7 +279,7 @@ CONDITION_SETTINGS = tuple(
 
 
 def settings_from(**values: Any) -> BipedSettings:
-    """Settings from keyword arguments or JSON: lists become tuples, numbers become floats.
+    """Return settings from keyword arguments or JSON: lists become tuples, numbers become floats.
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
@@ -287,18 +287,18 @@ def settings_from(**values: Any) -> BipedSettings:
 
 
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
-    """Settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
+    """Return settings as a dictionary of plain JSON values; `settings_from(**settings_to_json(s)) == s`."""
     values = {item.name: getattr(settings, item.name) for item in fields(settings)}
     return json.loads(json.dumps(values, default=lambda value: value.to_json()))
 
 
 def body_of(settings: BipedSettings) -> Body:
-    """The body of the settings."""
+    """Return the body of the settings."""
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
 
 
 def plan_file_of(settings: BipedSettings) -> Path | None:
-    """The file of the plan's style and leg constants, if it is not the package's."""
+    """Return the file of the plan's style and leg constants, if it is not the package's."""
     return None if settings.plan_file is None else Path(settings.plan_file)
 
 

@@ -28,7 +28,8 @@ class Ground:
     """
 
     def __init__(self, settings: BipedSettings, simulation: Simulation, subjects: Subjects, rows: NDArray):
-        self._settings, self._simulation = settings, simulation
+        self._settings = settings
+        self._simulation = simulation
         self.slope = subjects.slope
         """(N,) slope of the ground [rad], uphill positive."""
         self.height, self._phase = rows["ground"]["height"], rows["ground"]["phase"]

@@ -55,14 +55,16 @@ def place(
     `noise` (K, 2, side, joint) is the relative error of its angles and rates. Locked joints start locked.
     """
     (angle, velocity, pitch, speed), scale = posture, subjects.scale[ids]
-    angle, velocity = angle * (1.0 + noise[:, 0]), velocity * (1.0 + noise[:, 1])
+    angle = angle * (1.0 + noise[:, 0])
+    velocity = velocity * (1.0 + noise[:, 1])
     angle[..., HIP] += pitch[:, None]
     feet = subjects.rows["feet"][ids]
     locked = feet["locked"] > 0
     angle[..., ANKLE:] = np.where(locked, feet["rest"], angle[..., ANKLE:])
     velocity[..., ANKLE:] = np.where(locked, 0.0, velocity[..., ANKLE:])
     base, rate = np.zeros((2, len(ids), 3))
-    base[:, 2], rate[:, 0] = pitch, speed
+    base[:, 2] = pitch
+    rate[:, 0] = speed
     simulation.reset(ids, base, rate, angle, velocity)
     lowest = simulation.measure(ids).contact[ids, ..., 1].min(axis=(1, 2))
     base[:, 1] = -lowest - START_DEPTH * simulation.body.length_scale * scale["length"]

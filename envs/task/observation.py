@@ -39,7 +39,7 @@ SEEN = np.dtype(
 
 @lru_cache(maxsize=256)
 def units_of(body: Body) -> NDArray:
-    """(6,) the units of one body's observation, in the order of `UNITS` [SI]."""
+    """Return (6,) the units of one body's observation, in the order of `UNITS` [SI]."""
     leg = body.leg_length
     return np.array([1.0, 1.0, leg, sqrt(GRAVITY * leg), sqrt(GRAVITY / leg), body.total_mass * GRAVITY])
 
@@ -55,18 +55,27 @@ def observe(rows, controls, bodies, table, observation) -> None:
         table: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
         observation: (N, D) float32, which is filled.
     """
-    entries, curves = np.empty(len(LOW)), np.empty((2, table.shape[-1]))
+    entries = np.empty(len(LOW))
+    curves = np.empty((2, table.shape[-1]))
     seen = entries.view(SEEN)[0]
     for i in range(len(rows)):
-        row, control, m = rows[i], controls[i], bodies[i].measured
+        row = rows[i]
+        control = controls[i]
+        m = bodies[i].measured
         targets = targets_at(table, control, curves)
         seen.error[0], seen.error[1], seen.error[2] = error_of(control, targets, m)
         left = control.legs.phase[LEFT]
-        s, c = sin(2 * pi * left), cos(2 * pi * left)
-        seen.cycle[0], seen.cycle[1], seen.cycle[2], seen.cycle[3] = s, c, 2 * s * c, 1 - 2 * s * s
+        s = sin(2 * pi * left)
+        c = cos(2 * pi * left)
+        seen.cycle[0] = s
+        seen.cycle[1] = c
+        seen.cycle[2] = 2 * s * c
+        seen.cycle[3] = 1 - 2 * s * s
         seen.leading_leg = 1.0 if left < 0.5 else -1.0
-        seen.base[0], seen.base[1] = m.base[1], m.base[2]
-        seen.command[0], seen.command[1] = control.subject.speed, row.height_ratio
+        seen.base[0] = m.base[1]
+        seen.base[1] = m.base[2]
+        seen.command[0] = control.subject.speed
+        seen.command[1] = row.height_ratio
         for k in range(3):
             seen.base_velocity[k] = m.base_velocity[k]
         for k in range(4):
@@ -105,7 +114,7 @@ class SensorNoise:
                     self._noise[index] = self._scale * random.standard_normal(len(self._scale))
 
     def on(self, observation: NDArray) -> NDArray:
-        """The observation (N, D) with its noise, float32, within its bounds."""
+        """Return the observation (N, D) with its noise, float32, within its bounds."""
         if not self._on:
             return observation
         return np.clip(observation + self._noise, LOW, HIGH).astype(np.float32)

@@ -24,7 +24,8 @@ class Pushes:
         self._scale = subjects.scale
         self._size = settings.push_newton * (settings.mass / REFERENCE_MASS)
         self._latest = settings.push_interval - settings.push_seconds
-        self._interval, self._duration = settings.push_interval, settings.push_seconds
+        self._interval = settings.push_interval
+        self._duration = settings.push_seconds
         self._step = settings.step_seconds
         self._begin, self._force, self._ends = (rows["push"][name] for name in ("begin", "force", "ends"))
 
@@ -34,7 +35,7 @@ class Pushes:
         self._draw(index, random)
 
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
-        """(N,) push [N] after `steps` (N,); only environments that are `running` (N,) sample their next push."""
+        """Return (N,) push [N] after `steps` (N,); only environments that are `running` (N,) sample their next push."""
         time = steps * self._step
         for index in np.flatnonzero(running & (time >= self._ends)).tolist():
             generator = random[index]

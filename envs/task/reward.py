@@ -140,9 +140,12 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         forces: (W, N, side, contact, 2) on the body [N] in the W control windows of the step.
         terms: as above.
     """
-    curves, share = np.empty((2, table.shape[-1])), options[0].share
+    curves = np.empty((2, table.shape[-1]))
+    share = options[0].share
     for i in range(len(rows)):
-        scale, control, m = rows[i].scales, controls[i], bodies[i].measured
+        scale = rows[i].scales
+        control = controls[i]
+        m = bodies[i].measured
         targets = targets_at(table, control, curves)
         upright = m.base[1] >= scale.min_hip_height and abs(m.base[2]) <= MAX_PITCH  # False for NaN
         terms[i, ALIVE] = 1.0 if upright and m.diverged < 0 else 0.0
@@ -162,7 +165,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
             stiffness_rate += ((control.decision.action[k] - control.decision.last_action[k]) / share) ** 2
         terms[i, POSE] = exp(-pose_error / POSE_TOLERANCE)
         terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
-        terms[i, STIFFNESS], terms[i, STIFFNESS_RATE] = stiffness_cost, stiffness_rate
+        terms[i, STIFFNESS] = stiffness_cost
+        terms[i, STIFFNESS_RATE] = stiffness_rate
         terms[i, EFFORT] = _positive_power(m) / (scale.weight * control.subject.speed)
 
 
@@ -170,7 +174,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
 def total(terms, options, reward) -> None:
     """Fill `reward` (N,): weighted sum of `terms` (N, len(TERMS)), in proportion to the time of a step, 1 for 20 ms; 0
     where `alive` is 0. `options` (1,) of `TASK_OPTIONS`."""
-    weights, share = options[0].weights, options[0].share
+    weights = options[0].weights
+    share = options[0].share
     for i in range(len(reward)):
         reward[i] = 0.0
         for term in range(len(weights)):
@@ -191,12 +196,15 @@ class Task:
         self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects
     ) -> None:
         self.names = tuple(entry.name for entry in OBSERVATION)
-        self.low, self.high = LOW, HIGH
+        self.low = LOW
+        self.high = HIGH
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
         self.rows = np.zeros(len(subjects.bodies), TASK_ROW)
         """(N,) all that the task keeps of each environment."""
-        weights, seconds = [self.weights[name] for name in TERMS], settings.step_seconds
-        share, limit = seconds / ACTION_STEP, settings.max_episode_steps
+        weights = [self.weights[name] for name in TERMS]
+        seconds = settings.step_seconds
+        share = seconds / ACTION_STEP
+        limit = settings.max_episode_steps
         self.options = np.array([(weights, seconds, share, limit)], TASK_OPTIONS)
         """(1,) of `TASK_OPTIONS`."""
         curves = {walk: target_curves(walk.target, walk.plan, seconds) for _, walk in rows}
@@ -209,11 +217,15 @@ class Task:
         """Take over the present bodies of the subjects `ids`."""
         for index in ids:
             body = self._subjects.bodies[index]
-            self.rows["scales"][index], self.rows["units"][index] = body_scales(body)[0], units_of(body)
+            self.rows["scales"][index] = body_scales(body)[0]
+            self.rows["units"][index] = units_of(body)
             self.rows["height_ratio"][index] = body.length_scale
 
     def observe(self, bodies: NDArray) -> NDArray:
-        """The observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds; `bodies` (N,) of `BODY_ROW`."""
+        """Return the observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
+
+        `bodies` (N,) of `BODY_ROW`.
+        """
         observation = np.empty((len(self.rows), len(OBSERVATION)), np.float32)
         observe(self.rows, self._subjects.rows, bodies, self.table, observation)
         return observation
@@ -225,17 +237,17 @@ class Task:
         return error
 
     def planned_com(self, bodies: NDArray) -> NDArray:
-        """The plan's CoM (x in the world, z) [m], shape (N, 2); `bodies` (N,) of `BODY_ROW`."""
+        """Return the plan's CoM (x in the world, z) [m], shape (N, 2); `bodies` (N,) of `BODY_ROW`."""
         return bodies["measured"]["com"] - self.tracking(bodies)[:, :2]
 
     def reasons(self, m: "Measurement", terminated: NDArray) -> NDArray:
-        """(N,) why an episode is `terminated` (N,), as codes of `TERMINATIONS`."""
+        """Return (N,) why an episode is `terminated` (N,), as codes of `TERMINATIONS`."""
         reasons = np.where(terminated, self.fallen(m), 0)
         for index in np.flatnonzero(terminated & (m.diverged >= 0)).tolist():
             reasons[index] = divergence(m, index)
         return reasons
 
     def fallen(self, m: "Measurement") -> NDArray:
-        """(N,) why each body has fallen, as codes of `TERMINATIONS`; 0 while it has not."""
+        """Return (N,) why each body has fallen, as codes of `TERMINATIONS`; 0 while it has not."""
         tilted = np.where(np.abs(m.base[:, 2]) <= MAX_PITCH, 0, TOO_TILTED)
         return np.where(m.base[:, 1] >= self.rows["scales"]["min_hip_height"], tilted, TOO_LOW)

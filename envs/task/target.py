@@ -64,7 +64,8 @@ def error_of(control, targets, m) -> tuple[float, float, float]:
 
     The x of the target is from the ankle of the leg whose stance began last.
     """
-    ratio, phase = control.subject.scale, control.legs.phase
+    ratio = control.subject.scale
+    phase = control.legs.phase
     leader = LEFT if phase[LEFT] < 0.5 else RIGHT
     target = targets[leader]
     target_x = m.ankle[leader, 0] + ratio.length * target.stride_length * phase[leader]

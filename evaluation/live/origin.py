@@ -16,7 +16,7 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def is_own_page(headers: Mapping[str, str], host: str) -> bool:
-    """Whether a request is of a page from the address it goes to, or of a program, which sends no `Origin`.
+    """Return whether a request is of a page from the address it goes to, or of a program, which sends no `Origin`.
 
     Where `host`, the address listened on, is this machine's alone, the page's must be, too: a name that leads here
     (DNS rebinding) is not enough.
@@ -30,7 +30,7 @@ def is_own_page(headers: Mapping[str, str], host: str) -> bool:
 
 @contextmanager
 def own_pages_only(host: str) -> Iterator[None]:
-    """A viser server that is made inside answers websockets of other pages with 403."""
+    """Make a viser server that answers websockets of other pages with 403 inside the block."""
     serve = websockets.serve
 
     def serve_own(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:

@@ -31,8 +31,10 @@ class LiveScene:
     """Draws what walks in `session` on the page of `server`."""
 
     def __init__(self, server: viser.ViserServer, session: LiveSession):
-        self._server, self._session = server, session
-        server.initial_camera.position, server.initial_camera.look_at = (0.5, -2.6, 1.0), (0.15, 0.0, 0.75)
+        self._server = server
+        self._session = session
+        server.initial_camera.position = (0.5, -2.6, 1.0)
+        server.initial_camera.look_at = (0.15, 0.0, 0.75)
         self._begin()
 
     def show(self) -> None:
@@ -41,13 +43,15 @@ class LiveScene:
         if session.model is not self._model:
             self._server.scene.reset()
             self._begin()
-        data, slope = session.data(), np.radians(session.wishes.slope_deg)
+        data = session.data()
+        slope = np.radians(session.wishes.slope_deg)
         x = float(data.qpos[0])
         away = np.array([x, 0.0, x * np.tan(slope)])
         data.xpos[:] -= away
         with self._server.atomic():
             for body, frame in self._bodies.items():
-                frame.position, frame.wxyz = data.xpos[body], data.xquat[body]
+                frame.position = data.xpos[body]
+                frame.wxyz = data.xquat[body]
             along = (-x / np.cos(slope)) % 1.0  # the grid repeats itself every metre
             self._ground.position = (along * np.cos(slope), 0.0, along * np.sin(slope))
             self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], away)
@@ -95,16 +99,18 @@ def _name(body: int) -> str:
 
 
 def _grid() -> NDArray:
-    """(K, 2, 3) lines along and across the ground [m]."""
-    along, across = GROUND_LENGTH / 2, GROUND_WIDTH / 2
-    xs, ys = np.arange(-along, along + GROUND_CELL, GROUND_CELL), np.arange(-across, across + GROUND_CELL, GROUND_CELL)
+    """Return (K, 2, 3) lines along and across the ground [m]."""
+    along = GROUND_LENGTH / 2
+    across = GROUND_WIDTH / 2
+    xs = np.arange(-along, along + GROUND_CELL, GROUND_CELL)
+    ys = np.arange(-across, across + GROUND_CELL, GROUND_CELL)
     lines = [((x, -across, 0.0), (x, across, 0.0)) for x in xs] + [((-along, y, 0.0), (along, y, 0.0)) for y in ys]
     return np.array(lines, np.float32)
 
 
 def _arrows(force: NDArray, feet: NDArray, away: NDArray) -> NDArray:
-    """(side, (start, end), 3) arrows of `force` as in a `Frame`, in the planes of the `feet` (side, 3); without a force
-    they have no length."""
+    """Return (side, (start, end), 3) arrows of `force` as in a `Frame`, in the planes of the `feet` (side, 3); without
+    a force they have no length."""
     points = np.zeros((len(force), 2, 3), np.float32)
     for side, (place, height, forward, up) in enumerate(force):
         start = np.array([place, feet[side, 1], height]) - away * (1, 0, 1)

@@ -143,7 +143,9 @@ class LiveSession:
         self._policy, self._settings = prepare(policy, asked, seed)
         self.name = policy
         self._seed = seed
-        self._pushed, self._push_steps, self._lying = 0.0, 0, 0
+        self._pushed = 0.0
+        self._push_steps = 0
+        self._lying = 0
         self.falls = 0
         """Falls so far."""
         names = {item.name for item in fields(Wishes)}
@@ -171,11 +173,11 @@ class LiveSession:
         return self._biped.model_of(0)
 
     def data(self) -> MjData:
-        """A copy of its state, to draw."""
+        """Return a copy of its state, to draw."""
         return self._biped.data(0)
 
     def stiffness_ranges(self) -> NDArray:
-        """(joint, (lowest, highest)) K that actions can give to this body [N m/rad]; the legs may exceed it."""
+        """Return (joint, (lowest, highest)) K that actions can give to this body [N m/rad]; the legs may exceed it."""
         ends = np.array([-1.0, 1.0])[:, None]
         return stiffness_of(ends, self._settings, self.body).T
 
@@ -183,7 +185,8 @@ class LiveSession:
         """Change wishes, by name; raises `SpringfootError`, nothing changed, for what is no walk."""
         asked = replace(self.wishes, **wishes)
         self._check(asked)
-        before, biped = self.wishes, self._biped
+        before = self.wishes
+        biped = self._biped
         changed = {item.name for item in fields(Wishes) if getattr(asked, item.name) != getattr(before, item.name)}
         self.wishes = asked
         try:
@@ -252,20 +255,24 @@ class LiveSession:
             fell=fell,
         )
         if fell:
-            self.falls, self._lying = self.falls + 1, ceil(LYING_SECONDS / self.dt)
+            self.falls = self.falls + 1
+            self._lying = ceil(LYING_SECONDS / self.dt)
         return self.frame
 
     def _force(self, tick: Tick) -> NDArray:
-        force, contact = tick.measurement.force[0], tick.measurement.contact[0]
+        force = tick.measurement.force[0]
+        contact = tick.measurement.contact[0]
         load = force[..., 1]
         total = np.maximum(load.sum(axis=-1, keepdims=True), 1e-6)
         place = (load[..., None] * contact).sum(axis=1) / total
         return np.concatenate([place, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
     def _action(self, observation: NDArray) -> NDArray:
-        """(1, 4) the action of K as it is asked; the policy's own, untouched, where K is left to it."""
+        """Return (1, 4) the action of K as it is asked; the policy's own, untouched, where K is left to it."""
         own = np.asarray(self._policy(observation), float).reshape(len(SIDES), len(SPRINGS))
-        settings, body, wishes = self._settings, self.body, self.wishes
+        settings = self._settings
+        body = self.body
+        wishes = self.wishes
         residual = settings.action_mode == "residual"
         schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(own)
         stiffness = schedule * np.exp(own) if residual else stiffness_of(own, settings, body)
@@ -282,7 +289,7 @@ class LiveSession:
         return own.reshape(1, -1)
 
     def _make(self, wishes: Wishes) -> Biped:
-        """The batch of one with the ground, the feet and the theta_eq of `wishes`."""
+        """Return the batch of one with the ground, the feet and the theta_eq of `wishes`."""
         offset = _offset(wishes)
         feet = {name: getattr(wishes, name) for name in ("slope_deg", "left_foot", "right_foot")}
         settings = replace(self._settings, **feet)
@@ -302,5 +309,5 @@ class LiveSession:
 
 
 def _offset(wishes: Wishes) -> NDArray:
-    """(joint,) what is added to theta_eq [rad]."""
+    """Return (joint,) what is added to theta_eq [rad]."""
     return np.radians([getattr(wishes, name) for name in OFFSETS])

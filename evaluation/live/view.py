@@ -82,13 +82,17 @@ class LiveView:
 
     def run(self, seconds: float | None = None) -> float:
         """Walk in real time for `seconds`, for ever if None; returns how many pictures a second were shown."""
-        dt, begin, shown = self._session.dt, time.perf_counter(), self.frames
-        due, between = begin, max(1, round(1 / (CURVES_HZ * dt)))
+        dt = self._session.dt
+        begin = time.perf_counter()
+        shown = self.frames
+        due = begin
+        between = max(1, round(1 / (CURVES_HZ * dt)))
         step = 0
         while seconds is None or time.perf_counter() - begin < seconds:
             self._obey()
             self._history.append(self._session.step())
-            due, step = due + dt, step + 1
+            due = due + dt
+            step = step + 1
             if time.perf_counter() - due < dt:  # else the walk is kept in time, and this picture left out
                 self._show()
             if step % between == 0:
@@ -122,7 +126,8 @@ class LiveView:
                 self._handles[name].value = _shown(getattr(self._session.wishes, name))
 
     def _add_buttons(self) -> None:
-        push, restart = self._gui.add_button("Push"), self._gui.add_button("Restart")
+        push = self._gui.add_button("Push")
+        restart = self._gui.add_button("Restart")
         size = self._gui.add_slider(
             "Push, N", *LIVE_PUSHES, step=10.0, initial_value=FIRST_PUSH, hint="forward positive"
         )
@@ -185,7 +190,8 @@ class LiveView:
 
     def _tell(self) -> None:
         """Send words and curves."""
-        frame, session = self._history[-1], self._session
+        frame = self._history[-1]
+        session = self._session
         rows = "\n".join(
             f"| {side} | {k[0]:.0f} | {k[1]:.0f} | {rest[0]:.1f} | {rest[1]:.1f} |"
             for side, k, rest in zip(SIDES, frame.stiffness, np.degrees(frame.equilibrium), strict=True)
@@ -205,5 +211,5 @@ class LiveView:
 
 
 def _shown(wish: Any) -> Any:
-    """A wish as its slider or list shows it: of a foot its kind."""
+    """Return a wish as its slider or list shows it: of a foot its kind."""
     return wish["kind"] if isinstance(wish, dict) else wish

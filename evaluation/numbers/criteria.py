@@ -29,14 +29,14 @@ class Criterion:
     """What a table of one walk calls it; its name where there is none."""
 
     def value(self, values: dict[str, Any]) -> float | None:
-        """The number; None where it could not be measured."""
+        """Return the number; None where it could not be measured."""
         place: Any = values
         for key in self.path:
             place = place[key]
         return place
 
     def holds(self, values: dict[str, Any]) -> bool:
-        """Whether the number was measured and lies in the range."""
+        """Return whether the number was measured and lies in the range."""
         value = self.value(values)
         return value is not None and self.low <= value <= self.high
 
@@ -61,7 +61,8 @@ def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
     """metrics.json with two more keys: `off`, distances from command and plan, and `double_support_percent`."""
     settings = settings_from(**metrics["environment"])
     plan = reference_walk_at(settings, settings.speed).plan
-    cadence, support = metrics["cadence_steps_min"], metrics["double_support_s"]
+    cadence = metrics["cadence_steps_min"]
+    support = metrics["double_support_s"]
 
     def share(value: float | None, planned: float) -> float | None:
         return None if value is None else 100 * abs(value / planned - 1)
@@ -77,13 +78,13 @@ def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
 
 
 def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
-    """The criteria that an evaluation misses, each in words with its number; empty if it meets all."""
+    """Return the criteria that an evaluation misses, each in words with its number; empty if it meets all."""
     values = numbers(metrics)
     return [f"{each.name} {number_text(each, values)}" for each in criteria if not each.holds(values)]
 
 
 def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
-    """The number as it stands in words, with its unit."""
+    """Return the number as it stands in words, with its unit."""
     value = criterion.value(values)
     return "?" if value is None else format(value, criterion.pattern) + criterion.unit
 

@@ -28,10 +28,11 @@ class StrideCurves:
         return self._pick(np.asarray(self.total) / max(self.count, 1), name) if self.count else self._missing()
 
     def sd(self, name: str) -> NDArray:
-        """Standard deviation over strides (101,), n - 1."""
+        """Return standard deviation over strides (101,), n - 1."""
         if self.count < 2:
             return self._missing()
-        total, squares = np.asarray(self.total), np.asarray(self.squares)
+        total = np.asarray(self.total)
+        squares = np.asarray(self.squares)
         variance = (squares - total**2 / self.count) / (self.count - 1)
         return self._pick(np.sqrt(np.maximum(variance, 0.0)), name)
 

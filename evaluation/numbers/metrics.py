@@ -65,7 +65,8 @@ def measure(recording: Recording) -> Gait:
 
 
 def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
-    settings, both = recording.settings, tally.both
+    settings = recording.settings
+    both = tally.both
     human = reference_gait(settings)
     phase = PERCENT / 100
     reasons = Counter(str(reason) for reason in recording.fall_reason if reason)
@@ -75,7 +76,8 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     com_z = tally.com.mean("z")
 
     def joint(name: str) -> dict[str, Any]:
-        curve, people = both.mean(ANGLE_COLUMNS[name]), np.degrees(human.mean(name, phase))
+        curve = both.mean(ANGLE_COLUMNS[name])
+        people = np.degrees(human.mean(name, phase))
         return {
             "rmse_deg": score.rmse(curve, people),
             "r": score.correlation(curve, people),
@@ -89,7 +91,8 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late}
         if name == "toe":
             return entry | {"r": None, "within_2sd_percent": None}
-        people, sd = human.mean(f"{name}_moment", phase), human.sd(f"{name}_moment", phase)
+        people = human.mean(f"{name}_moment", phase)
+        sd = human.sd(f"{name}_moment", phase)
         return entry | {
             "r": score.correlation(curve, people),
             "within_2sd_percent": score.share_within_sd(curve, people, 2 * sd),

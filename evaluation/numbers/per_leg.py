@@ -26,7 +26,7 @@ def kinds_of(settings: BipedSettings) -> dict[str, str]:
 
 
 def differ(settings: BipedSettings) -> bool:
-    """Whether the two feet are not the same."""
+    """Return whether the two feet are not the same."""
     left, right = settings.feet
     return left != right
 
@@ -43,7 +43,8 @@ def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
 
 
 def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
-    curves, mine = tally.feet[side], np.array(tally.stride_sides, int) == side
+    curves = tally.feet[side]
+    mine = np.array(tally.stride_sides, int) == side
     features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))
     work = _chosen(tally.joint_work, mine)
     stance = _mean(_chosen(tally.toe_off, mine))

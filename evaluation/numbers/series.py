@@ -48,13 +48,13 @@ def foot_contacts(series: dict[str, NDArray], body: Body) -> list[Contacts]:
 
 
 def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
-    """(S, 3) heel strike, toe-off and next heel strike [s] of the complete strides within the `steady` time [s]."""
+    """Return (S, 3) heel strike, toe-off and next heel strike [s] of complete strides in the `steady` time [s]."""
     strides = foot.strides(after=steady[0])
     return strides[strides[:, 2] <= steady[1]]
 
 
 def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
-    """(S, 101, C) `GAIT_CYCLE_COLUMNS` of one leg over `strides` (S, 3)."""
+    """Return (S, 101, C) `GAIT_CYCLE_COLUMNS` of one leg over `strides` (S, 3)."""
     begin, _, end = strides.T
     return np.concatenate(
         [
@@ -66,12 +66,12 @@ def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: ND
 
 
 def mid_tick(state: NDArray) -> NDArray:
-    """What is known at the ends of ticks (T, ...) at their middles."""
+    """Return a state at the ends of ticks (T, ...) at their middles."""
     return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
 
 
 def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without those of `_means`."""
+    """Return (T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without those of `_means`."""
     angle = np.degrees(series["angle"][:, side])
     pitch = np.degrees(series["base"][:, 2])
     thigh = angle[:, HIP] - pitch
@@ -92,7 +92,7 @@ def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
 
 
 def _means(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """(T, C) curves that are means over ticks, in the order of `_MEANS`."""
+    """Return (T, C) curves that are means over ticks, in the order of `_MEANS`."""
     force = series["force"][:, side].sum(axis=1) / (body.mass * GRAVITY)
     moment = -series["joint_torque"][:, side] / body.mass
     power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass

@@ -82,7 +82,8 @@ class StrideTally:
 
 def tally_strides(recording: Recording) -> StrideTally:
     """Every stride, step and episode of a recording, its steady walk only, without the warm-up."""
-    tally, body = StrideTally(), body_of(recording.settings)
+    tally = StrideTally()
+    body = body_of(recording.settings)
     fell = recording.fall_reason != ""
     begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks):
@@ -103,7 +104,8 @@ def add_episode(
     com = series["com"]
     begin, end = (round(min(time / TICK, len(com))) for time in steady)
     if end > begin:
-        distance, seconds = com[end - 1, 0] - com[begin - 1, 0], (end - begin) * TICK
+        distance = com[end - 1, 0] - com[begin - 1, 0]
+        seconds = (end - begin) * TICK
         tally.distance += distance
         tally.work += float(series["joint_work"][begin:end, ..., 0].sum())
         if seconds >= SHORTEST_SPEED:
@@ -124,7 +126,8 @@ def add_episode(
         tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
         tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, end) / body.mass)
         tally.energy += list(_energies(series["energy"], heel_strike, end) / body.mass)
-        contact, load = series["contact"][:, side], series["force"][:, side, :, 1]
+        contact = series["contact"][:, side]
+        load = series["force"][:, side, :, 1]
         for start, leave, stop in np.floor(strides / TICK).astype(int):
             tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
             stance = slice(start, leave + 1)
@@ -139,7 +142,8 @@ def _add_steps(
 ) -> None:
     steps, sides = find_steps(contacts[0], contacts[1], after=steady[0])
     in_time = steps[:, 1] <= steady[1]
-    steps, sides = steps[in_time], sides[in_time]
+    steps = steps[in_time]
+    sides = sides[in_time]
     for side in range(len(SIDES)):
         begin, end = steps[sides == side].T
         relative = np.column_stack(
@@ -161,7 +165,9 @@ def _add_steps(
 
 
 def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """(S, ...) sums of (T, ...) over spans from `begin` to `end` (S,) [s], ticks that lie in part counted in part."""
+    """Return (S, ...) sums of (T, ...) over spans from `begin` to `end` (S,) [s], ticks that lie in part counted in
+    part.
+    """
     total = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
 
     def at(time: NDArray) -> NDArray:
@@ -174,16 +180,18 @@ def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
 
 
 def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """(S, entries) of the ledger (T, entries) in strides from `begin` to `end` (S,): its works, and the rise of the
-    mechanical energy [J]."""
-    flow, state = energy.copy(), ledger_entries().index("mechanical")
+    """Return (S, entries) of the ledger (T, entries) in strides from `begin` to `end` (S,): its works, and the rise of
+    the mechanical energy [J]."""
+    flow = energy.copy()
+    state = ledger_entries().index("mechanical")
     flow[1:, state] = np.diff(energy[:, state])
     return _sums(flow, begin, end)
 
 
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
-    """(T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
-    load, place = series["force"][..., 1], mid_tick(series["contact"][..., 0])
+    """Return (T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
+    load = series["force"][..., 1]
+    place = mid_tick(series["contact"][..., 0])
     total = load.sum(axis=(1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
         return (load * place).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)

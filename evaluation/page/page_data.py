@@ -29,8 +29,9 @@ FORCE_PANELS = {
 
 
 def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
-    """All that the page shows of one policy but its words and its table."""
-    human, apart = reference_gait(recording.settings), differ(recording.settings)
+    """Return all that the page shows of one policy but its words and its table."""
+    human = reference_gait(recording.settings)
+    apart = differ(recording.settings)
     return {
         "name": recording.policy,
         "metrics": gait.metrics,
@@ -105,7 +106,8 @@ def _kinetics(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]
         theirs = {} if joint == "toe" else _people(human, f"{joint}_moment")
         panels.append(stride("Moments", f"{joint.capitalize()} moment", unit, column, theirs))
     for joint in ("hip", "knee", "ankle"):
-        column, theirs = f"{joint}_power_W_per_kg", _people(human, f"{joint}_power")
+        column = f"{joint}_power_W_per_kg"
+        theirs = _people(human, f"{joint}_power")
         panels.append(stride("Powers", f"{joint.capitalize()} power", "generation, W/kg", column, theirs))
     for name, (title, unit) in FORCE_PANELS.items():
         panels.append(stride("Ground reaction forces", title, unit, f"{name}_bw", _people(human, name)))
@@ -113,7 +115,8 @@ def _kinetics(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]
 
 
 def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
-    group, axis = "Centre of mass, centre of pressure and their plans, over the step", "step"
+    group = "Centre of mass, centre of pressure and their plans, over the step"
+    axis = "step"
     com, (x, z) = gait.com, recording.plan_com.T
     cop = gait.tally.cop
     return [
@@ -132,7 +135,8 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
 
 def _springs(recording: Recording) -> list[dict[str, Any]]:
     """K and theta_eq over the leg's phase: its mean is the open-loop copy, the SD around it feedback."""
-    curves, group = schedule_curves(recording), "Stiffness and equilibrium over the leg's phase"
+    curves = schedule_curves(recording)
+    group = "Stiffness and equilibrium over the leg's phase"
     panels = []
     for column, words, unit in (
         ("stiffness_Nm_per_rad", "stiffness K", "N·m/rad"),
@@ -149,7 +153,7 @@ def _springs(recording: Recording) -> list[dict[str, Any]]:
 
 
 def _reward(gait: Gait) -> list[dict[str, Any]]:
-    """The reward's terms over the step: rewards from 0 to 1, and costs."""
+    """Return the reward's terms over the step: rewards from 0 to 1, and costs."""
     group = "Reward terms over the step, unweighted"
     return [
         _panel(group, f"Reward term {name}", "dimensionless", _of(gait.tally.reward, name), zero=True, axis="step")
@@ -172,7 +176,8 @@ def _loops(recording: Recording, gait: Gait, human: HumanGait, apart: bool) -> l
         thesis.append(shown_numbers(np.stack([np.degrees(angle), moment], -1)))
 
     def of(curves: StrideCurves, joint: str) -> dict[str, Any]:
-        angle, moment = curves.mean(f"{joint}_dorsiflexion_deg"), curves.mean(f"{joint}_moment_Nm_per_kg")
+        angle = curves.mean(f"{joint}_dorsiflexion_deg")
+        moment = curves.mean(f"{joint}_moment_Nm_per_kg")
         return {"x": shown_numbers(angle), "y": shown_numbers(moment)}
 
     def loop(joint: str) -> dict[str, Any]:

@@ -24,7 +24,7 @@ DRAWN_DIGITS = 4
 
 
 def shown_numbers(values: NDArray) -> Any:
-    """An array as lists of numbers of `DRAWN_DIGITS` digits, None for NaN."""
+    """Return an array as lists of numbers of `DRAWN_DIGITS` digits, None for NaN."""
     if values.ndim > 1:
         return [shown_numbers(row) for row in values]
     return [float(f"{value:.{DRAWN_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
@@ -32,7 +32,8 @@ def shown_numbers(values: NDArray) -> Any:
 
 def figure_data(recording: Recording) -> dict[str, Any]:
     """Two strides of the body, tick by tick: joints, forces, masses and plans, in metres of the world."""
-    settings, body = recording.settings, body_of(recording.settings)
+    settings = recording.settings
+    body = body_of(recording.settings)
     _, first, last = clip_of(recording, body)
     whole = recording.shown()
     series = {name: values[first:last] for name, values in whole.items()}
@@ -42,7 +43,8 @@ def figure_data(recording: Recording) -> dict[str, Any]:
     percent = [_percent_of(each.heel_strikes, len(whole["phase"]))[first:last] for each in contacts]
     steps = np.unique(np.concatenate([each.heel_strikes for each in contacts]))
     phase = np.append(whole["phase"], whole["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
-    offsets, weight = contact_offsets(body), body.mass * GRAVITY
+    offsets = contact_offsets(body)
+    weight = body.mass * GRAVITY
     acting = {"px": 1.0, "vx": weight, "vy": weight}
     return {
         "seconds_a_frame": TICK,
@@ -85,7 +87,7 @@ def _contacts_of(series: dict[str, NDArray], side: int, body: Body) -> Contacts:
 
 
 def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
-    """(T,) percent from one of `strikes` [s] to the next at the end of each of `ticks`, NaN outside them."""
+    """Return (T,) percent from one of `strikes` [s] to the next at the end of each of `ticks`, NaN outside them."""
     time = TICK * np.arange(1, ticks + 1)
     if len(strikes) < 2:
         return np.full(len(time), np.nan)
@@ -94,7 +96,9 @@ def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
 
 
 def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
-    """(T,) forward place of the planned ZMP [m]: over the step of the leg whose stance began last, from its ankle."""
+    """Return (T,) forward place of the planned ZMP [m]: over the step of the leg whose stance began last, from its
+    ankle.
+    """
     phase = series["phase"] % 1.0
     side = np.where(phase[:, 0] < phase[:, 1], 0, 1)
     every = np.arange(len(phase))
@@ -103,7 +107,7 @@ def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
 
 
 def _foot(setting: FootSetting) -> dict[str, Any]:
-    """What a foot is, in words; whether it is one piece, without a toe joint; what is at its ankle and its toe."""
+    """Describe a foot: its words, whether it is one piece without a toe joint, and the parts at its ankle and toe."""
     foot = setting.foot
     joints = [_at_joint(joint) for joint in foot.joints]
     worn = any(joint.orthosis is not None for joint in foot.joints)
@@ -117,7 +121,7 @@ def _at_joint(joint: FootJoint) -> str:
 
 
 def foot_words(setting: FootSetting) -> str:
-    """A foot of the settings for people who read: its kind, and the numbers that were given of it."""
+    """Return a foot of the settings for people who read: its kind, and the numbers that were given of it."""
     given = setting.numbers
     known = KINDS[setting.kind] | SEGMENT_RATIOS
     words = [f"{_plain(name)} {given[name]:g} {known[name].unit}" for name in known if name in given]

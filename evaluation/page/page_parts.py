@@ -10,7 +10,7 @@ SHARED = {"STYLE": "page.css", "DRAWING": "drawing.js"}
 
 
 def filled(name: str, texts: Mapping[str, str]) -> str:
-    """The page `name` with the shared parts, and `texts` in place of their marks."""
+    """Return the page `name` with the shared parts, and `texts` in place of their marks."""
     folder = resources.files("springfoot.evaluation.page")
     page = folder.joinpath(name).read_text(encoding="utf-8")
     for mark, file in SHARED.items():

@@ -64,8 +64,11 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
     if not standing.any():
         return _end(recording, told)
     upright = episodes_of(recording, standing)
-    gait, body = measure(upright), body_of(recording.settings)
-    strides, times, lengths = [], [], []
+    gait = measure(upright)
+    body = body_of(recording.settings)
+    strides = []
+    times = []
+    lengths = []
     for episode, ticks in enumerate(upright.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in upright.series.items()}
         begin, _, end = strides_within(foot_contacts(series, body)[0], (WARM_UP, np.inf)).T
@@ -74,7 +77,9 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
         found = sample(drawn, at, TICK, TICK)
         length = found[:, -1, 0] - found[:, 0, 0]
         found[..., 0] -= found[:, :1, 0] + length[:, None] * np.linspace(0, 1, MOMENTS)
-        strides, times, lengths = [*strides, *found], [*times, *(end - begin)], [*lengths, *length]
+        strides = [*strides, *found]
+        times = [*times, *(end - begin)]
+        lengths = [*lengths, *length]
     if not (strides and all(foot.count for foot in gait.feet)):
         return _end(recording, told)
     curves = [foot.mean(column)[:: 100 // (MOMENTS - 1)] for column, _, _ in PANELS.values() for foot in gait.feet]
@@ -92,7 +97,7 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
 
 
 def episodes_of(recording: Recording, rows: NDArray) -> Recording:
-    """Some episodes of a recording."""
+    """Return some episodes of a recording."""
     named = {name: getattr(recording, name)[rows] for name in ("ticks", "returns", "fall_reason")}
     return replace(recording, **named, series={name: values[rows] for name, values in recording.series.items()})
 
@@ -114,7 +119,7 @@ def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], ND
 
 
 def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body) -> NDArray:
-    """(T, 26) columns of `BODY_PARTS`.
+    """Return (T, 26) columns of `BODY_PARTS`.
 
     Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP, forward of the hip; forces in body weights;
     `up` times where it acts forward of the hip, 0 without a force; K.
@@ -138,10 +143,11 @@ def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body)
 
 
 def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
-    """All series of a page as text: `low` and `high` of each column, and whole numbers between them."""
+    """Return all series of a page as text: `low` and `high` of each column, and whole numbers between them."""
     values = np.stack(walks)
     values = np.where(values < LOCK.stiffness, values, 0.0)  # of a locked joint no K is drawn
-    low, high = values.min(axis=(0, 1)), values.max(axis=(0, 1))
+    low = values.min(axis=(0, 1))
+    high = values.max(axis=(0, 1))
     share = (values - low) / np.where(high > low, high - low, 1.0)
     whole = np.round(share * LARGEST).astype("<u2")
     return {
@@ -155,7 +161,8 @@ def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
 
 def people_behind(recording: Recording) -> dict[str, Any]:
     """People's mean and SD behind each panel, over percent of the stride, and their toe-off [%]."""
-    human, phase = reference_gait(recording.settings), PERCENT / 100
+    human = reference_gait(recording.settings)
+    phase = PERCENT / 100
     curves = {}
     for title, (_, unit, name) in PANELS.items():
         if name is None:

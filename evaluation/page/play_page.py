@@ -36,7 +36,7 @@ class PlayPage(NamedTuple):
 
 
 def play_page(grid: Grid, recordings: Sequence[Recording], what: str, made: str) -> PlayPage:
-    """The page of `recordings`, one for each combination of `grid` in its order.
+    """Return the page of `recordings`, one for each combination of `grid` in its order.
 
     `what` was recorded, in a sentence; `made` says how.
     """

@@ -68,11 +68,14 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     environment = metrics["environment"]
     people = people_metrics(reference_gait(settings_from(**environment)))
     judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
-    falls, episodes = metrics["falls"], metrics["episodes"]
+    falls = metrics["falls"]
+    episodes = metrics["episodes"]
     reasons = ", ".join(f"{count} × {reason}" for reason, count in metrics["fall_reasons"].items())
     counted = f"{episodes} episode{'s' * (episodes != 1)}"
     fell = f"Fell in {falls} of {counted}: {reasons}." if falls else f"Never fell in {counted}."
-    joints, grf, work = metrics["joints"], metrics["grf"], metrics["joint_work_J_kg"]["ankle"]
+    joints = metrics["joints"]
+    grf = metrics["grf"]
+    work = metrics["joint_work_J_kg"]["ankle"]
     said = {"Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s."}
     if metrics["strides"]["count"] == 0:
         return said | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}

@@ -39,7 +39,7 @@ SAME_K = 1e-9
 
 
 def deciding_legs(settings: BipedSettings) -> list[int]:
-    """The sides whose springs follow the policy's stiffness at ankle and toe; in others either is a device."""
+    """Return the sides whose springs follow the policy's stiffness at ankle and toe; in others either is a device."""
     return [side for side, foot in enumerate(settings.feet) if not any(joint.device for joint in foot.joints)]
 
 
@@ -67,10 +67,14 @@ def decided(
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """(MEAN_KNOTS, C) periodic curve, linear between knots, of least squares from `values` (n, C) at `phase` (n,)."""
-    normal, circle = np.zeros((MEAN_KNOTS, MEAN_KNOTS)), np.arange(MEAN_KNOTS)
+    """Return (MEAN_KNOTS, C) periodic curve, linear between knots, of least squares from `values` (n, C) at `phase`
+    (n,).
+    """
+    normal = np.zeros((MEAN_KNOTS, MEAN_KNOTS))
+    circle = np.arange(MEAN_KNOTS)
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
-    following, way = (knot + 1) % MEAN_KNOTS, phase * MEAN_KNOTS - knot
+    following = (knot + 1) % MEAN_KNOTS
+    way = phase * MEAN_KNOTS - knot
     normal[circle, circle] = np.bincount(knot, (1 - way) ** 2, MEAN_KNOTS) + np.bincount(following, way**2, MEAN_KNOTS)
     beside = np.bincount(knot, (1 - way) * way, MEAN_KNOTS)
     normal[circle, (circle + 1) % MEAN_KNOTS] = beside
@@ -110,7 +114,7 @@ def open_loop_copy(
     threads: int = 2,
     watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """A policy's mean K over the stride as a policy, and its environment: `settings` with absolute actions.
+    """Return a policy's mean K over the stride as a policy, and its environment: `settings` with absolute actions.
 
     Args:
         policy: observations to actions.

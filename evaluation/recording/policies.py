@@ -39,7 +39,7 @@ def prepare(
     threads: int = 2,
     watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """A policy by name and the environment it is evaluated in.
+    """Return a policy by name and the environment it is evaluated in.
 
     Args:
         name: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, `module:function`, a
@@ -52,7 +52,8 @@ def prepare(
 
     Raises `SpringfootError` for an unknown name or a bad setting.
     """
-    wanted, kind = CONDITIONS | given, name.partition(":")[0]
+    wanted = CONDITIONS | given
+    kind = name.partition(":")[0]
     if kind == FROZEN:
         return _prepare_copy(name, given, threads, watch)
     if kind in BASELINES:
@@ -89,7 +90,7 @@ def _prepare_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) 
 
 
 def policy_label(name: str) -> str:
-    """What results call a policy: its own name, that of its run or that of its file, without folders.
+    """Return the name of a policy in results: its own, that of its run or that of its file, without folders.
 
     It names a folder inside that of the results, whatever `name` is: printable, no path, not hidden, not too long.
     """

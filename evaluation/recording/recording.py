@@ -102,7 +102,7 @@ class Recording:
         return int(standing[0]) if len(standing) else int(np.argmax(self.ticks))
 
     def shown(self) -> dict[str, NDArray]:
-        """Name -> (T, ...) float64 series of the `example`, without the samples after its end."""
+        """Return name -> (T, ...) float64 series of the `example`, without the samples after its end."""
         episode = self.example
         return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
 
@@ -122,7 +122,8 @@ class Recording:
 
 
 def load_recording(path: str | Path) -> Recording:
-    """The recording in a `strides.npz`; raises `SpringfootError` for any other file, and for one of another version."""
+    """Return the recording in a `strides.npz`; raise `SpringfootError` for any other file, and for one of another
+    version."""
     header, arrays = read_arrays(Path(path), "strides.npz written by evaluate.py")
     try:
         if missing := [name for name in ("plan_zmp", *SERIES, REWARD) if name not in arrays]:

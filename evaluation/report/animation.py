@@ -28,10 +28,18 @@ LONGEST = 3.0
 FORCE_LENGTH = 0.55
 """Length of an arrow of one body weight [m at 1.70 m]."""
 
-PAPER, INK, FAINT, GROUND = (255, 255, 255), (34, 34, 34), (140, 140, 140), (244, 246, 247)
-TRUNK, NEAR, FAR = (64, 78, 92), (11, 110, 143), (158, 196, 209)
-FORCE, FAR_FORCE, PLAN = (226, 88, 34), (243, 178, 145), (209, 73, 91)
-SOFT, STIFF = np.array([255, 236, 179]), np.array([122, 18, 60])
+PAPER = (255, 255, 255)
+INK = (34, 34, 34)
+FAINT = (140, 140, 140)
+GROUND = (244, 246, 247)
+TRUNK = (64, 78, 92)
+NEAR = (11, 110, 143)
+FAR = (158, 196, 209)
+FORCE = (226, 88, 34)
+FAR_FORCE = (243, 178, 145)
+PLAN = (209, 73, 91)
+SOFT = np.array([255, 236, 179])
+STIFF = np.array([122, 18, 60])
 
 
 def save_animation(path: Path, recording: Recording) -> None:
@@ -64,7 +72,8 @@ class _Canvas:
     """Draws one frame after another, world metres to pixels, by a camera that moves at the walk's mean speed."""
 
     def __init__(self, body: Body, series: dict[str, NDArray], recording: Recording):
-        self._body, self._series = body, series
+        self._body = body
+        self._series = series
         self._scale = OVERSAMPLING * SIZE[1] / (1.30 * body.height)
         self._floor = OVERSAMPLING * SIZE[1] * 0.865
         ticks = np.arange(len(series["com"]))
@@ -83,7 +92,8 @@ class _Canvas:
 
     def frame(self, tick: int) -> Image.Image:
         image = Image.new("RGB", (OVERSAMPLING * SIZE[0], OVERSAMPLING * SIZE[1]), PAPER)
-        self._draw, self._tick = ImageDraw.Draw(image), tick
+        self._draw = ImageDraw.Draw(image)
+        self._tick = tick
         self._ground()
         self._leg(RIGHT, FAR)
         self._force(RIGHT, FAR_FORCE)
@@ -106,14 +116,15 @@ class _Canvas:
         self._draw.ellipse((x - r, y - r, x + r, y + r), **style)
 
     def _capsule(self, start: NDArray, end: NDArray, radius: float, colour: tuple) -> None:
-        """A round-ended line, `radius` in metres."""
+        """Return a round-ended line, `radius` in metres."""
         width = max(1, round(2 * radius * self._scale))
         self._draw.line([self._pixel(start), self._pixel(end)], fill=colour, width=width)
         self._disc(start, radius, fill=colour)
         self._disc(end, radius, fill=colour)
 
     def _ground(self) -> None:
-        width, height = OVERSAMPLING * SIZE[0], OVERSAMPLING * SIZE[1]
+        width = OVERSAMPLING * SIZE[0]
+        height = OVERSAMPLING * SIZE[1]
         self._draw.rectangle((0, self._floor, width, height), fill=GROUND)
         self._draw.line((0, self._floor, width, self._floor), fill=FAINT, width=OVERSAMPLING)
         reach = 0.5 * width / self._scale
@@ -126,7 +137,9 @@ class _Canvas:
                 self._text((x, self._floor + 13 * OVERSAMPLING), f"{mark // 4} m", 11, FAINT, "ma")
 
     def _trunk(self) -> None:
-        hip, pitch, size = self._at("base")[:2], self._at("base")[2], self._body.length_scale
+        hip = self._at("base")[:2]
+        pitch = self._at("base")[2]
+        size = self._body.length_scale
         along = np.array([np.sin(pitch), np.cos(pitch)])
         shoulder = hip + self._body.trunk_length * along
         self._capsule(hip + 0.02 * size * along, shoulder - 0.05 * size * along, 0.058 * size, TRUNK)
@@ -134,7 +147,8 @@ class _Canvas:
         self._disc(shoulder + 0.165 * size * along, 0.095 * size, fill=TRUNK)
 
     def _leg(self, side: int, colour: tuple) -> None:
-        body, size = self._body, self._body.length_scale
+        body = self._body
+        size = self._body.length_scale
         angle = self._at("angle")[side]
         thigh = angle[HIP] - self._at("base")[2]
         shank = thigh - angle[KNEE]
@@ -169,16 +183,20 @@ class _Canvas:
         return int(red), int(green), int(blue)
 
     def _force(self, side: int, colour: tuple) -> None:
-        force, contact = self._at("force")[side], self._at("contact")[side]
+        force = self._at("force")[side]
+        contact = self._at("contact")[side]
         vertical = force[:, 1].sum()
         weight = self._body.mass * GRAVITY
         if vertical < CONTACT_THRESHOLD_BW * weight:
             return
         foot = np.array([(force[:, 1] * contact[:, 0]).sum() / vertical, 0.0])
         arrow = force.sum(axis=0) / weight * FORCE_LENGTH * self._body.length_scale
-        end, length = foot + arrow, np.hypot(*arrow)
-        along, head = arrow / length, min(0.07 * self._body.length_scale, length)
-        across, neck = np.array([-along[1], along[0]]), end - head * along
+        end = foot + arrow
+        length = np.hypot(*arrow)
+        along = arrow / length
+        head = min(0.07 * self._body.length_scale, length)
+        across = np.array([-along[1], along[0]])
+        neck = end - head * along
         line = round(0.016 * self._body.length_scale * self._scale)
         self._draw.line([self._pixel(foot), self._pixel(neck)], fill=colour, width=line)
         corners = [end, neck + 0.4 * head * across, neck - 0.4 * head * across]
@@ -195,7 +213,8 @@ class _Canvas:
         self._text((14 * unit, 10 * unit), self._title, 15, INK, "la")
         self._text((14 * unit, 31 * unit), self._subtitle, 11, FAINT, "la")
         y = (height - 12) * unit
-        draw, x = self._draw, 14 * unit
+        draw = self._draw
+        x = 14 * unit
         draw.ellipse((x, y - 4 * unit, x + 8 * unit, y + 4 * unit), fill=PAPER, outline=INK, width=unit)
         self._text((x + 13 * unit, y), "CoM", 11, FAINT, "lm")
         x += 48 * unit
@@ -216,7 +235,7 @@ class _Canvas:
 
 
 def _palette() -> Image.Image:
-    """One palette for all frames: every colour drawn, and its blends with the paper where edges are smoothed."""
+    """Return one palette for all frames: every colour drawn, and its blends with the paper where edges are smoothed."""
     drawn = np.array([INK, FAINT, TRUNK, NEAR, FAR, FORCE, FAR_FORCE, PLAN], float)
     drawn = np.concatenate([drawn, SOFT + np.linspace(0, 1, 24)[:, None] * (STIFF - SOFT)])
     share = np.linspace(0, 1, 7)[:-1, None, None]  # the last blend is the paper itself
@@ -227,6 +246,6 @@ def _palette() -> Image.Image:
 
 
 def _turned(offset: tuple[float, float], angle: float) -> NDArray:
-    """An offset (forward, up) in a segment's frame, in the world; toes-up positive."""
+    """Return an offset (forward, up) in a segment's frame, in the world; toes-up positive."""
     forward, up = offset
     return np.array([forward * np.cos(angle) - up * np.sin(angle), forward * np.sin(angle) + up * np.cos(angle)])

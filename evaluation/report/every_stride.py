@@ -38,8 +38,8 @@ def write_every_stride(folder: Path, recording: Recording) -> None:
 
 
 def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]]:
-    """The strides that the mean curves are of, in their order: which one (`STRIDE_KEYS` without percent), and its
-    curves (101, C) as float32 in the order of `GAIT_CYCLE_COLUMNS`."""
+    """Return the strides that the mean curves are of, in their order: which one (`STRIDE_KEYS` without percent), and
+    its curves (101, C) as float32 in the order of `GAIT_CYCLE_COLUMNS`."""
     body = body_of(recording.settings)
     begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks.tolist()):

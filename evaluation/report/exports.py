@@ -53,16 +53,19 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
     Each foot's force acts at its centre of pressure on the mean ground, about which it has no moment; a foot that
     bears nothing has it below its ankle.
     """
-    series, slope = recording.shown(), _slope(recording.settings)
+    series = recording.shown()
+    slope = _slope(recording.settings)
     columns = {"time": TICK * (np.arange(len(series["base"])) + 0.5)}
     for side, name in enumerate(SIDES):
-        force, place = series["force"][:, side], mid_tick(series["contact"][:, side, :, 0])
+        force = series["force"][:, side]
+        place = mid_tick(series["contact"][:, side, :, 0])
         pressing = force[..., 1] - slope * force[..., 0]  # times the slope's cosine: what presses on the ground
         total = pressing.sum(axis=1)
         loaded = total > 0.0
         centre = (pressing * place).sum(axis=1) / np.where(loaded, total, 1.0)
         centre = np.where(loaded, centre, mid_tick(series["ankle"][:, side, 0]))
-        zero, start = np.zeros(len(centre)), f"ground_force_{name[0]}"
+        zero = np.zeros(len(centre))
+        start = f"ground_force_{name[0]}"
         columns |= {f"{start}_vx": force[..., 0].sum(axis=1), f"{start}_vy": force[..., 1].sum(axis=1)}
         columns |= {f"{start}_vz": zero, f"{start}_px": centre, f"{start}_py": slope * centre, f"{start}_pz": zero}
         columns |= {f"ground_torque_{name[0]}_{axis}": zero for axis in "xyz"}
@@ -74,14 +77,15 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
 
 def write_model(path: Path, recording: Recording) -> None:
     """Write the body as MJCF: its key `walk` is the first posture recorded, its ground has the walk's slope."""
-    spec, walk = sloping_spec(recording), postures(recording)
+    spec = sloping_spec(recording)
+    walk = postures(recording)
     if len(walk):
         spec.add_key(name="walk", qpos=walk[0].tolist())
     path.write_text(model_text(spec), encoding="utf-8")
 
 
 def sloping_spec(recording: Recording) -> MjSpec:
-    """The model's specification of the recorded body and feet, its ground with the walk's slope."""
+    """Return the model's specification of the recorded body and feet, its ground with the walk's slope."""
     settings = recording.settings
     spec = build_spec(body_of(settings), settings.friction, settings.feet)
     half = radians(settings.slope_deg) / 2
@@ -91,7 +95,7 @@ def sloping_spec(recording: Recording) -> MjSpec:
 
 
 def postures(recording: Recording) -> NDArray:
-    """(T, 11) positions of that model's joints at the end of each tick."""
+    """Return (T, 11) positions of that model's joints at the end of each tick."""
     series = recording.shown()
     x, above, pitch = series["base"].T
     place = np.stack([x, above + _slope(recording.settings) * x, pitch], axis=-1)

@@ -29,7 +29,7 @@ def require_film() -> None:
 
 
 def film_seconds(recording: Recording) -> float:
-    """How long the film is [s]."""
+    """Return how long the film is [s]."""
     return min(FILM_SECONDS, TICK * int(recording.ticks[recording.example]))
 
 
@@ -41,7 +41,8 @@ def save_film(path: Path, recording: Recording, progress: Callable[[float], obje
     require_film()
     import imageio_ffmpeg  # pyright: ignore[reportMissingImports]  # optional
 
-    model, per_second = sloping_spec(recording).compile(), round(1 / (TICK * TICKS_A_FRAME))
+    model = sloping_spec(recording).compile()
+    per_second = round(1 / (TICK * TICKS_A_FRAME))
     data = mujoco.MjData(model)
     camera = Camera(model, "rgb_array", per_second)
     try:

@@ -20,7 +20,10 @@ from ..numbers.metrics import MOMENT_CURVES, Gait
 from ..numbers.per_leg import ANGLE_COLUMNS, differ, kinds_of
 from ..recording.recording import Recording
 
-MODEL, OTHER_LEG, PLAN, PEOPLE = "#0b6e8f", "#c77800", "#d1495b", "#8a8a8a"
+MODEL = "#0b6e8f"
+OTHER_LEG = "#c77800"
+PLAN = "#d1495b"
+PEOPLE = "#8a8a8a"
 Legs = tuple[tuple[StrideCurves, str], ...]
 """What is drawn of the model: curves and their colours, both feet together or, where they differ, left and right."""
 STYLE: dict[Any, Any] = {
@@ -43,7 +46,8 @@ STYLE: dict[Any, Any] = {
 
 def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
     """Write the picture: angles, moments, forces, CoM and stiffness, people's mean ± SD behind each."""
-    settings, metrics = recording.settings, gait.metrics
+    settings = recording.settings
+    metrics = gait.metrics
     human = reference_gait(settings)
     legs: Legs = ((gait.both, MODEL),)
     if differ(settings):
@@ -111,7 +115,8 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
         error = numbers[f"{name}_rmse_m"]
         _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", numbers["z_r"] if name == "z" else None)
     low, high = axes[1].get_ylim()
-    middle, half = (low + high) / 2, max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
+    middle = (low + high) / 2
+    half = max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
     axes[1].set_ylim(middle - half, middle + half)
 
 
@@ -138,7 +143,8 @@ def _people(ax: Axes, mean: NDArray, sd: NDArray) -> None:
 
 def _model(ax: Axes, legs: Legs, name: str) -> None:
     for curves, colour in legs:
-        mean, sd = curves.mean(name), curves.sd(name)
+        mean = curves.mean(name)
+        sd = curves.sd(name)
         ax.fill_between(PERCENT, mean - sd, mean + sd, color=colour, alpha=0.22, lw=0)
         ax.plot(PERCENT, mean, color=colour, lw=1.8)
 
@@ -160,7 +166,8 @@ def _stride_axis(ax: Axes, toe_off: float | None, people_toe_off: float) -> None
 
 
 def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) -> None:
-    settings, metrics = recording.settings, gait.metrics
+    settings = recording.settings
+    metrics = gait.metrics
     falls = f"{metrics['falls']} fall{'s' * (metrics['falls'] != 1)}"
     figure.suptitle(
         f"{recording.policy}    {settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s commanded    "

@@ -21,7 +21,8 @@ from springfoot.gait.people.cycle import PERCENT
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
     """Print the evaluation as a table, people beside the model; plain text where the output is no terminal."""
     console = console or Console(highlight=False)
-    environment, people = metrics["environment"], metrics["reference"]
+    environment = metrics["environment"]
+    people = metrics["reference"]
     pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
     console.print(
         f"\n[bold]{escape(metrics['policy'])}[/] on {environment['height']:g} m, {environment['mass']:g} kg, "
@@ -62,7 +63,7 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
 
 
 def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
-    """The legs beside each other, where their feet differ; a foot's name may take two lines."""
+    """Return the legs beside each other, where their feet differ; a foot's name may take two lines."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     for name in ("each leg",) if narrow else ("each leg", ""):
         table.add_column(name, no_wrap=not narrow)
@@ -74,7 +75,7 @@ def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
 
 
 def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """What, unit, left and right leg; nothing where the feet are the same."""
+    """Return quantity, unit, left and right leg; nothing where the feet are the same."""
     if metrics["per_leg"] is None:
         return []
     legs = metrics["per_leg"].values()
@@ -100,7 +101,7 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
 
 
 def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
-    """The rows of the table."""
+    """Return the rows of the table."""
     return [row for section in _sections(metrics) for row in section]
 
 
@@ -123,10 +124,13 @@ TableRow = tuple[str, str, str, str, str, str]
 
 
 def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
-    """The table's rows, in groups."""
+    """Return the table's rows, in groups."""
     people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
-    grf, their_grf, com = metrics["grf"], people["grf"], metrics["com"]
-    zmp, rest = metrics["zmp"], metrics["came_to_rest"]
+    grf = metrics["grf"]
+    their_grf = people["grf"]
+    com = metrics["com"]
+    zmp = metrics["zmp"]
+    rest = metrics["came_to_rest"]
     at_rest = [] if rest is None else [("came to rest", "", f"{rest} of {metrics['episodes']}", "", "", "")]
 
     def row(
@@ -215,7 +219,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
 
 
 def people_metrics(human: HumanGait) -> dict[str, Any]:
-    """The numbers of people, or of own data, from their mean curves; keys as in metrics.json."""
+    """Return the numbers of people, or of own data, from their mean curves; keys as in metrics.json."""
     phase = PERCENT / 100
     features = score.force_features(human.mean("grf_vertical", phase), human.mean("grf_forward", phase))
     work = {name: _people_work(human, name) for name in ("hip", "knee", "ankle")}

@@ -70,7 +70,7 @@ def _write_numbers(folder: Path, recording: Recording, gait: Gait) -> None:
 
 
 def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) -> None:
-    """One gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
+    """Return one gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
 
     The leading columns repeat the whole gait's values on each row, as in the reference data.
     """

@@ -32,7 +32,8 @@ STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "l
 def write_schedules(folder: Path, recording: Recording) -> None:
     """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`."""
     curves = schedule_curves(recording)
-    settings, body = recording.settings, body_of(recording.settings)
+    settings = recording.settings
+    body = body_of(recording.settings)
     whose = {
         "policy": recording.policy,
         "height_m": body.height,
@@ -92,7 +93,9 @@ def finite_states(recording: Recording) -> dict[str, Any]:
     begin at the gait events of the walk that the body is held to (`gait_events`), the inner ones half-way between two.
     Raises `SpringfootError` where both feet have a device.
     """
-    settings, body, legs = recording.settings, body_of(recording.settings), deciding_legs(recording.settings)
+    settings = recording.settings
+    body = body_of(recording.settings)
+    legs = deciding_legs(recording.settings)
     if not legs:
         raise SpringfootError("a table of finite states needs a foot without a device")
     strike, flat, heel_off, toe_off = gait_events(reference_gait(settings))
@@ -105,7 +108,8 @@ def finite_states(recording: Recording) -> dict[str, Any]:
     walked = np.isfinite(phase) & (of["stiffness"] > 0.0).all(-1).ravel()
     of |= {name: of[name][..., FEET] for name in ("angle", "velocity", "torque")}
     springs = {name: values.reshape(-1, len(SPRINGS))[walked].astype(float) for name, values in of.items()}
-    phase, beta = phase[walked] % 1.0, damping_times(body)[FEET]
+    phase = phase[walked] % 1.0
+    beta = damping_times(body)[FEET]
     states = []
     for name, event, (start, stop) in zip(STATES, events, pairwise([*starts, 1.0]), strict=True):
         inside = (phase >= start) & (phase < stop)

@@ -17,11 +17,12 @@ from torch import nn
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
+ID = "springfoot.envs:SegmentedFootBiped-v0"
+TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
 
 
 def _batch(config: dict) -> gym.vector.VectorEnv:
-    """What RLlib steps: `config` is TASK and the number of environments."""
+    """Make the environment that RLlib steps: `config` is TASK and the number of environments."""
     return TransformReward(NormalizeObservation(gym.make_vec(ID, **config)), lambda reward: 0.02 * reward)
 
 
@@ -46,7 +47,8 @@ def main(out: str = "rllib.safetensors", timesteps: int = 131_072, seed: int = 0
     algorithm = ppo.build_algo()
     for _ in range(timesteps // 2048):
         algorithm.train()
-    module, seen = algorithm.get_module(), algorithm.env_runner.env.env.env.obs_rms
+    module = algorithm.get_module()
+    seen = algorithm.env_runner.env.env.env.obs_rms
     norm = {"observation_mean": seen.mean, "observation_variance": seen.var}
     layers = [
         (layer.weight, layer.bias) for layer in [*module.encoder.actor_encoder.net.mlp[::2], module.pi.net.mlp[-1]]

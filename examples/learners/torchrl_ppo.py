@@ -18,7 +18,8 @@ from torchrl.objectives.value import GAE
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
+ID = "springfoot.envs:SegmentedFootBiped-v0"
+TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
 Face = Literal["vector", "GymEnv", "GymWrapper"]
 
 

@@ -81,12 +81,12 @@ class Body:
 
     @property
     def length_scale(self) -> float:
-        """height / 1.70 m."""
+        """Height / 1.70 m."""
         return self.height / REFERENCE_HEIGHT
 
     @property
     def mass_scale(self) -> float:
-        """mass / 63 kg."""
+        """Mass / 63 kg."""
         return self.mass / REFERENCE_MASS
 
     @property

@@ -23,7 +23,8 @@ from .rockers import turned
 JOINTS = ("hip", "knee", "ankle", "toe")
 """Joints of a leg from the top; joint i holds segment i of `LEG_SEGMENTS`."""
 LEG_SEGMENTS = ("thigh", "shank", "foot", "toe")
-FOOT_SEGMENT, TOE_SEGMENT = LEG_SEGMENTS.index("foot"), LEG_SEGMENTS.index("toe")
+FOOT_SEGMENT = LEG_SEGMENTS.index("foot")
+TOE_SEGMENT = LEG_SEGMENTS.index("toe")
 
 _MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
 """Internal moment over the turning moment on the segment below, in the order of `JOINTS`."""
@@ -86,14 +87,16 @@ def segment_turns(angles: Mapping[str, ArrayLike], slope: float = 0.0) -> NDArra
 
 
 def leg_motion(angles: Mapping[str, ArrayLike], hip: ArrayLike, tick: float, slope: float = 0.0) -> LegMotion:
-    """The motion of a leg from samples every `tick` [s]: angles (T,) as in `segment_turns`, hip (T, 2) (x, z) [m].
+    """Return the motion of a leg from samples every `tick` [s]: angles (T,) as in `segment_turns`, hip (T, 2) (x, z)
+    [m].
 
     Rates and accelerations are those of the cubic splines through the samples: exact for cubics, else with an error
     of the order of tick^2, and larger in the first and last few samples. Nothing is smoothed: noise of e in the
     samples is noise of about 3 e / tick^2 in the accelerations, so filter measured data first. Raises `SpringfootError`
     for fewer than 4 samples or values that are not finite.
     """
-    turns, hips = segment_turns(angles, slope), np.asarray(hip, float)
+    turns = segment_turns(angles, slope)
+    hips = np.asarray(hip, float)
     if hips.shape != (len(turns), 2) or turns.ndim != 2:
         raise SpringfootError(
             f"angles and hip must have shapes (T,) and (T, 2), got {turns.shape[:-1]} and {hips.shape}"
@@ -145,7 +148,8 @@ def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
 
 
 def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
-    """The load of one force (..., 2) [N] at `cop` (..., 2) (x, z) [m]: ahead of the toe joint (x, [m]) it is the toe's.
+    """Return the load of one force (..., 2) [N] at `cop` (..., 2) (x, z) [m]: ahead of the toe joint (x, [m]) it is the
+    toe's.
 
     As the centre of pressure passes the joint the toe's moment starts with what the forward force has about it: its
     lever is the height of the joint.
@@ -158,7 +162,7 @@ def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
 
 
 def resultant(force: NDArray, point: NDArray) -> tuple[NDArray, NDArray]:
-    """One force (..., 2) [N] and its point (..., 2) [m] in place of several, (..., K, 2) each, on one segment.
+    """Return one force (..., 2) [N] and its point (..., 2) [m] in place of several, (..., K, 2) each, on one segment.
 
     Same force, same moment: the centre of pressure, at the mean height weighted by upward force. Without load 0, at
     the mean of the points.
@@ -198,8 +202,10 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     included (Winter 2009, section 5.1).
     """
     joints = list(joint_positions(body, motion.turn, motion.hip).values())
-    force, turning = np.zeros(motion.hip.shape), np.zeros(motion.hip.shape[:-1])
-    moments, forces = {}, {}
+    force = np.zeros(motion.hip.shape)
+    turning = np.zeros(motion.hip.shape[:-1])
+    moments = {}
+    forces = {}
     for index in reversed(range(len(LEG_SEGMENTS))):
         mass, inertia = _inertial(body)[index]
         com, acceleration = _com(body, motion, joints, index)
@@ -207,13 +213,15 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
         force = mass * (acceleration - gravity(slope)) + below[0]
         turning = inertia * motion.acceleration[..., index] + below[1]
         if index >= FOOT_SEGMENT:
-            push, point = load.force[..., index - FOOT_SEGMENT, :], load.point[..., index - FOOT_SEGMENT, :]
+            push = load.force[..., index - FOOT_SEGMENT, :]
+            point = load.point[..., index - FOOT_SEGMENT, :]
             force = force - push
             turning = turning - _cross(point - com, push)
         if index < TOE_SEGMENT:
             turning = turning + _cross(joints[index + 1] - com, below[0])
         turning = turning - _cross(joints[index] - com, force)
-        moments[JOINTS[index]], forces[JOINTS[index]] = _MOMENT_SIGN[index] * turning, force
+        moments[JOINTS[index]] = _MOMENT_SIGN[index] * turning
+        forces[JOINTS[index]] = force
     return JointLoads(moment={name: moments[name] for name in JOINTS}, force={name: forces[name] for name in JOINTS})
 
 
@@ -228,12 +236,12 @@ def _require_shapes(holder: object, last: Mapping[str, int], leading: tuple[int,
 
 
 def _cross(r: NDArray, force: NDArray) -> NDArray:
-    """r x F in the plane, positive from x towards z: the sense of a turn."""
+    """R x F in the plane, positive from x towards z: the sense of a turn."""
     return r[..., 0] * force[..., 1] - r[..., 1] * force[..., 0]
 
 
 def _far_ends(body: Body) -> tuple[tuple[float, float], ...]:
-    """The next joint (forward, up) [m] from the upper joint of thigh, shank, foot, at turn 0."""
+    """Return the next joint (forward, up) [m] from the upper joint of thigh, shank, foot, at turn 0."""
     drop = body.ankle_height - body.toe_joint_height
     return (0.0, -body.thigh_length), (0.0, -body.shank_length), (body.ankle_to_toe_joint, -drop)
 

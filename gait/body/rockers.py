@@ -10,12 +10,12 @@ from .body import Body
 
 
 def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:
-    """The vector (forward, up) of a flat foot, in a foot at `pitch`."""
+    """Return the vector (forward, up) of a flat foot, in a foot at `pitch`."""
     return forward * np.cos(pitch) - up * np.sin(pitch), forward * np.sin(pitch) + up * np.cos(pitch)
 
 
 def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float | tuple[float, float]) -> NDArray:
-    """(3, ...): 0 until `start`, then to `top` at `end`, with two phase derivatives.
+    """Return (3, ...): 0 until `start`, then to `top` at `end`, with two phase derivatives.
 
     The `shape` is a power, or the share of `top` half-way and the rate at the end over the mean rate: of a polynomial
     of 2nd to 4th order.
@@ -35,7 +35,9 @@ def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float 
 
 
 def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
-    """(3, 3, ...): x, z, pitch of an ankle whose foot turns about a point of its flat place, two phase derivatives."""
+    """Return (3, 3, ...): x, z, pitch of an ankle whose foot turns about a point of its flat place, two phase
+    derivatives.
+    """
     ankle = turning(pitch, -pivot[0], body.ankle_height - pivot[1])
     ankle[0, 0] += pivot[0]
     ankle[0, 1] += pivot[1]
@@ -43,7 +45,10 @@ def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
 
 
 def turning(pitch: NDArray, forward: float, up: float) -> NDArray:
-    """(3, 2, ...): the vector (forward, up) of a flat foot and its two phase derivatives; `pitch` (3, ...) with its."""
+    """Return (3, 2, ...): the vector (forward, up) of a flat foot and its two phase derivatives.
+
+    `pitch` (3, ...) with its.
+    """
     angle, rate, curvature = pitch
     x, z = turned(angle, forward, up)
     return np.stack([[x, z], [-z * rate, x * rate], [-z * curvature - x * rate**2, x * curvature - z * rate**2]])

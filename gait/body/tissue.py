@@ -19,7 +19,7 @@ Exp. Biol. 208 (2005) 4715-4725) at a lever of 46 mm."""
 
 
 def passive_moments(body: Body, angle: NDArray) -> NDArray:
-    """(..., 4) passive moments of hip, knee, ankle and toe [N m], extension and plantarflexion positive.
+    """Return (..., 4) passive moments of hip, knee, ankle and toe [N m], extension and plantarflexion positive.
 
     `angle` (..., 4) [rad], flexion, dorsiflexion and toe up positive; the trunk is upright. The toe has
     `TOE_STIFFNESS` and rests in line with the foot.

@@ -27,7 +27,7 @@ _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles
 
 
 def read_c3d(path: Path) -> Trial:
-    """A C3D file with Plug-in Gait output, read in this process (`c3d_process` says why to do that in another).
+    """Return a C3D file with Plug-in Gait output, read in this process (`c3d_process` says why to do that in another).
 
     It reads the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
     Model's `LHXFFA` (toe) [deg] and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg]; right with R;
@@ -44,7 +44,8 @@ def read_c3d(path: Path) -> Trial:
             file = ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError, IndexError, MemoryError) as error:
         raise SpringfootError(f"{path.name} is not a C3D file that ezc3d can read: {error}") from None
-    points, parameters = file["data"]["points"], file["parameters"]
+    points = file["data"]["points"]
+    parameters = file["parameters"]
     rate = float(file["header"]["points"]["frame_rate"])
     labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
     found = {label: points[:3, k] for k, label in enumerate(labels)}
@@ -79,7 +80,7 @@ def read_c3d(path: Path) -> Trial:
 
 
 def _refuse_broken(path: Path) -> None:
-    """Raises `SpringfootError` for a file that is not whole: ezc3d would hang, crash or make up frames.
+    """Raise `SpringfootError` for a file that is not whole: ezc3d would hang, crash or make up frames.
 
     Layout as in the C3D User Guide (c3d.org): header, a chain of parameters, the data, in blocks of 512 bytes.
     """
@@ -99,9 +100,11 @@ def _refuse_broken(path: Path) -> None:
         at = start + 4
         while length := min(data[at], 256 - data[at]):  # negative for a locked one
             link = at + 2 + length
-            content, following = link + 2, link + word(link)
+            content = link + 2
+            following = link + word(link)
             if data[at + 1] < 128:  # a parameter: type, dimensions, values; groups have negative numbers
-                size, dimensions = data[content], data[content + 2 : content + 2 + data[content + 1]]
+                size = data[content]
+                dimensions = data[content + 2 : content + 2 + data[content + 1]]
                 content += 2 + len(dimensions) + min(size, 256 - size) * prod(dimensions)
             if following == link:
                 following = end
@@ -181,7 +184,7 @@ def _per_frame(samples: NDArray, frames: int) -> NDArray:
 
 
 def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
-    """The frames between the gaps at the beginning and the end; a gap in between is refused."""
+    """Return the frames between the gaps at the beginning and the end; a gap in between is refused."""
     broken = {
         f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()
     }

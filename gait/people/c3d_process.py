@@ -21,7 +21,10 @@ _CHILD = "from springfoot.gait.people.c3d_process import main; main()"
 
 
 def c3d_trial(path: Path) -> Trial:
-    """The walk in a C3D file, as `c3d_file.read_c3d` reads it; raises `SpringfootError` for what it cannot read."""
+    """Return the walk in a C3D file, as `c3d_file.read_c3d` reads it.
+
+    Raise `SpringfootError` for what it cannot read.
+    """
     if find_spec("ezc3d") is None:
         raise SpringfootError(f"{path.name}: reading C3D needs ezc3d; install springfoot[c3d]")
     said = in_process(_CHILD, str(existing(path).absolute()))
@@ -54,7 +57,7 @@ def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
 
 
 def main() -> None:
-    """The child: read the file that the command line names, write what is in it to standard output."""
+    """Run the child: read the file that the command line names, write its numbers to standard output."""
     import ezc3d  # noqa: F401  # before the bounds
 
     from .c3d_file import read_c3d
@@ -72,10 +75,12 @@ def main() -> None:
         for side, events in trial.contacts.items():
             arrays |= {f"contacts/{side}/{name}": getattr(events, name) for name in ("heel_strikes", "toe_offs")}
     except SpringfootError as error:
-        header, arrays = {"error": str(error)}, {}
+        header = {"error": str(error)}
+        arrays = {}
     except Exception as error:  # whatever a damaged file makes of ezc3d's answers
         what = f"{Path(sys.argv[1]).name} is not a C3D file, or it is damaged"
-        header, arrays = {"error": f"{what}: {type(error).__name__}: {quoted(str(error))}"}, {}
+        header = {"error": f"{what}: {type(error).__name__}: {quoted(str(error))}"}
+        arrays = {}
     with os.fdopen(out, "wb") as file:
         buffer = io.BytesIO()
         np.savez(buffer, header=np.array(json.dumps(header)), **dict[str, Any](arrays))

@@ -128,7 +128,7 @@ def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | N
 
 
 def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
-    """What is seen and guessed, the surest first; `usual` has all of people's curves."""
+    """Return guesses of the fault, the surest first; `usual` has all of people's curves."""
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
             f"the knee is at {np.degrees(mean['knee']).mean():.0f} deg on the average: the angle between thigh and "
@@ -184,14 +184,14 @@ def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
 
 
 def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
-    """Whether there are walks in which the curve hardly moves: not if all of its kind do so, as in a wrong unit."""
+    """Return whether the curve hardly moves in some walks; not if all of its kind do so, as in a wrong unit."""
     rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < CURVE_LIMITS["ankle"].least
     others = [size >= CURVE_LIMITS[each].least for each, size in sizes.items() if _kind(each) == _kind(curve)]
     return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
 
 
 def _unit(kind: str, size: float) -> str:
-    """The unit that makes a curve so many times as large, if there is one."""
+    """Return the unit that makes a curve so many times as large, if there is one."""
     factors = MISTAKEN_UNITS[kind]
     unit = min(factors, key=lambda each: abs(np.log(size / factors[each])))
     near = abs(np.log(size / factors[unit])) < np.log(NEAR_UNIT)
@@ -223,11 +223,12 @@ def _as_written(curve: str, values: NDArray) -> tuple[float, float]:
 
 
 def _at_another_time(late: Curves, backward: Curves) -> Iterator[str]:
-    """The shift, or the running backward, by which every curve comes nearer to people's."""
+    """Return the shift, or the running backward, by which every curve comes nearer to people's."""
     if len(late) < 2:
         return
     present = np.array([[each[0]] for each in late.values()])
-    shifted, reversed_ = np.array([*late.values()]) - present, np.array([*backward.values()]) - present
+    shifted = np.array([*late.values()]) - present
+    reversed_ = np.array([*backward.values()]) - present
     best = LEAST_SHIFT + int(shifted.sum(axis=0)[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
     forward = shifted[:, best].min() > SHIFT_GAIN
     turn = int(reversed_.sum(axis=0).argmax())
@@ -246,7 +247,7 @@ _OPPOSITE = ": opposite"
 
 
 def _guess(curve: str, values: NDArray, usual: Curves, late: NDArray, backward: float) -> str:
-    """What would make a curve most like people's."""
+    """Return the change that makes a curve most like people's."""
     at = LEAST_SHIFT + int(late[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
     others = [each for each in usual if each != curve and _kind(each) == _kind(curve)]
     like = {each: _likeness(values, usual[each])[0] for each in others}
@@ -261,7 +262,7 @@ def _guess(curve: str, values: NDArray, usual: Curves, late: NDArray, backward: 
 
 
 def _unborne(mean: Curves) -> Iterator[str]:
-    """Forces that bear no body, and an ankle moment that is not theirs times a foot's lever."""
+    """Refuse forces that bear no body, and an ankle moment that is not theirs times a foot's lever."""
     if "grf_vertical" not in mean:
         return
     force, (least, most), (nearest, farthest) = mean["grf_vertical"], BORNE, LEVERS
@@ -271,7 +272,8 @@ def _unborne(mean: Curves) -> Iterator[str]:
         yield f"{COLUMNS['grf_vertical']} is {borne:.2g} on the average, where each foot bears half of 1: {guess}"
     if "ankle_moment" not in mean:
         return
-    peak, column = int(mean["ankle_moment"].argmax()), COLUMNS["ankle_moment"]
+    peak = int(mean["ankle_moment"].argmax())
+    column = COLUMNS["ankle_moment"]
     lever = float(mean["ankle_moment"][peak] / (GRAVITY * max(force[peak], LEAST_LOAD)))
     if force[peak] < LEAST_LOAD:
         yield (
@@ -287,14 +289,14 @@ def _unborne(mean: Curves) -> Iterator[str]:
 
 
 def _likeness(values: NDArray, usual: NDArray) -> NDArray:
-    """(100,) correlation with `usual` of the curve moved earlier by 0 to 99 % of the stride."""
+    """Return (100,) correlation with `usual` of the curve moved earlier by 0 to 99 % of the stride."""
     one, other = (each[:-1] - each[:-1].mean() for each in (values, usual))
     scale = float(np.sqrt((one @ one) * (other @ other))) or 1.0
     return np.fft.irfft(np.fft.rfft(one) * np.conj(np.fft.rfft(other)), len(one)) / scale
 
 
 def _sign(curve: str) -> str:
-    """What must be positive."""
+    """Return the names of the numbers that must be positive."""
     positive = {"knee_moment": "extension", "hip_moment": "extension", "ankle_moment": "plantarflexion"}
     positive |= {"ankle": "dorsiflexion", "toe": "toe-up", "grf_vertical": "up", "grf_forward": "forward"}
     default = "generation" if curve.endswith("power") else "flexion"

@@ -32,7 +32,8 @@ class Contacts:
 
     def strides(self, after: float = 0.0) -> NDArray:
         """Complete strides that begin at or after `after` [s]: (S, 3) heel strike, toe-off, next heel strike [s]."""
-        begin, end = self.heel_strikes[:-1], self.heel_strikes[1:]
+        begin = self.heel_strikes[:-1]
+        end = self.heel_strikes[1:]
         toe_off = next_after(self.toe_offs, begin)
         keep = (begin >= after) & (toe_off < end)
         return np.stack([begin, toe_off, end], -1)[keep]
@@ -59,7 +60,7 @@ def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first:
 
 
 def find_steps(left: Contacts, right: Contacts, after: float = 0.0) -> tuple[NDArray, NDArray]:
-    """Steps: from a heel strike to the next one, where that is the other foot's.
+    """Return steps: from a heel strike to the next one, where that is the other foot's.
 
     Returns times (P, 2) of both heel strikes [s] and the side (P,) of the first, 0 left, 1 right. Only steps that
     begin at or after `after` [s].
@@ -67,7 +68,8 @@ def find_steps(left: Contacts, right: Contacts, after: float = 0.0) -> tuple[NDA
     times = np.concatenate([left.heel_strikes, right.heel_strikes])
     sides = np.repeat([0, 1], [len(left.heel_strikes), len(right.heel_strikes)])
     order = np.argsort(times, kind="stable")
-    times, sides = times[order], sides[order]
+    times = times[order]
+    sides = sides[order]
     keep = (sides[:-1] != sides[1:]) & (times[:-1] >= after)
     return np.stack([times[:-1], times[1:]], -1)[keep], sides[:-1][keep]
 
@@ -96,7 +98,10 @@ def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first
 
 
 def _without_short_runs(flags: NDArray, value: bool, shortest: float) -> NDArray:
-    """`flags` with inner runs of `value` that are shorter than `shortest` samples inverted; runs at the ends stay."""
+    """Return `flags` with inner runs of `value` that are shorter than `shortest` samples inverted.
+
+    Runs at the ends stay.
+    """
     edges = np.flatnonzero(flags[:-1] != flags[1:]) + 1
     bounds = np.concatenate([[0], edges, [len(flags)]])
     result = flags.copy()

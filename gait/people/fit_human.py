@@ -44,11 +44,12 @@ COP_SOURCE = (
 
 
 def fit(reference: Path) -> dict:
-    """The series of every curve, as `human.py` reads them, from the CSV files in folder `reference`."""
+    """Return the series of every curve, as `human.py` reads them, from the CSV files in folder `reference`."""
     rows = _read(reference / "human_gait.csv")
     toe_rows = _read(reference / "human_mtp.csv")
     names = sorted({row["condition"] for row in rows}, key=lambda name: float(_of(rows, name)[0]["speed_m_s"]))
-    conditions, table = [], {"mean": {}, "sd": {}}
+    conditions = []
+    table = {"mean": {}, "sd": {}}
     for condition in names:
         own = _of(rows, condition)
         keys = ("speed_m_s", "stride_time_s", "step_length_m", "toe_off_percent")

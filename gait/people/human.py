@@ -110,11 +110,11 @@ class HumanGait:
         return self._evaluate(self.mean_series, name, phase)
 
     def sd(self, name: str, phase: ArrayLike) -> NDArray:
-        """Standard deviation over the subjects' trials of curve `name`, never negative; units as the mean."""
+        """Return standard deviation over the subjects' trials of curve `name`, never negative; units as the mean."""
         return np.maximum(self._evaluate(self.sd_series, name, phase), 0.0)
 
     def rate(self, name: str, phase: ArrayLike) -> NDArray:
-        """Derivative of the mean curve to phase (units per stride); divide by the stride time for per second."""
+        """Return derivative of the mean curve to phase (units per stride); divide by the stride time for per second."""
         return self._evaluate(self.mean_series, name, phase, derivative=True)
 
     def _evaluate(self, series: Curves, name: str, phase: ArrayLike, derivative: bool = False) -> NDArray:
@@ -141,7 +141,8 @@ def fourier_series(values: NDArray) -> list[list[float]]:
     turn = 2 * np.pi * np.outer(phase, np.arange(HARMONICS + 1))
     basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])
     solution = np.linalg.lstsq(basis, values, rcond=None)[0]
-    real, imaginary = solution[: HARMONICS + 1], np.concatenate([[0.0], solution[HARMONICS + 1 :]])
+    real = solution[: HARMONICS + 1]
+    imaginary = np.concatenate([[0.0], solution[HARMONICS + 1 :]])
     return np.round(np.stack([real, imaginary], -1), DIGITS).tolist()
 
 
@@ -196,7 +197,7 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Pat
 
 @cache
 def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
-    """What the foot's springs take of the file of `people`."""
+    """Return the entries of the file of `people` that the foot's springs take."""
     foot = harmonics(people)["foot"]
     phases = {name: tuple(foot[name]) for name in ("plateaus", "ankle_quasi_stiffness", "toe_flat", "toe_off")}
     return FootHabits(**phases, toe_swing_deg=foot["toe_swing_deg"])
@@ -216,7 +217,7 @@ def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDAr
 
 @cache
 def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
-    """A file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
+    """Return a file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
     try:
         table = json.loads(read_bytes(Path(people), MOST_JSON_BYTES))
         for kind in ("mean", "sd"):

@@ -28,7 +28,8 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
 
 
 def _bears_downward(force: NDArray) -> bool:
-    """Whether a vertical force (T,) is that of a walk upside down: below 0 for a good part of the time, and not always.
+    """Return whether a vertical force (T,) is that of a walk upside down: below 0 for a good part of the time, and not
+    always.
 
     A plate that nobody trod on shows noise, or an offset.
     """

@@ -54,7 +54,7 @@ class Trial:
 
 
 def csv_trial(table: Table) -> Trial:
-    """A walk over time: a column `time_s`, curves as in `COLUMNS`, with `_left` or `_right` behind for two legs."""
+    """Return a walk over time: column `time_s`, curves as in `COLUMNS`, `_left` or `_right` behind for two legs."""
     time = next((name for name in TIME_COLUMNS if name in table.columns), None)
     if time is None:
         raise SpringfootError(
@@ -86,13 +86,14 @@ _OPENSIM_FORCE = {
 
 
 def opensim_trial(path: Path) -> Trial:
-    """An OpenSim motion or storage file: header with `inDegrees`, `endheader`, column names, rows.
+    """Return an OpenSim motion or storage file: header with `inDegrees`, `endheader`, column names, rows.
 
     Angles `hip_flexion_r`, `knee_angle_r`, `ankle_angle_r`, `mtp_angle_r`, `pelvis_tilt` (also as the paths of OpenSim
     4, `/jointset/.../value`), the same with `_moment` behind [N m], forces `ground_force_vx` (forward), `_vy` (up) [N],
     right; left as `_l`, and forces as `1_ground_force_v*`, `ground_force_2_v*` or `ground_force_l_v*`.
     """
-    lines, header = text_lines(path), []
+    lines = text_lines(path)
+    header = []
     for line in islice(lines, LONGEST_HEADER):
         if line.strip().lower() == "endheader":
             break
@@ -144,7 +145,7 @@ def opensim_trial(path: Path) -> Trial:
 
 
 def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:
-    """The legs of which anything was measured; `SpringfootError` if there is none."""
+    """Return the legs of which anything was measured; `SpringfootError` if there is none."""
     legs = {side: curves for side, curves in legs.items() if curves}
     if not legs:
         raise SpringfootError(
@@ -159,7 +160,7 @@ def _split(line: str) -> list[str]:
 
 
 def refuse_absurd(name: str, curves: Mapping[str, NDArray]) -> None:
-    """Raises `SpringfootError` for angles [rad] that no leg has."""
+    """Raise `SpringfootError` for angles [rad] that no leg has."""
     for joint in ("thigh", "hip", "knee", "ankle", "toe"):
         if joint in curves and (largest := np.abs(curves[joint]).max()) > np.pi:
             raise SpringfootError(f"{name}: the {joint} reaches {np.degrees(largest):.0f} deg; degrees or radians?")

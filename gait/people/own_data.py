@@ -37,7 +37,8 @@ COMFORTABLE_SPEED = 1.2
 SPEEDS_APART = 1.4
 """Largest factor between a file's speed and that of its step length and stride time; chosen. Who limps here has
 steps of one foot that make 1.21, and mistakes make 2."""
-_MOST_COEFFICIENTS, _LARGEST = 64, 1e3
+_MOST_COEFFICIENTS = 64
+_LARGEST = 1e3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +66,7 @@ class OwnGait:
         return isinstance(other, OwnGait) and self.to_json() == other.to_json()
 
     def gait(self, speed: float, height: float, people: str | Path = PEOPLE_FILE) -> HumanGait:
-        """These curves as a `HumanGait`; what is missing is that of `people` of `height` [m] at `speed` [m/s].
+        """Return these curves as a `HumanGait`; what is missing is that of `people` of `height` [m] at `speed` [m/s].
 
         They are taken as they are, whatever `height` and `speed`. An unknown step length follows from the stride time
         and the file's speed, or else `speed`. `HumanGait.borrowed` names what is taken from people.
@@ -97,7 +98,7 @@ class OwnGait:
 
     @classmethod
     def from_json(cls, values: object) -> "OwnGait":
-        """The gait that `to_json` wrote; raises `SpringfootError` for anything else."""
+        """Return the gait that `to_json` wrote; raise `SpringfootError` for anything else."""
         names = set(cls.__dataclass_fields__)
         if not isinstance(values, Mapping) or set(values) != names or not isinstance(values["name"], str):
             raise SpringfootError(
@@ -115,7 +116,7 @@ def read_gait(
     mass: float | None = None,
     trust_units: bool = False,
 ) -> OwnGait:
-    """The mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
+    """Return the mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
 
     CSV: `percent` 0, 1, ..., 100 and mean curves in our columns (`_sd` behind for the spread; what evaluate.py writes
     as gait_cycle.csv; `condition` picks one of several below each other), or `time_s` and curves over time, with
@@ -151,7 +152,8 @@ def read_gait(
 def _from_percent(table: Table, condition: str | None, trust_units: bool) -> OwnGait:
     """Mean curves over percent, as the file has them."""
     table = _one_condition(table, condition)
-    mean, sd = our_columns(table), our_columns(table, "_sd")
+    mean = our_columns(table)
+    sd = our_columns(table, "_sd")
     if not mean:
         raise SpringfootError(f"{table.name}, line 1: none of the columns {', '.join(COLUMNS.values())}")
 
@@ -176,8 +178,9 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
 
 
 def _one_condition(table: Table, condition: str | None) -> Table:
-    """The rows of one gait, percent 0 to 100."""
-    percent, size = table.numbers("percent"), len(PERCENT)
+    """Return the rows of one gait, percent 0 to 100."""
+    percent = table.numbers("percent")
+    size = len(PERCENT)
     for k, ((line, _), value) in enumerate(zip(table.rows, percent, strict=True)):
         if value != k % size:
             raise table.error(line, "percent", f"must be {k % size} here (0, 1, ..., 100), got {value:g}")
@@ -199,7 +202,7 @@ def _one_condition(table: Table, condition: str | None) -> Table:
 
 
 def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
-    """The mean of the strides of a walk."""
+    """Return the mean of the strides of a walk."""
     strides, curves = cut_strides(walk, side, mass)
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
     for name in ("thigh", "hip"):
@@ -236,7 +239,7 @@ def _require_one_speed(own: OwnGait) -> None:
 
 
 def _people_at(speed: float | None) -> HumanGait:
-    """People at a speed, at a comfortable one if it is unknown or beyond what is accepted."""
+    """Return people at a speed, at a comfortable one if it is unknown or beyond what is accepted."""
     low, high, _ = ACCEPTED["speed"]
     return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
 
@@ -278,7 +281,7 @@ def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
 
 
 def _series(kind: str, rows: object) -> dict[str, NDArray]:
-    """The inverse of `_rows`; raises `SpringfootError` for anything else."""
+    """Return the inverse of `_rows`; raise `SpringfootError` for anything else."""
     if not isinstance(rows, Mapping):
         raise SpringfootError(f"human {kind} must map curves to coefficients, got {rows!r:.60}")
     series = {}

@@ -43,7 +43,8 @@ def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
     a, b = (np.asarray(values, float) for values in (curve, reference))
     # A constant curve keeps rounding errors of 1e-16 of its mean, which must not pass for a shape.
     floor = 1e-12 * np.sqrt(np.sum(a * a) * np.sum(b * b))
-    a, b = a - np.mean(a), b - np.mean(b)
+    a = a - np.mean(a)
+    b = b - np.mean(b)
     scale = np.sqrt(np.sum(a * a) * np.sum(b * b))
     return _number(np.sum(a * b) / scale) if scale > floor else None
 
@@ -155,7 +156,8 @@ def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]
 
     `power` (S, 101) over percent of strides lasting `stride_time` (S,) [s]; trapezoidal rule.
     """
-    positive, negative = np.maximum(power, 0.0), np.maximum(-power, 0.0)
+    positive = np.maximum(power, 0.0)
+    negative = np.maximum(-power, 0.0)
     spacing = np.asarray(stride_time) / 100
     return np.trapezoid(positive, axis=-1) * spacing, np.trapezoid(negative, axis=-1) * spacing
 
@@ -168,7 +170,8 @@ def loop_area(angle: ArrayLike, torque: ArrayLike) -> NDArray:
     over dorsiflexion then runs counter-clockwise, as in Hansen et al. 2004) and negative where it absorbs. The last
     sample is joined to the first by a straight line; a spring of constant stiffness has area 0.
     """
-    angle, torque = np.asarray(angle, float), np.asarray(torque, float)
+    angle = np.asarray(angle, float)
+    torque = np.asarray(torque, float)
     turned = np.roll(angle, -1, axis=-1) - angle
     return (turned * (torque + np.roll(torque, -1, axis=-1)) / 2).sum(axis=-1)
 
@@ -206,7 +209,10 @@ def travel(position: NDArray, force: NDArray, least: float) -> float:
 
 
 def at_rest(*points: NDArray, tick: float) -> bool:
-    """Whether points (T, 2) [m], sampled every `tick` [s], rest at the end; False for a series that is too short."""
+    """Return whether points (T, 2) [m], sampled every `tick` [s], rest at the end.
+
+    False for a series that is too short.
+    """
     samples = round(REST_SECONDS / tick)
     return all(len(x) >= samples and np.ptp(x[-samples:], axis=0).max() <= REST_TRAVEL for x in points)
 

@@ -74,12 +74,14 @@ def together(trials: Sequence[Trial]) -> MeasuredWalk:
             at = int(gaps.argmax())
             raise SpringfootError(f"{trial.name} has no samples for {gaps[at]:.2f} s after {trial.time[at]:.2f} s")
     tick = max(min(float(np.median(np.diff(trial.time))) for trial in trials), SHORTEST_TICK)
-    first, last = max(trial.time[0] for trial in trials), min(trial.time[-1] for trial in trials)
+    first = max(trial.time[0] for trial in trials)
+    last = min(trial.time[-1] for trial in trials)
     if last - first < tick:
         raise SpringfootError(f"{name}: the files have no time in common")
     time = first + tick * np.arange(int((last - first) / tick * (1 + 1e-12)) + 1)
     legs: dict[str, Series] = {}
-    unscaled, as_read = set(), {}
+    unscaled = set()
+    as_read = {}
     for trial in trials:
         for side, curves in trial.legs.items():
             for curve in curves.keys() - legs.get(side, {}).keys():
@@ -93,7 +95,8 @@ def together(trials: Sequence[Trial]) -> MeasuredWalk:
             leg |= {curve: -leg[curve] for curve in as_read[side] if curve in leg}
         refuse_absurd(name, leg)
         for joint in ("hip", "knee", "ankle"):
-            moment, power = f"{joint}_moment", f"{joint}_power"
+            moment = f"{joint}_moment"
+            power = f"{joint}_power"
             if power not in leg and joint in leg and moment in leg:
                 leg[power] = -leg[moment] * np.gradient(_smooth(leg[joint], tick), tick)
                 if (side, moment) in unscaled:
@@ -104,7 +107,7 @@ def together(trials: Sequence[Trial]) -> MeasuredWalk:
 
 
 def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Series]:
-    """Times (S, 3) of heel strike, toe-off, next heel strike [s] and curve -> (strides with it, 101), scaled.
+    """Return times (S, 3) of heel strike, toe-off, next heel strike [s] and curve -> (strides with it, 101), scaled.
 
     `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises `SpringfootError` for too few strides.
     """
@@ -132,8 +135,11 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
 
 
 def _strides(walk: MeasuredWalk, side: str) -> NDArray:
-    """(S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first means that finds enough of them."""
-    leg, found = walk.legs[side], []
+    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first means that finds enough of
+    them.
+    """
+    leg = walk.legs[side]
+    found = []
     if "grf_vertical" in leg:
         threshold = CONTACT_THRESHOLD_BW * _bearing(leg["grf_vertical"])
         found.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
@@ -172,16 +178,19 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
     def peaks(values: NDArray) -> NDArray:
         # Half of the excursion stands out once a stride, whatever the cadence.
         at = find_peaks(values, prominence=0.5 * np.ptp(values))[0]
-        before, top, after = values[at - 1], values[at], values[at + 1]
+        before = values[at - 1]
+        top = values[at]
+        after = values[at + 1]
         return first + tick * (at + 0.5 * (before - after) / (before - 2 * top + after))
 
-    strikes, offs = peaks(heel), peaks(-toe)
+    strikes = peaks(heel)
+    offs = peaks(-toe)
     stride = float(np.median(np.diff(strikes))) if len(strikes) > 1 else 0.0
     return Contacts(heel_strikes=strikes + HEEL_STRIKE_AFTER * stride, toe_offs=offs + TOE_OFF_AFTER * stride)
 
 
 def _smooth(angle: NDArray, tick: float) -> NDArray:
-    """The angle after a low-pass without delay (fourth order in all)."""
+    """Return the angle after a low-pass without delay (fourth order in all)."""
     from scipy.signal import butter, sosfiltfilt  # half a second to import, and only files need it
 
     return sosfiltfilt(

@@ -52,7 +52,8 @@ class HyperbolicPath:
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
         """Position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
-        time, knots = np.asarray(time, float), self.polynomial.x
+        time = np.asarray(time, float)
+        knots = self.polynomial.x
         piece = np.clip(np.searchsorted(knots, time, "right") - 1, 0, len(knots) - 2)
         fading = self.fading[piece] * np.exp(-self.rate * (time - knots[piece]))
         growing = self.growing[piece] * np.exp(self.rate * (time - knots[piece + 1]))
@@ -77,7 +78,8 @@ class Bob:
         derivative of it."""
         turn = 2 * pi / self.step_time
         # Each derivative of a cosine is a quarter turn ahead.
-        angle, ahead = turn * (np.asarray(time) - self.lowest_at), derivative * pi / 2
+        angle = turn * (np.asarray(time) - self.lowest_at)
+        ahead = derivative * pi / 2
         one = -self.amplitude * turn**derivative * np.cos(angle + ahead)
         if self.second == (0.0, 0.0):
             return one
@@ -104,19 +106,19 @@ class ComMotion:
     """Forward from the CoM to the pivot of the ground reaction force [m] over time [s] (`leg_spin`); None: 0."""
 
     def position(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """(x, z) [m]."""
+        """Return (x, z) [m]."""
         return self.path(time), self.height + self.bob(time)
 
     def velocity(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """(forward, up) [m/s]."""
+        """Return (forward, up) [m/s]."""
         return self.path(time, 1), self.bob(time, 1)
 
     def acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """(forward, up) [m/s^2]."""
+        """Return (forward, up) [m/s^2]."""
         return self.path(time, 2), self.bob(time, 2)
 
     def pivot(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """The point (x, z) [m] through which the ground reaction force acts."""
+        """Return the point (x, z) [m] through which the ground reaction force acts."""
         x, z = self.position(time)
         return (x if self.ahead is None else x + self.ahead(time)), z
 
@@ -134,7 +136,7 @@ def periodic_com(
     slope: float = 0.0,
     ahead: PPoly | None = None,
 ) -> ComMotion:
-    """The one CoM motion over a ZMP that repeats itself every step.
+    """Return the one CoM motion over a ZMP that repeats itself every step.
 
     The ZMP p [m] runs straight between `zmp_points` at `zmp_times` [s] (first 0, last the step time T). The height
     is z = height - amplitude cos(2 pi (t - lowest_at) / T) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a
@@ -159,7 +161,7 @@ def periodic_com(
 
 
 def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.0) -> HyperbolicPath:
-    """The CoM path at constant `height` [m] over a ZMP of any degree and number of pieces, repeating with it.
+    """Return the CoM path at constant `height` [m] over a ZMP of any degree and number of pieces, repeating with it.
 
     `zmp` [m] over the time of one step [s] starts again `step_length` further on; it may jump. The polynomial
     p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
@@ -174,12 +176,14 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     polynomial = PPoly(coefficients, zmp.x)
 
     # What the polynomials lack at the end of each piece to go on as the next one does, in x and in x' / rate.
-    lasts, velocity = np.diff(zmp.x), polynomial.derivative().c
+    lasts = np.diff(zmp.x)
+    velocity = polynomial.derivative().c
     jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, lasts)
     jump[-1] += step_length
     kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, lasts)) / rate
     # Their sum determines the growing exponentials alone, their difference the fading ones.
-    decay, this = np.exp(-rate * lasts), np.eye(len(lasts))
+    decay = np.exp(-rate * lasts)
+    this = np.eye(len(lasts))
     following = np.roll(this, 1, axis=1)
     return HyperbolicPath(
         polynomial=polynomial,
@@ -197,7 +201,7 @@ def _integrated(
     bob: Bob,
     slope: float,
 ) -> PPoly:
-    """The path of `periodic_com` as the sum of one particular and two homogeneous solutions that is periodic."""
+    """Return the path of `periodic_com` as the sum of one particular and two homogeneous solutions that is periodic."""
     step_time = zmp_times[-1]
     back, down = -gravity(slope)
 
@@ -208,11 +212,13 @@ def _integrated(
     driven = np.array([1.0, 0.0, 0.0])  # columns: driven by ZMP and slope, from unit position, from unit velocity
 
     def motion(t: float, state: NDArray) -> NDArray:
-        x, v = state[:3], state[3:]
+        x = state[:3]
+        v = state[3:]
         return np.concatenate([v, pull(t) * (x - driven * np.interp(t, zmp_times, zmp_points)) - driven * back])
 
     state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
-    times, states = [], []
+    times = []
+    states = []
     # The ZMP has corners: integrating piece by piece keeps the order of the method.
     for start, end in pairwise(zmp_times):
         grid = np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)
@@ -226,7 +232,8 @@ def _integrated(
     ends = np.array([x[:, -1], v[:, -1]])
     start_state = np.linalg.solve(ends[:, 1:] - np.eye(2), np.array([step_length, 0.0]) - ends[:, 0])
     weights = np.array([1.0, *start_state])
-    position, velocity = weights @ x, weights @ v
+    position = weights @ x
+    velocity = weights @ v
     acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
     quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
     return PPoly.from_bernstein_basis(quintics)
@@ -241,7 +248,7 @@ def _stepped(
     slope: float,
     ahead: PPoly,
 ) -> PPoly:
-    """The path of `periodic_com` with a pivot `ahead` of the CoM, by Runge-Kutta steps of `STEP_SAMPLES` a step.
+    """Return the path of `periodic_com` with a pivot `ahead` of the CoM, by Runge-Kutta steps of `STEP_SAMPLES` a step.
 
     The equation is linear, so each step is a matrix on (x, x', 1), and the product of all has the periodic start.
     """
@@ -257,11 +264,14 @@ def _stepped(
         z = height + bob(time)
         pull = (down + bob(time, 2)) / z
         matrix = np.zeros((len(time), 3, 3))
-        matrix[:, 0, 1], matrix[:, 1, 0] = 1.0, pull
+        matrix[:, 0, 1] = 1.0
+        matrix[:, 1, 0] = pull
         matrix[:, 1, 2] = pull * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
         return matrix
 
-    at, lasts, unit = equation(t), np.diff(t)[:, None, None], np.eye(3)
+    at = equation(t)
+    lasts = np.diff(t)[:, None, None]
+    unit = np.eye(3)
     middle = equation(0.5 * (t[1:] + t[:-1]))
     first = at[:-1]
     second = middle @ (unit + lasts / 2 * first)
@@ -274,8 +284,10 @@ def _stepped(
     whole = through[-1][:2]
     start = np.linalg.solve(whole[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole[:, 2])
     state = np.stack(through) @ np.append(start, 1.0)
-    x, v = state[:, 0], state[:, 1]
-    a, h = (at @ state[..., None])[:, 1, 0], np.diff(t)
+    x = state[:, 0]
+    v = state[:, 1]
+    a = (at @ state[..., None])[:, 1, 0]
+    h = np.diff(t)
     bernstein = [x[:-1], x[:-1] + h * v[:-1] / 5, x[:-1] + 2 * h * v[:-1] / 5 + h**2 * a[:-1] / 20]
     bernstein += [x[1:] - 2 * h * v[1:] / 5 + h**2 * a[1:] / 20, x[1:] - h * v[1:] / 5, x[1:]]
     return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))

@@ -75,7 +75,8 @@ class ComPlan:
         return self.motion.acceleration(self._time(step_phase))
 
     def pivot(self, step_phase: ArrayLike) -> Point:
-        """The point (x, z) [m] to which the ground reaction force points: the CoM, unless the legs' swing counts."""
+        """Return the point (x, z) [m] to which the ground reaction force points: the CoM, unless the legs' swing
+        counts."""
         return self.motion.pivot(self._time(step_phase))
 
     def zmp(self, step_phase: ArrayLike) -> NDArray:
@@ -87,7 +88,7 @@ class ComPlan:
 
 
 def over_peoples_zmp(plan: ComPlan) -> ComPlan:
-    """The steps, height, rise and slope of `plan`, its CoM over people's ZMP.
+    """Return the steps, height, rise and slope of `plan`, its CoM over people's ZMP.
 
     Double support lasts `PEOPLES_SHARE` of that of `plan.human`; in single support the ZMP runs straight along
     `PEOPLES_ZMP`.

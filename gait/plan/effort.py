@@ -83,8 +83,9 @@ AS_IS = Muscle()
 
 
 def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
-    """The effort of a plan."""
-    body, phase = plan.body, np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
+    """Return the effort of a plan."""
+    body = plan.body
+    phase = np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
@@ -101,13 +102,14 @@ def effort_of_stride(
     distance: float,
     muscle: Muscle = AS_IS,
 ) -> Effort:
-    """The effort of a stride of `distance` [m] in `stride_time` [s] whose legs do the same, half a stride apart.
+    """Return the effort of a stride of `distance` [m] in `stride_time` [s] whose legs do the same, half a stride apart.
 
     `angle`, `rate` and `moment` (S, 4) are one leg's at hip (thigh to the vertical), knee, ankle and toe, evenly over
     the stride: flexion and dorsiflexion positive [rad], [rad/s], extension and plantarflexion positive [N m]. Without
     a `rate` it is the angle's.
     """
-    tick, toe = stride_time / len(angle), JOINTS.index("toe")
+    tick = stride_time / len(angle)
+    toe = JOINTS.index("toe")
     rate = _change(angle, tick) if rate is None else rate
     acceleration = _change(rate[:, :toe], tick)
     moment = moment - muscle.tissue * passive_moments(body, angle)
@@ -140,17 +142,19 @@ def _change(values: NDArray, tick: float) -> NDArray:
 
 
 def _joints(turns: NDArray) -> NDArray:
-    """(..., 4) hip, knee, ankle and toe, flexion and dorsiflexion positive, from turns of thigh, shank, foot, toe."""
+    """Return (..., 4) hip, knee, ankle and toe, flexion and dorsiflexion positive, from turns of thigh, shank, foot,
+    toe.
+    """
     thigh, shank, foot, toe = np.moveaxis(turns, -1, 0)
     return np.stack([thigh, thigh - shank, foot - shank, toe - foot], -1)
 
 
 def _strength(body: Body, moment: NDArray) -> NDArray:
-    """The strength [N m] against which each of the moments (..., 4) counts."""
+    """Return the strength [N m] against which each of the moments (..., 4) counts."""
     return body.mass * GRAVITY * body.height * _of_groups(STRENGTH, moment)
 
 
 def _of_groups(table: dict[str, tuple[float, float]], moment: NDArray) -> NDArray:
-    """(..., 4) what a table says of the muscles that make each of the moments (..., 4)."""
+    """Return (..., 4) what a table says of the muscles that make each of the moments (..., 4)."""
     extending, flexing = np.array([table[joint] for joint in JOINTS]).T
     return np.where(moment > 0.0, extending, flexing)

@@ -57,7 +57,7 @@ class Case:
 
 
 def case(speed: float) -> Case:
-    """The walk at a `speed` [m/s]."""
+    """Return the walk at a `speed` [m/s]."""
     people = human_gait(speed, STANDARD.height)
     share = max(PEOPLES_SHARE * (2 * people.toe_off - 1), LEAST_FULL_ROLL)
     plan = plan_walk(STANDARD, speed, double_support=share * people.stride_time / 2)
@@ -72,7 +72,7 @@ def case(speed: float) -> Case:
 
 
 def constants() -> NDArray:
-    """Those at a roll of 1, in the order of `use`."""
+    """Return those at a roll of 1, in the order of `use`."""
     return np.array(
         [
             *(foot_style.TOE_ROCKER_POWER[1], foot_style.ROLL_POWER),
@@ -84,7 +84,8 @@ def constants() -> NDArray:
 def use(values: NDArray) -> None:
     """Put other constants in the place of those at a roll of 1."""
     toe_power, roll_power, *via = map(float, values)
-    foot_style.TOE_ROCKER_POWER, foot_style.ROLL_POWER = (foot_style.TOE_ROCKER_POWER[0], toe_power), roll_power
+    foot_style.TOE_ROCKER_POWER = (foot_style.TOE_ROCKER_POWER[0], toe_power)
+    foot_style.ROLL_POWER = roll_power
     for name, pair in zip(("VIA_FORWARD", "VIA_UP", "VIA_PITCH"), np.reshape(via, (3, -1)), strict=True):
         setattr(foot_style, name, (getattr(foot_style, name)[0], tuple(pair.tolist())))
 

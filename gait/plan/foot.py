@@ -130,7 +130,7 @@ class FootPath:
         return rear, np.where(phase >= self.foot_flat, tip, heel)
 
     def swing_heights(self, part: tuple[float, float]) -> NDArray:
-        """(2, 200) ball and heel above the floor [m] over a part of the swing."""
+        """Return (2, 200) ball and heel above the floor [m] over a part of the swing."""
         phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
         return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
 
@@ -140,7 +140,7 @@ class FootPath:
         return self.body.ankle_height - self.body.toe_joint_height
 
     def _jet(self, stride_phase: ArrayLike) -> NDArray:
-        """(x, z, pitch) of the ankle at any phases."""
+        """Return (x, z, pitch) of the ankle at any phases."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         heel = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]
         toe = self._toe_rocker(np.clip(phase, self.heel_off, self.toe_off))[0]
@@ -148,7 +148,8 @@ class FootPath:
         return np.where(phase < self.foot_flat, heel, np.where(phase <= self.toe_off, toe, swing))
 
     def _heel_rocker(self, phase: ArrayLike) -> NDArray:
-        left, power = 1 - np.asarray(phase) / self.foot_flat, HEEL_ROCKER_POWER
+        left = 1 - np.asarray(phase) / self.foot_flat
+        power = HEEL_ROCKER_POWER
         pitch = self.heel_strike_pitch * left**power
         rate = -self.heel_strike_pitch * power / self.foot_flat * left ** (power - 1)
         curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * left ** (power - 2)
@@ -168,7 +169,7 @@ class FootPath:
         return jet
 
     def _roll(self, phase: ArrayLike) -> NDArray:
-        """(3, ...): toe to ground over its tip [rad] and two phase derivatives."""
+        """Return (3, ...): toe to ground over its tip [rad] and two phase derivatives."""
         if self.roll_pitch == 0:
             return np.zeros((3, *np.shape(phase)))
         return rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
@@ -176,7 +177,8 @@ class FootPath:
     @cached_property
     def _swing(self) -> BSpline:
         """(x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously differentiable."""
-        start, end = self._toe_rocker(self.toe_off), self._heel_rocker(0.0)
+        start = self._toe_rocker(self.toe_off)
+        end = self._heel_rocker(0.0)
         end[0, 0] += 2 * self.step_length
         way, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
         forward = start[0, 0] + way * (end[0, 0] - start[0, 0])
@@ -203,7 +205,8 @@ def feet_under_zmp(
     """
     margin = ROCKER_MARGIN * body.length_scale
     heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)
-    ball, toe_tip = body.ankle_to_toe_joint, body.ankle_to_toe_joint + body.toe_length
+    ball = body.ankle_to_toe_joint
+    toe_tip = body.ankle_to_toe_joint + body.toe_length
     first, zmp_from, *_, zmp_to = zmp_points
     for name, value, low, high in (("start", zmp_from, heel, ball), ("end", zmp_to, ball + margin, toe_tip)):
         beyond = max(low - value, value - high)
@@ -252,7 +255,7 @@ def feet_under_zmp(
 
 
 def refuse_swing_in_ground(feet: FootPath) -> None:
-    """Raises `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`: its ball or heel.
+    """Raise `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`: its ball or heel.
 
     The tip of the toe is not checked: early in swing the toe bends back to people's posture, which at 1.2 m/s would
     take its tip 20 mm into the floor; a sprung toe gives way.

@@ -75,7 +75,7 @@ class FootStyle:
 
 
 def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: float) -> FootStyle:
-    """The style that comes near people's curves.
+    """Return the style that comes near people's curves.
 
     Args:
         stride: step length over leg length.
@@ -95,12 +95,12 @@ def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: fl
 
 
 def between(pair: tuple, roll: float) -> NDArray:
-    """A constant given at a roll of 0 and of 1."""
+    """Return a constant given at a roll of 0 and of 1."""
     return (1 - roll) * np.array(pair[0]) + roll * np.array(pair[1])
 
 
 def pitch_at(pair: tuple, stride: float, roll: float) -> float:
-    """A pitch at an event [rad], positive, for a step length over leg length."""
+    """Return a pitch at an event [rad], positive, for a step length over leg length."""
     return float(between(tuple(a * stride**n for a, n in pair), roll))
 
 

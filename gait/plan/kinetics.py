@@ -73,7 +73,8 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
     if not np.all(force[..., 1] > 0):
         raise SpringfootError("the ground can only push: the upward force must be > 0 N")
     zmp = com[..., 0] - com[..., 1] * force[..., 0] / force[..., 1]
-    rear, front = np.asarray(rear_cop), np.asarray(front_cop)
+    rear = np.asarray(rear_cop)
+    front = np.asarray(front_cop)
     outside = float(np.max(np.maximum(np.minimum(rear, front) - zmp, zmp - np.maximum(rear, front)), initial=0.0))
     if not outside <= ZMP_TOLERANCE:
         raise SpringfootError(
@@ -104,7 +105,8 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     step_phase = 2 * (phase - 0.5 * second)
     pivot = np.stack(plan.pivot(step_phase), -1)
     force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
-    zmp, shared = plan.zmp(step_phase), step_phase <= 2 * plan.feet.toe_off - 1
+    zmp = plan.zmp(step_phase)
+    shared = step_phase <= 2 * plan.feet.toe_off - 1
     rear, front = _double_support_cops(plan, step_phase)
     # In single support the stance foot bears all of it at the ZMP, as front foot.
     on_rear, on_front = share_forces(force, pivot, np.where(shared, rear, zmp - 1.0), np.where(shared, front, zmp))
@@ -116,8 +118,11 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
 
 def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
     """Centres of pressure [m] of the rear and the front foot in double support, in the front foot's frame."""
-    body, flat, end = plan.body, 2 * plan.feet.foot_flat, 2 * plan.feet.toe_off - 1
-    heel, tip = plan.feet.flat_heel, body.ankle_to_toe_joint + body.toe_length - plan.step_length
+    body = plan.body
+    flat = 2 * plan.feet.foot_flat
+    end = 2 * plan.feet.toe_off - 1
+    heel = plan.feet.flat_heel
+    tip = body.ankle_to_toe_joint + body.toe_length - plan.step_length
     at_start, at_flat, at_end = (float(plan.zmp(each)) for each in (0.0, flat, end))
     if at_flat > heel or tip >= at_end:
         return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
@@ -128,7 +133,7 @@ def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, 
 
 
 def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
-    """One leg of a plan over its stride, in its foot's frame: motion and load, for the functions above.
+    """Return one leg of a plan over its stride, in its foot's frame: motion and load, for the functions above.
 
     The plan is differentiated as a Fourier series of `PLAN_HARMONICS`; forces by `foot_force`.
     """
@@ -145,12 +150,12 @@ def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, Foo
 
 
 def planned_moments(plan: WalkPlan, stride_phase: ArrayLike) -> dict[str, NDArray]:
-    """Internal joint moments (...) [N m] of a plan at stride phases of any shape, by joint: inverse dynamics."""
+    """Return internal joint moments (...) [N m] of a plan at stride phases of any shape, by joint: inverse dynamics."""
     return inverse_dynamics(plan.body, *planned_leg(plan, stride_phase), plan.slope).moment
 
 
 def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
-    """One leg of people on level ground, as a `body`: motion and load, for the functions above.
+    """Return one leg of people on level ground, as a `body`: motion and load, for the functions above.
 
     Angles and forces are the gait's, the centre of pressure is `human_cop` times the foot's length. The foot stands on
     its heel while its toes point up, on its ball while they point down, x from where its ankle is when flat. The hip
@@ -192,7 +197,7 @@ def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[Le
 
 
 def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> list[ProjectionError]:
-    """How far the GRF projection (Wells 1981) is from inverse dynamics: per joint, in stance and in swing.
+    """Return how far the GRF projection (Wells 1981) is from inverse dynamics: per joint, in stance and in swing.
 
     Stance is where the ground bears on the foot. For people `projection_table(body, *people_leg(gait, body, phase))`,
     for a plan `planned_leg(plan, phase)` and its slope; samples weigh alike, so take phases evenly. Parts that do not
@@ -205,7 +210,8 @@ def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float
     parts: tuple[tuple[Literal["stance", "swing"], NDArray], ...] = (("stance", stance), ("swing", ~stance))
     for joint in JOINTS:
         for part, where in parts:
-            ours, exact = projection[joint][where] / body.mass, dynamics[joint][where] / body.mass
+            ours = projection[joint][where] / body.mass
+            exact = dynamics[joint][where] / body.mass
             if not len(ours):
                 continue
             rows.append(

@@ -34,17 +34,20 @@ def spinning_legs(
     height: float | None = None,
     lean: float = 0.0,
 ) -> tuple[ComMotion, LegPostures]:
-    """The CoM and the legs whose angular momentum it knows, as high as leaves every knee flexed by `knee` [rad].
+    """Return the CoM and the legs whose angular momentum it knows, as high as leaves every knee flexed by `knee` [rad].
 
     `legs_at` plans for a CoM `height` [m], which may be given, and a pivot; `still` is that of legs that do not turn;
     `lean` [rad] is that of the trunk. Raises `SpringfootError` where they do not settle.
     """
-    reach, given = full_reach(body, knee), height
-    height, ahead = 1.05 * body.leg_length if given is None else given, still
+    reach = full_reach(body, knee)
+    given = height
+    height = 1.05 * body.leg_length if given is None else given
+    ahead = still
     for _ in range(ROUNDS):
         motion, legs = legs_at(height, ahead)
         lacking = float(legs.reach.max()) - reach if given is None else 0.0
-        before, ahead = ahead, pivot_ahead(body, motion, legs, step_length, lean)
+        before = ahead
+        ahead = pivot_ahead(body, motion, legs, step_length, lean)
         moved = float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
         if abs(lacking) < PLAN_SETTLED and moved < PLAN_SETTLED:
             return motion, legs
@@ -56,7 +59,8 @@ def spinning_legs(
 
 def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0) -> CubicSpline:
     """Forward from the CoM to the pivot [m] over the time of a step, trunk held upright or at a `lean` [rad]."""
-    stride_time, half = 2 * motion.step_time, POSTURE_SAMPLES // 2
+    stride_time = 2 * motion.step_time
+    half = POSTURE_SAMPLES // 2
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     angles = {name: getattr(legs, name) for name in ("thigh", "knee", "ankle", "toe")}
     still = legs.hip - np.outer(phase, [2 * step_length, 0.0])

@@ -87,7 +87,7 @@ class WalkPlan(ComPlan):
         )
 
     def joint_angles(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
-        """thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
+        """Thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
         return _named(self.joint_table(np.mod(stride_phase, 1.0)))
 
     def joint_rates(self, stride_phase: ArrayLike) -> dict[str, NDArray]:

@@ -19,7 +19,7 @@ FLAT_SHARE = 0.5
 
 
 def gait_of(plan: WalkPlan) -> HumanGait:
-    """The gait of a plan: everything of it from body, plan and inverse dynamics.
+    """Return the gait of a plan: everything of it from body, plan and inverse dynamics.
 
     Curves are Fourier series of as many terms as people's are. Moments and powers are for body mass and height as
     people's are [N m/kg at 1.70 m]. The spread is 0: a plan has none.
@@ -29,7 +29,8 @@ def gait_of(plan: WalkPlan) -> HumanGait:
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     angles = plan.joint_angles(phase)
-    turn, rate = motion.turn, motion.rate
+    turn = motion.turn
+    rate = motion.rate
     rates = {"hip": rate[:, 0], "knee": rate[:, 0] - rate[:, 1], "ankle": rate[:, 2] - rate[:, 1]}
     rates["toe"] = rate[:, 3] - rate[:, 2]
     mean = {name: _series(angles[name]) for name in ANGLES} | {"hip": _series(turn[:, 0])}
@@ -55,9 +56,11 @@ def gait_of(plan: WalkPlan) -> HumanGait:
 
 
 def _foot(plan: WalkPlan) -> FootHabits:
-    """Where the schedule of K has its phases: at the plan's own events, the other foot's toe-off and landing."""
+    """Return where the schedule of K has its phases: at the plan's own events, the other foot's toe-off and landing."""
     feet = plan.feet
-    flat, off, leaves = feet.foot_flat, feet.heel_off, feet.toe_off
+    flat = feet.foot_flat
+    off = feet.heel_off
+    leaves = feet.toe_off
     middle = flat + FLAT_SHARE * (off - flat)
     begins = max(off, middle + 2 * RAMP)
     plateaus = (0.0, flat, flat + RAMP, middle, middle + RAMP, begins, begins + RAMP, leaves, leaves + RAMP, 0.95)
@@ -72,14 +75,14 @@ def _foot(plan: WalkPlan) -> FootHabits:
 
 
 def _series(values: NDArray) -> NDArray:
-    """(HARMONICS + 1,) complex Fourier coefficients of evenly spaced samples of a stride."""
+    """Return (HARMONICS + 1,) complex Fourier coefficients of evenly spaced samples of a stride."""
     series = np.fft.rfft(values)[: HARMONICS + 1] / len(values)
     series[1:] *= 2
     return series
 
 
 def _stance(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
-    """(STANCE_TERMS,) least-squares sine series over stance."""
+    """Return (STANCE_TERMS,) least-squares sine series over stance."""
     inside = phase < toe_off
     basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
     return np.linalg.lstsq(basis, values[inside], rcond=None)[0]

@@ -63,8 +63,8 @@ def legs_under_com(
     near: LegPostures | None = None,
     lean: float = 0.0,
 ) -> LegPostures:
-    """The posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one; sooner found `near`
-    one. `lean` [rad] is that of `ComPlan`.
+    """Return the posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one; sooner found
+    `near` one. `lean` [rad] is that of `ComPlan`.
 
     Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
     """
@@ -104,8 +104,8 @@ def legs_under(
     near: NDArray | None = None,
     lean: float = 0.0,
 ) -> LegPostures:
-    """The posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip, but
-    for a `lean` [rad].
+    """Return the posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip,
+    but for a `lean` [rad].
 
     `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
     length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2);
@@ -116,7 +116,8 @@ def legs_under(
     trunk = hypot(*body.upper_moment) / body.total_mass
     # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
     for _ in range(60):
-        forward, down = ankle[0] - hip[0], hip[1] - ankle[1]
+        forward = ankle[0] - hip[0]
+        down = hip[1] - ankle[1]
         thigh, knee = leg_angles(forward, down, body.thigh_length, body.shank_length)
         knee_joint = body.thigh_length * np.stack([np.sin(thigh), -np.cos(thigh)])
         shank = np.stack([np.sin(thigh - knee), -np.cos(thigh - knee)])
@@ -174,14 +175,15 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
 
 def full_reach(body: Body, knee: float) -> float:
     """Hip to ankle [m] at a knee flexion [rad]."""
-    a, b = body.thigh_length, body.shank_length
+    a = body.thigh_length
+    b = body.shank_length
     return sqrt(a**2 + b**2 + 2 * a * b * cos(knee))
 
 
 def highest_legs(
     body: Body, legs_at: Callable[[float], tuple[ComMotion, LegPostures]]
 ) -> tuple[ComMotion, LegPostures]:
-    """The highest CoM, and its legs, at which no knee is straighter than `STRAIGHTEST_KNEE`."""
+    """Return the highest CoM, and its legs, at which no knee is straighter than `STRAIGHTEST_KNEE`."""
     reach = full_reach(body, STRAIGHTEST_KNEE)
     height = 1.08 * body.leg_length
     for _ in range(50):
@@ -200,7 +202,7 @@ def highest_legs(
 
 
 def refuse_impossible_legs(body: Body, legs: LegPostures) -> None:
-    """Raises `SpringfootError` for legs that would have to be longer, or to bend further, than they can."""
+    """Raise `SpringfootError` for legs that would have to be longer, or to bend further, than they can."""
     too_far = float(legs.reach.max()) - full_reach(body, 0.0)
     if too_far > 0:
         phase = int(legs.reach.argmax()) / POSTURE_SAMPLES

@@ -122,17 +122,22 @@ class ThesisWalk:
     @property
     def com_knots(self) -> tuple[NDArray, NDArray]:
         """x_CoM, z_CoM (6,) [m]. Fault: mean speeds of 1.67, 0.66 and 1.50 m/s between them."""
-        ahead, behind = self.com_ahead_at_end, self.com_behind_at_start
+        ahead = self.com_ahead_at_end
+        behind = self.com_behind_at_start
         steps = self.step_length * (self.k + np.array([0, 1, 1, 1, 2, 2]))
         return steps + np.array([ahead, -behind, -0.5 * behind] * 2), self.com_height(self.knot_times)
 
     @property
     def ankle_knots(self) -> tuple[NDArray, NDArray]:
         """x_foot_mod, z_foot_mod (6,) [m]."""
-        l_an, l_bf, l_ft = self.body.ankle_height, self.body.heel_to_ankle, self.body.ankle_to_toe_joint
-        q_b, q_f = self.toe_off_pitch, self.heel_strike_pitch
+        l_an = self.body.ankle_height
+        l_bf = self.body.heel_to_ankle
+        l_ft = self.body.ankle_to_toe_joint
+        q_b = self.toe_off_pitch
+        q_f = self.heel_strike_pitch
         steps = self.step_length * (self.k + np.array([0, 0, 0, 2, 2, 2]))
-        toe_off, heel_strike = l_an * sin(q_b) + l_ft * (1 - cos(q_b)), -l_an * sin(q_f) - l_bf * (1 - cos(q_f))
+        toe_off = l_an * sin(q_b) + l_ft * (1 - cos(q_b))
+        heel_strike = -l_an * sin(q_f) - l_bf * (1 - cos(q_f))
         return (
             steps + np.array([0, toe_off, self.highest_ankle_forward, heel_strike, 0, 0]),
             np.array(
@@ -150,7 +155,9 @@ class ThesisWalk:
     @property
     def toe_joint_knots(self) -> tuple[NDArray, NDArray]:
         """x_toe_mod, z_toe_mod (6,) [m]. Fault: at heel strike l_an sin q_f is the ankle's alone: 8 mm short."""
-        l_an, l_bf, l_ft = self.body.ankle_height, self.body.heel_to_ankle, self.body.ankle_to_toe_joint
+        l_an = self.body.ankle_height
+        l_bf = self.body.heel_to_ankle
+        l_ft = self.body.ankle_to_toe_joint
         q_f = self.heel_strike_pitch
         steps = self.step_length * (self.k + np.array([0, 0, 0, 2, 2, 2]))
         heel_strike = -l_an * sin(q_f) - l_bf * (1 - cos(q_f)) + l_ft * cos(q_f)
@@ -166,7 +173,7 @@ class ThesisWalk:
         return (self._within(time) - self.step_time) / (self.k * self.step_time + self.highest_ankle_time)
 
     def com_height(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """z = 0.89 - 0.012 sin(4 pi (t - 2.62)) [m] or a time derivative. Fault: highest as double support begins."""
+        """Z = 0.89 - 0.012 sin(4 pi (t - 2.62)) [m] or a time derivative. Fault: highest as double support begins."""
         rate = 4 * pi
         # Each derivative of a sine leads it by a quarter turn.
         wave = -0.012 * rate**derivative * np.sin(rate * (np.asarray(time) - 2.62) + derivative * pi / 2)
@@ -243,7 +250,7 @@ class ThesisWalk:
         return rear - lengths["l_bf"], front + lengths["l_ff"]
 
     def zmp_outside(self, time: ArrayLike) -> NDArray:
-        """How far the ZMP lies ahead of the feet on the ground (positive) or behind them (negative) [m], else 0."""
+        """Return the distance of the ZMP ahead of the feet on the ground (positive) or behind them [m], else 0."""
         zmp, (rear, front) = self.zmp(time), self.support(time)
         return np.maximum(zmp - front, 0.0) + np.minimum(zmp - rear, 0.0)
 
@@ -278,7 +285,8 @@ class ThesisWalk:
         return {joint: CubicSpline(self.knot_times, np.stack(xz, -1)) for joint, xz in knots.items()}
 
     def _within(self, time: ArrayLike) -> NDArray:
-        time, ends = np.asarray(time, float), self.knot_times[[0, -1]]
+        time = np.asarray(time, float)
+        ends = self.knot_times[[0, -1]]
         # Half a nanosecond: `linspace` may end a rounding error late.
         if not np.all((time >= ends[0] - 5e-10) & (time <= ends[1] + 5e-10)):
             raise SpringfootError(f"time must be in [{ends[0]:g}, {ends[1]:g}] s, step {self.k} of the thesis's walk")

@@ -56,12 +56,13 @@ class WalkStyle:
 
 
 def style_from(values: Mapping[str, Any]) -> WalkStyle:
-    """The style of JSON values (lists for tuples); raises `ValueError`, `TypeError` or `KeyError` for others."""
+    """Return the style of JSON values (lists for tuples); raises `ValueError`, `TypeError` or `KeyError` for others."""
     own = dict(values)
     style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
     for part in (style, style.foot):
         for name, hint in get_type_hints(type(part)).items():
-            value, kinds = getattr(part, name), get_args(hint) if isinstance(hint, UnionType) else (hint,)
+            value = getattr(part, name)
+            kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
             if not any(_is_a(kind, value) for kind in kinds):
                 what = (
                     "a finite number" if float in kinds else "2 finite numbers" if PAIR in kinds else "finite numbers"
@@ -73,7 +74,7 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
 
 
 def _is_a(kind: Any, value: Any) -> bool:
-    """Whether a value is of a field's type, and its numbers are finite."""
+    """Return whether a value is of a field's type, and its numbers are finite."""
     if get_origin(kind) is tuple:
         own = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
         return own and all(isfinite(as_float(each)) for each in value)
@@ -81,12 +82,14 @@ def _is_a(kind: Any, value: Any) -> bool:
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:
-    """The style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`: linear between the
-    speeds it was searched at, and beyond them that of the nearest. Raises `SpringfootError` for a file of no styles."""
+    """Return the style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`: linear between
+    the speeds it was searched at, and beyond them that of the nearest. Raises `SpringfootError` for a file of no
+    styles."""
     table = _committed() if file is None else styles_of(file)
     speeds = sorted(table)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
-    low, high = table[speeds[int(place)]], table[speeds[min(int(place) + 1, len(speeds) - 1)]]
+    low = table[speeds[int(place)]]
+    high = table[speeds[min(int(place) + 1, len(speeds) - 1)]]
     return style_from(_mixed(low.to_json(), high.to_json(), place - int(place)))
 
 

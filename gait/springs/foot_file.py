@@ -15,7 +15,7 @@ from .stiffness import SPRINGS
 
 
 def read_foot(path: str | Path) -> dict[str, Any]:
-    """The setting `left_foot` or `right_foot` in a file.
+    """Return the setting `left_foot` or `right_foot` in a file.
 
     A CSV is a passive foot with these torques; the other joint is as usual. A JSON file is a foot's dictionary or a
     `StiffnessSchedule`, then an adaptive foot that follows it. Raises `SpringfootError` for another file; the numbers
@@ -32,7 +32,8 @@ def _tables(path: Path) -> dict[str, list[list[float]]]:
     table = read_csv(path)
     found = {}
     for joint in SPRINGS:
-        angle, torque = f"{joint}_deg", f"{joint}_torque_Nm"
+        angle = f"{joint}_deg"
+        torque = f"{joint}_torque_Nm"
         if table.has(angle) != table.has(torque):
             raise SpringfootError(f"{table.name}, line 1: {angle} and {torque} go together")
         if table.has(angle):

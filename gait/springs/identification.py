@@ -173,11 +173,12 @@ def noise_study(
 
 
 def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
-    """The result of one phase and its warning."""
+    """Return the result of one phase and its warning."""
     count = len(torque)
     estimates: Sequence[Estimate | None] = [None] * 3
     r2 = correlation = lagged = None
-    spread, condition = 0.0, np.inf
+    spread = 0.0
+    condition = np.inf
     reasons = []
     if count <= 3:
         reasons.append(f"{count} samples are too few for three unknowns")
@@ -186,7 +187,8 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
         columns = np.stack([np.ones(count), angle, velocity], -1)
         size = np.sqrt((columns**2).sum(0))
         condition = float(np.linalg.cond(columns / np.where(size > 0, size, 1.0)))
-        moved, rate = angle - angle.mean(), velocity - velocity.mean()
+        moved = angle - angle.mean()
+        rate = velocity - velocity.mean()
         scale = np.sqrt((moved @ moved) * (rate @ rate))
         correlation = float(np.clip(moved @ rate / scale, -1, 1)) if scale > 0 else None
         spread = float(np.sqrt(moved @ moved / count * (1 - (correlation or 0.0) ** 2)))
@@ -200,7 +202,8 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
             reasons.append("K, beta and theta_eq cannot be told apart")
         else:
             estimates = found = [Estimate(*map(float, numbers)) for numbers in intervals(fit)]
-            lost, total = fit.residual @ fit.residual, np.sum((torque - torque.mean()) ** 2)
+            lost = fit.residual @ fit.residual
+            total = np.sum((torque - torque.mean()) ** 2)
             r2 = float(1 - lost / total) if total > 0 else None
             if lost > 1e-20 * (torque @ torque):
                 lagged = float(fit.residual[1:] @ fit.residual[:-1] / lost)

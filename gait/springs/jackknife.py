@@ -30,7 +30,10 @@ class TrialFit(NamedTuple):
     """Share of the variance explained [0..1]."""
 
     def interval(self, value: float, without: NDArray) -> Estimate:
-        """A function of the coefficients with its interval; `without` (trials,): its values without each trial."""
+        """Return a function of the coefficients with its interval.
+
+        `without` (trials,): its values without each trial.
+        """
         trials = len(without)
         variance = self.inflation * (trials - 1) / trials * np.sum((without - without.mean()) ** 2)
         half = stdtrit(trials - 1, (1 + CONFIDENCE) / 2) * np.sqrt(variance)  # Student's t
@@ -38,7 +41,8 @@ class TrialFit(NamedTuple):
 
     def chance(self, first: int) -> float:
         """Probability of coefficients `first` and on if all of them are 0: Hotelling's T^2; 1 with too few trials."""
-        values, without = self.coefficients[first:], self.without[:, first:]
+        values = self.coefficients[first:]
+        without = self.without[:, first:]
         trials, count = without.shape
         if trials <= count:
             return 1.0
@@ -55,7 +59,8 @@ def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) 
     """
     count, unknowns = columns.shape
     size = np.sqrt((columns**2).mean(0))
-    total, freedom = values @ values, count - spent - unknowns
+    total = values @ values
+    freedom = count - spent - unknowns
     if not (size > 1e-12).all() or freedom <= 0 or total == 0:
         return None
     unit = columns / size
@@ -64,7 +69,8 @@ def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) 
     parts = list(zip(np.split(unit[order], ends), np.split(values[order], ends), strict=True))
     squares = np.stack([part.T @ part for part, _ in parts])
     pulls = np.stack([part.T @ own for part, own in parts])
-    whole, pull = squares.sum(0), pulls.sum(0)
+    whole = squares.sum(0)
+    pull = pulls.sum(0)
     if np.linalg.cond(whole) > WORST_CONDITION:
         return None
     coefficients = np.linalg.solve(whole, pull)

@@ -46,7 +46,9 @@ REACTION_LEVEL = 0.01
 REACTION_SHARE = 0.02
 """Share of all that is explained which they must explain beyond K and beta: a torque a seventh of the spring's."""
 
-SPRING, REACTS, UNKNOWN = "spring", "reacts: not a spring", "not identified"
+SPRING = "spring"
+REACTS = "reacts: not a spring"
+UNKNOWN = "not identified"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,13 +156,16 @@ def _checked(
 
 
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
-    """The result of one phase."""
-    low_in, high_in = low + margin, high - margin
+    """Return the result of one phase."""
+    low_in = low + margin
+    high_in = high - margin
     inside = np.flatnonzero((data.phase >= low_in) & (data.phase < high_in))
     cell = np.unique(((data.phase[inside] - low_in) / BIN).astype(int), return_inverse=True)[1]
     full = np.bincount(cell)[cell] >= LEAST_IN_BIN if len(cell) else np.empty(0, bool)
-    inside, cell = inside[full], np.unique(cell[full], return_inverse=True)[1]
-    phase, trial = data.phase[inside], np.unique(data.trial[inside], return_inverse=True)[1]
+    inside = inside[full]
+    cell = np.unique(cell[full], return_inverse=True)[1]
+    phase = data.phase[inside]
+    trial = np.unique(data.trial[inside], return_inverse=True)[1]
     trials = int(trial.max()) + 1 if len(trial) else 0
     known = {"start": low, "end": high, "samples": len(inside), "trials": trials}
     needed = max(LEAST_TRIALS, 2 * (data.states.shape[1] + 2))
@@ -181,11 +186,14 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
         return _unknown(known, "angle and velocity move too little, or as one, to tell K from beta")
     weights = hats.mean(0)
     columns = len(weights)
-    stiffness, once = fit.coefficients[:columns] @ weights, fit.without[:, :columns] @ weights
-    damping, damping_once = fit.coefficients[columns:] @ weights, fit.without[:, columns:] @ weights
+    stiffness = fit.coefficients[:columns] @ weights
+    once = fit.without[:, :columns] @ weights
+    damping = fit.coefficients[columns:] @ weights
+    damping_once = fit.without[:, columns:] @ weights
     K = fit.interval(stiffness, once)
     bounded = K.low > 0 or K.high < 0
-    reaction, chance = max(wide.explained - fit.explained, 0.0), wide.chance(2 * columns)
+    reaction = max(wide.explained - fit.explained, 0.0)
+    chance = wide.chance(2 * columns)
     verdict, reason = _verdict(K, fit.explained, reaction, chance)
     return PushedSpring(
         **known,
@@ -227,19 +235,20 @@ def _unknown(known: dict[str, float], reason: str) -> PushedSpring:
 
 
 def _deviation(values: NDArray, phase: NDArray, cell: NDArray) -> NDArray:
-    """(n,) minus the straight line over `phase` through the values of each `cell`."""
+    """Return (n,) minus the straight line over `phase` through the values of each `cell`."""
 
     def centred(column: NDArray) -> NDArray:
         return column - (np.bincount(cell, column) / np.bincount(cell))[cell]
 
-    moved, values = centred(phase), centred(values)
+    moved = centred(phase)
+    values = centred(values)
     spread = np.bincount(cell, moved**2)
     slope = np.bincount(cell, moved * values) / np.where(spread > 1e-18, spread, np.inf)
     return values - slope[cell] * moved
 
 
 def _hats(phase: NDArray, low: float, high: float, spacing: float | None) -> NDArray:
-    """(n, knots) weights of a piecewise linear function's values at its evenly spaced knots."""
+    """Return (n, knots) weights of a piecewise linear function's values at its evenly spaced knots."""
     if spacing is None:
         return np.ones((len(phase), 1))
     pieces = max(1, int(np.ceil((high - low) / spacing - 1e-9)))

@@ -44,7 +44,8 @@ def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
     """People's ankle quasi-stiffness, not the joint's own K, at 1.2 m/s (`human_gait`) beside another laboratory's."""
     human = human_gait(FUKUCHI_SPEED)
     phase = np.arange(100) / 100
-    angle, moment = human.mean("ankle", phase), human.mean("ankle_moment", phase)
+    angle = human.mean("ankle", phase)
+    moment = human.mean("ankle_moment", phase)
     velocity = human.rate("ankle", phase) / human.stride_time
     bounds = (0.0, *(end for _, _, end, _, _ in FUKUCHI_OVERGROUND))
     rows = []

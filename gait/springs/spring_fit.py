@@ -68,7 +68,7 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
 
 
 def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
-    """(value, low, high) of K, beta and theta_eq.
+    """Return (value, low, high) of K, beta and theta_eq.
 
     Fieller 1954 for the ratios: all r for which the numerator - r K does not differ from 0. Exact where the delta
     method is not; where K may be 0 the ratio has no bounds.
@@ -84,6 +84,7 @@ def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
             product = (top**2 - v[index, index]) / squared
             half = np.sqrt(np.maximum(middle**2 - product, 0.0))
             bounded = squared > 0
-            low, high = np.where(bounded, middle - half, -np.inf), np.where(bounded, middle + half, np.inf)
+            low = np.where(bounded, middle - half, -np.inf)
+            high = np.where(bounded, middle + half, np.inf)
             results.append((top / K, low, high))
     return results

@@ -69,7 +69,8 @@ class StiffnessSchedule:
             starts, springs, rests = np.array(getattr(self, joint)).T
             # Before the first start the index is -1: the last segment of the previous stride.
             index = np.searchsorted(starts, phase, side="right") - 1
-            stiffness[..., column], equilibrium[..., column] = springs[index], rests[index]
+            stiffness[..., column] = springs[index]
+            equilibrium[..., column] = rests[index]
         return stiffness, equilibrium
 
     def to_json(self) -> dict[str, list[list[float]]]:
@@ -78,7 +79,7 @@ class StiffnessSchedule:
 
     @classmethod
     def from_json(cls, data: object) -> "StiffnessSchedule":
-        """The inverse of `to_json`; `SpringfootError` if `data` is not of that form."""
+        """Return the inverse of `to_json`; `SpringfootError` if `data` is not of that form."""
         if not isinstance(data, dict) or set(data) != set(SPRINGS):
             raise SpringfootError(f"a stiffness schedule must be an object with keys ankle and toe, got {data!r:.80}")
         for joint, segments in data.items():
@@ -95,7 +96,8 @@ def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: fl
     all (torque growing with the angle, or changing at a standing angle), gets K = `lowest` through its mid-point.
     """
     (first_angle, first_torque), (last_angle, last_torque) = start, end
-    turned, lost = last_angle - first_angle, first_torque - last_torque
+    turned = last_angle - first_angle
+    lost = first_torque - last_torque
     stiffness = lost / turned if abs(turned) > 1e-6 else 0.0
     stiffness = max(stiffness, lowest)
     if stiffness == 0.0:
@@ -190,7 +192,7 @@ PRINTED_SWING = tuple((k, 0.0) for k in LOWEST_STIFFNESS)
 def thesis_schedule(
     body: Body, speed: float = 1.2, swing: tuple[tuple[float, float], ...] = THESIS_SWING
 ) -> StiffnessSchedule:
-    """The thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
+    """Return the thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
 
     Torques scale with mass x height from people's at `speed` [m/s]. Of the toe people's moment is not known: it has
     `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. No line of the ankle falls below its `LOWEST_STIFFNESS`.
@@ -223,7 +225,7 @@ def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray
 
 
 def _curves(*curves: ArrayLike) -> list[NDArray]:
-    """The curves as float arrays (n,), all finite and of the same length."""
+    """Return the curves as float arrays (n,), all finite and of the same length."""
     arrays = [np.asarray(curve, float) for curve in curves]
     shapes = [array.shape for array in arrays]
     if len(shapes[0]) != 1 or len(set(shapes)) > 1 or not all(np.isfinite(array).all() for array in arrays):
@@ -234,7 +236,7 @@ def _curves(*curves: ArrayLike) -> list[NDArray]:
 def _lines(
     events: dict[str, float], phase: ArrayLike, angle: ArrayLike, torque: ArrayLike, lowest: float
 ) -> list[Segment]:
-    """One segment from each event to the next; events that coincide leave no line between them."""
+    """Return one segment from each event to the next; events that coincide leave no line between them."""
     phases, angles, torques = _curves(phase, angle, torque)
     times = list(events.values())
     points = [(float(np.interp(time, phases, angles)), float(np.interp(time, phases, torques))) for time in times]

@@ -25,7 +25,10 @@ _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 
 def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
-    """How tyro reads a flag of this type; the word `None` is a value of those that can be None, and of no others."""
+    """Return how tyro reads a flag of this type.
+
+    The word `None` is a value of those that can be None, and of no others.
+    """
     inner = next((part for part in _parts(kind) if get_origin(part) is tuple), kind)
     items = get_args(inner) if get_origin(inner) is tuple else ()
     count: Any = "*" if items[1:] == (...,) else len(items) or 1
@@ -35,7 +38,7 @@ def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
 
 
 def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro.constructors.PrimitiveConstructorSpec:
-    """A flag of `count` words that `read` makes a value of; its default is `NOT_GIVEN`."""
+    """Return a flag of `count` words that `read` makes a value of; its default is `NOT_GIVEN`."""
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs=count,
         metavar=metavar,
@@ -46,7 +49,7 @@ def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro
 
 
 def metavar_of(kind: Any) -> str:
-    """How a value of this type is written on the command line."""
+    """Return how a value of this type is written on the command line."""
     parts = get_args(kind)
     if get_origin(kind) is Literal:
         return "|".join(map(str, parts))
@@ -61,7 +64,7 @@ def _parts(kind: Any) -> tuple[Any, ...]:
 
 
 def _read(kind: Any, words: list[str]) -> Any:
-    """The value, or `ValueError` that says what it must be."""
+    """Return the value, or `ValueError` that says what it must be."""
     parts = _parts(kind)
     if NoneType in parts and words == [_NONE]:
         return None

@@ -26,7 +26,7 @@ from .flag_words import NOT_GIVEN, flag_of, spec
 
 
 def field_help(settings: type) -> dict[str, str]:
-    """The docstring below each field of a dataclass, on one line."""
+    """Return the docstring below each field of a dataclass, on one line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
     return {
         item.target.id: " ".join(str(doc.value.value).split())
@@ -39,7 +39,7 @@ def field_help(settings: type) -> dict[str, str]:
 
 
 def _read_json(words: list[str]) -> dict[str, Any]:
-    """A dictionary from JSON text, or from the JSON file of that name."""
+    """Return a dictionary from JSON text, or from the JSON file of that name."""
     text = words[0]
     if not text.lstrip().startswith("{"):
         if not Path(text).is_file():
@@ -53,7 +53,7 @@ def _read_json(words: list[str]) -> dict[str, Any]:
 
 
 def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
-    """The setting `human` from what `--human` is given; `trust_units` as in `read_gait`.
+    """Return the setting `human` from what `--human` is given; `trust_units` as in `read_gait`.
 
     A file of `read_gait`; FILE:CONDITION for one of several in a CSV; several files of one walk with commas between.
     Raises `SpringfootError` for a file that cannot be read.
@@ -73,12 +73,12 @@ def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | 
 
 
 def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
-    """A word as it is, a name of a file too; a dictionary from JSON text."""
+    """Return a word as it is, a name of a file too; a dictionary from JSON text."""
     return _read_json(words) if words[0].lstrip().startswith("{") else words[0]
 
 
 def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
-    """The foot that a flag is given: as it is, or that of the file of that name; no kind's name has a suffix."""
+    """Return the foot that a flag is given: as it is, or that of the file of that name; no kind's name has a suffix."""
     if isinstance(given, str) and (Path(given).is_file() or Path(given).suffix):
         return read_foot(given)
     return given
@@ -106,14 +106,17 @@ def optional_flags(
     themes: Mapping[str, str] = THEMES,
     refused: Mapping[str, str] = MappingProxyType({}),
 ) -> type:
-    """A dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
+    """Return a dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
 
     The help of each flag is the docstring of the field, with its value in `defaults` (an instance). Fields that name a
     theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
     `themes` has for it. Of the fields that the command refuses, by name, the help says `refused`: what is there for it.
     """
-    help_of, flags, themed = field_help(settings), [], {theme: [] for theme in themes}
-    hints, metadata = get_type_hints(settings), {item.name: item.metadata for item in dataclasses.fields(settings)}
+    help_of = field_help(settings)
+    flags = []
+    themed = {theme: [] for theme in themes}
+    hints = get_type_hints(settings)
+    metadata = {item.name: item.metadata for item in dataclasses.fields(settings)}
     for item_name, kind in hints.items():
         if item_name not in leave_out:
             shown = help_of[item_name], f"(default: {_words(getattr(defaults, item_name))})"
@@ -141,7 +144,7 @@ def _words(default: Any) -> Any:
 
 
 def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
-    """The annotation of a flag for a setting of this type, with its help and the hint behind it."""
+    """Return the annotation of a flag for a setting of this type, with its help and the hint behind it."""
     parts = get_args(kind)
     if name in FILE_FLAGS:
         how = spec(lambda words: words[0], "FILE")
@@ -155,7 +158,10 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
 
 
 def given(flags: Any) -> dict[str, Any]:
-    """The flags that were given, by name, themes aside and files read; raises `SpringfootError` for a bad file."""
+    """Return the flags that were given, by name, themes aside and files read.
+
+    Raise `SpringfootError` for a bad file.
+    """
     values: dict[str, Any] = {}
     for item in dataclasses.fields(flags):
         value = getattr(flags, item.name)
@@ -169,7 +175,7 @@ def given(flags: Any) -> dict[str, Any]:
 
 
 def _evaluated(theme: str) -> str:
-    """The help of a theme in an evaluation: which of its settings a trained policy brings with it."""
+    """Return the help of a theme in an evaluation: which of its settings a trained policy brings with it."""
     names = [name for name, its in THEME_OF.items() if its == theme and name != "episode_seconds"]  # given as --seconds
     own = [f"--{name.replace('_', '-')}" for name in names if name not in CONDITION_SETTINGS]
     if len(own) == len(names):

@@ -34,7 +34,8 @@ def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
     """Student's interval of the mean of a few values (n,), as of training seeds; of one value, everything."""
     if len(values) < 2:
         return -np.inf, np.inf
-    mean, half = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    mean = float(np.mean(values))
+    half = float(np.std(values, ddof=1) / np.sqrt(len(values)))
     half *= float(t.ppf(0.5 + 0.5 * level, len(values) - 1))
     return mean - half, mean + half
 
@@ -50,5 +51,6 @@ def paired_p(fell: NDArray, other: NDArray) -> float:
 
     Only episodes in which one row fell and the other did not tell; 1 without any.
     """
-    alone, other_alone = int((fell & ~other).sum()), int((other & ~fell).sum())
+    alone = int((fell & ~other).sum())
+    other_alone = int((other & ~fell).sum())
     return float(binomtest(alone, alone + other_alone).pvalue) if alone + other_alone else 1.0

@@ -31,7 +31,7 @@ class Protocol:
     progress: OnProgress = lambda seconds: None
 
     def of(self, policy: str, given: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
-        """The policy's metrics `undisturbed` and `pushed`, with the default reward."""
+        """Return the policy's metrics `undisturbed` and `pushed`, with the default reward."""
         metrics = {}
         for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
             wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})

@@ -19,7 +19,7 @@ OPEN_LOOP = "open loop"
 
 
 def open_loop_note(name: str) -> str:
-    """The sentence under a table that has the open-loop copy of a policy; empty where it has none."""
+    """Return the sentence under a table that has the open-loop copy of a policy; empty where it has none."""
     copies = ", ".join(f"`{copy}`" for copy in and_copy(name)[1:])
     return copies and f" Open loop: {copies}, the policy's mean K over the stride at the same θ_eq, without feedback."
 
@@ -33,7 +33,7 @@ class Quantity:
     path: tuple[str, ...]
 
     def of(self, metrics: Mapping[str, Any]) -> Any:
-        """The number; None where it could not be measured."""
+        """Return the number; None where it could not be measured."""
         return reduce(getitem, self.path, metrics)
 
     @property
@@ -66,7 +66,7 @@ def walks_csv(rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> st
 
 
 def falls_text(metrics: Mapping[str, Any]) -> str:
-    """How many episodes fell, in words."""
+    """Return how many episodes fell, in words."""
     return f"{metrics['falls']} of {metrics['episodes']}"
 
 

@@ -43,12 +43,12 @@ from .person_search import Person, PersonSearch
 
 
 def kept_name(name: str, search: int) -> str:
-    """What the foot of a search is called in the file: the first by its name alone."""
+    """Return the foot's name in the file for a search: the first by its name alone."""
     return name if search == 1 else f"{name}, search {search}"
 
 
 def beginning(foot: str | dict[str, Any], speed: float) -> Person:
-    """The person who has not adapted; the springs of an adaptive foot have the stiffness of a usual passive one."""
+    """Return the person who has not adapted; an adaptive foot has the stiffness of a usual passive one."""
     tuned = leg_constants("planned", "people", speed)
     other = tuned
     setting = foot_setting("foot", foot)
@@ -129,7 +129,9 @@ class Adapt(Study):
         foot = without_person(setting.plain) if isinstance(setting.plain, dict) else setting.plain
         name = self.name or (setting.kind if self.speed == TUNED_SPEED else f"{setting.kind}, {self.speed:g} m/s")
         begin = self._begin(foot)
-        lines, told, files = [], [], {}
+        lines = []
+        told = []
+        files = {}
         walks = []
         for search in self.searches:
             label = kept_name(name, search)
@@ -151,7 +153,7 @@ class Adapt(Study):
         return Answer(text=text, files=files)
 
     def _walked(self, policy: str, foot: str | dict[str, Any]) -> list[str]:
-        """What a walk on the right `foot` comes to, in a table's words."""
+        """Describe a walk on the right `foot` in a table's words."""
         given = {"right_foot": foot, "speed": self.speed, "episode_seconds": self.seconds}
         given |= SCHEDULE[1] if policy == SCHEDULE[0] else {}
         found = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
@@ -173,7 +175,8 @@ class Adapt(Study):
         self, begin: Person, search: int, label: str, progress: OnProgress
     ) -> tuple[Person, list[tuple[int, float, float]]]:
         settings = BipedSettings(speed=self.speed)
-        space, seed = PersonSearch(begin, self.speed, self.design), self.seed + 1_000_000 * (search - 1)
+        space = PersonSearch(begin, self.speed, self.design)
+        seed = self.seed + 1_000_000 * (search - 1)
         options = {"popsize": self.population, "seed": seed + 1, "CMA_diagonal": True, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(space.size), self.sigma, options)
         bend = None if self.bend_deg is None else radians(self.bend_deg)

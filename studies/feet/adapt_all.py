@@ -44,7 +44,8 @@ class AdaptAll(Study):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Search; with --quick for a moment, and nothing is written."""
-        known, lines = read_feet(self.feet), []
+        known = read_feet(self.feet)
+        lines = []
         for label, command in list(known["found_by"].items())[: self.first]:
             if read_feet(self.to)["found_by"].get(label) != command or self.quick:
                 self._run(label, command, progress)

@@ -68,10 +68,12 @@ ABOUT_STOPS = (
 
 
 def numbers_of(gait: Gait) -> dict[str, float | None]:
-    """The numbers of an undisturbed walk, by their names in the CSV files; None where nothing walks."""
-    metrics, tally = gait.metrics, gait.tally
+    """Return the numbers of an undisturbed walk, by their names in the CSV files; None where nothing walks."""
+    metrics = gait.metrics
+    tally = gait.tally
     sound, other = leg_numbers(tally).values()
-    apart, steps = asymmetry({"left": sound, "right": other})["step_length"], metrics["step_length_m"]
+    apart = asymmetry({"left": sound, "right": other})["step_length"]
+    steps = metrics["step_length_m"]
     found: dict[str, float | None] = {
         "falls": metrics["falls"] / metrics["episodes"],
         "speed_m_s": metrics["speed_m_s"]["mean"],
@@ -123,7 +125,7 @@ def beyond_stop(recording: Recording) -> float | None:
 
 
 def for_body(foot: Mapping[str, Any], height: float, mass: float) -> dict[str, Any]:
-    """The foot for another body: its own springs as much stiffer as the body's mass x height is larger."""
+    """Return the foot for another body: its own springs as much stiffer as the body's mass x height is larger."""
     ratio = height * mass / (REFERENCE_HEIGHT * REFERENCE_MASS)
     stiff = {
         key: round(float(np.clip(value * ratio, SPRING_NUMBERS[key].low, SPRING_NUMBERS[key].high)), 3)

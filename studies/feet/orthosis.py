@@ -1,4 +1,4 @@
-"""Which spring beside the right ankle helps a weak calf, and which a drop foot?
+"""Springs beside the right ankle: which helps a weak calf, and which a drop foot.
 
     springfoot study orthosis
 
@@ -90,11 +90,14 @@ class Orthosis(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with every spring."""
-        kept, dropping = Kept(self.keep), replace(self, episodes=self.episodes_drop)
+        kept = Kept(self.keep)
+        dropping = replace(self, episodes=self.episodes_drop)
         elsewhere = replace(dropping, seed=UNSEARCHED)
-        weak, drop = self._weak(kept, progress), dropping._drop(kept, progress)
+        weak = self._weak(kept, progress)
+        drop = dropping._drop(kept, progress)
         even = at_walked_speeds(weak, (1.1,) if self.quick else WALKED_SPEEDS)
-        best, as_asked = best_springs(even), best_springs([row for row in weak if row["speed_m_s"] in DROP_SPEEDS])
+        best = best_springs(even)
+        as_asked = best_springs([row for row in weak if row["speed_m_s"] in DROP_SPEEDS])
         files = {
             "weak.csv": _csv(weak),
             "best.csv": _csv(best),
@@ -123,7 +126,8 @@ class Orthosis(WalkingStudy):
         return rows
 
     def _drop(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
-        rows, springs = [], list(product(SWING_SPRINGS, SWING_RESTS))
+        rows = []
+        springs = list(product(SWING_SPRINGS, SWING_RESTS))
         feet = [{"kind": "drop", "orthosis": {"ankle_stiffness": k, "ankle_deg": rest}} for k, rest in springs]
         for speed in self._drop_speeds():
             cells = [
@@ -136,7 +140,7 @@ class Orthosis(WalkingStudy):
         return rows
 
     def _adapted(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
-        """Walks on the feet of `WHO_ADAPTED`, of one who has not adapted and of one who has."""
+        """Walk on the feet of `WHO_ADAPTED`, without and with a person who has adapted."""
         rows = []
         for name in self._people():
             bare = without_person(committed_feet()[name])
@@ -169,7 +173,7 @@ class Orthosis(WalkingStudy):
     def _walk(
         self, kept: Kept, given: Mapping[str, Any], feet: Sequence[dict[str, Any]], progress: OnProgress
     ) -> list[dict[str, Any]]:
-        """The numbers of each of the right `feet`, the same episodes for each."""
+        """Return the numbers of each of the right `feet`, the same episodes for each."""
 
         def make() -> dict[str, Any]:
             acting, settings = prepare(self.policy, {**given, "episode_seconds": self.seconds})
@@ -187,7 +191,8 @@ def muscle_energy(recording: Recording) -> float | None:
 
     The right ankle's is of the mean torque and the change of angle of each 10 ms; None without progress.
     """
-    settings, first = recording.settings, round(WARM_UP / TICK)
+    settings = recording.settings
+    first = round(WARM_UP / TICK)
     orthosis = settings.right_foot.foot.ankle.orthosis or Spring()
     beta = damping_times(body_of(settings))[ANKLE] if orthosis.damping_time is None else orthosis.damping_time
     energy = way = 0.0
@@ -197,11 +202,13 @@ def muscle_energy(recording: Recording) -> float | None:
         work = recording.series["joint_work"][episode, first + 1 : end].astype(float)
         angle = recording.series["angle"][episode, first:end, RIGHT, ANKLE].astype(float)
         torque = recording.series["joint_torque"][episode, first + 1 : end, RIGHT, ANKLE].astype(float)
-        change, middle = np.diff(angle), 0.5 * (angle[1:] + angle[:-1])
+        change = np.diff(angle)
+        middle = 0.5 * (angle[1:] + angle[:-1])
         spring = orthosis.stiffness * (orthosis.rest - middle - beta * change / TICK)
         muscle = (torque - spring) * change
         work[:, RIGHT, ANKLE] = np.stack([np.maximum(muscle, 0.0), np.minimum(muscle, 0.0)], -1)
-        up, down = work[..., 0].sum(), -work[..., 1].sum()
+        up = work[..., 0].sum()
+        down = -work[..., 1].sum()
         energy += up / EFFICIENCY["positive"] + down / EFFICIENCY["negative"]
         way += float(recording.series["com"][episode, end - 1, 0] - recording.series["com"][episode, first, 0])
     return energy / (body_of(settings).mass * way) if way > 0.5 else None

@@ -44,15 +44,16 @@ def at_walked_speeds(rows: Sequence[Row], speeds: Sequence[float]) -> list[dict[
 def _energy_at(speed: float, slow: Row, fast: Row) -> float | None:
     if slow["falls"] or fast["falls"] or None in (slow["energy_J_kg_m"], fast["energy_J_kg_m"]):
         return None
-    low, high = slow["walked_m_s"], fast["walked_m_s"]
+    low = slow["walked_m_s"]
+    high = fast["walked_m_s"]
     if not low <= speed <= high:
         return None
     return float(np.interp(speed, [low, high], [slow["energy_J_kg_m"], fast["energy_J_kg_m"]]))
 
 
 def best_springs(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Of the springs with which nobody falls, for each body, speed and strength: that with which muscles take least
-    energy for a metre, by how much the worst of them takes more, and that which slows the walk least."""
+    """Return of the springs with which nobody falls, for each body, speed and strength: that with which muscles take
+    least energy for a metre, by how much the worst of them takes more, and that which slows the walk least."""
     found = []
     for cell in _cells(rows):
         walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row["energy_J_kg_m"] is not None]
@@ -78,8 +79,8 @@ def _of(rows: Sequence[Row], cell: tuple[float, ...]) -> list[Row]:
 
 
 def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row], what_ran: str) -> str:
-    """The section of the weak calf: all `rows`, and `best_springs` where people walk, and where they are asked to walk,
-    equally fast."""
+    """Return the section of the weak calf: all `rows`, and `best_springs` where people walk, and where they are asked
+    to walk, equally fast."""
     speeds = sorted({row["speed_m_s"] for row in best})
     lines = []
     for strength in sorted({row["strength"] for row in best}):
@@ -118,8 +119,8 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
 
 
 def directions(best: Sequence[Row], column: str) -> str:
-    """Whether a stiffness of `best_springs` rises with weakness, mass and speed, in words: over all cells, and in pairs
-    of cells that differ in nothing else."""
+    """Return whether a stiffness of `best_springs` rises with weakness, mass and speed, in words: over all cells, and
+    in pairs of cells that differ in nothing else."""
     known = [row for row in best if row[column] is not None]
     told = []
     for name, label, sign in (("strength", "weakness", -1), ("mass_kg", "mass", 1), ("speed_m_s", "speed", 1)):
@@ -151,7 +152,7 @@ def at_the_ends(best: Sequence[Row], springs: Sequence[float]) -> str:
 
 
 def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
-    """The weakest spring with which, and with all stiffer ones of its rest angle, none falls."""
+    """Return the weakest spring with which, and with all stiffer ones of its rest angle, none falls."""
     cures = []
     for rest in sorted({row["rest_deg"] for row in rows}):
         own = sorted((row for row in rows if row["rest_deg"] == rest), key=lambda row: -row["spring_Nm_rad"])
@@ -165,7 +166,7 @@ def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
 
 
 def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: float) -> str:
-    """The section of the drop foot; each cell is of `episodes`."""
+    """Return the section of the drop foot; each cell is of `episodes`."""
     parts = []
     for speed in dict.fromkeys(row["speed_m_s"] for row in rows):
         here = [row for row in rows if row["speed_m_s"] == speed]
@@ -198,7 +199,7 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
 
 
 def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
-    """The section of people who adapted; nothing where there are none."""
+    """Return the section of people who adapted; nothing where there are none."""
     head = ["right foot", "person", *(each.label for each in TOLD)]
     lines = [
         [row["foot"], row["person"], *(_unless_all_fall(row, each.key, each.pattern) for each in TOLD)] for row in rows
@@ -222,7 +223,8 @@ def _cell(row: Row) -> str:
 def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
     """Write the picture: energy over stiffness, a panel a speed walked at the middle mass, a line a strength."""
     masses = sorted({row["mass_kg"] for row in rows})
-    mass, speeds = masses[len(masses) // 2], sorted({row["speed_m_s"] for row in rows})
+    mass = masses[len(masses) // 2]
+    speeds = sorted({row["speed_m_s"] for row in rows})
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 3.4), layout="constrained")
         for ax, speed in zip(
@@ -230,7 +232,8 @@ def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
         ):
             for strength, color in zip(sorted({row["strength"] for row in rows}), COLORS * 9, strict=False):
                 own = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
-                x, y = [row["spring_Nm_deg"] for row in own], [row["energy_J_kg_m"] for row in own]
+                x = [row["spring_Nm_deg"] for row in own]
+                y = [row["energy_J_kg_m"] for row in own]
                 ax.plot(x, y, "o-", color=color, ms=3.5, lw=1.3, label=f"a calf of {100 * strength:.0f} %")
                 for row in _of(best, (mass, speed, strength)):
                     if row["best_Nm_deg"] is not None:

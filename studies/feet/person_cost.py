@@ -49,10 +49,12 @@ def cost(
     bend: float | None = None,
     bend_weight: float = 1.0,
 ) -> NDArray:
-    """(C,) what each person pays; `push` [N]; the range of the right toe beyond `bend` [rad], if given, costs too,
-    `bend_weight` times."""
+    """Return (C,) what each person pays; `push` [N]; the range of the right toe beyond `bend` [rad], if given, costs
+    too, `bend_weight` times."""
     settings = replace(settings, unevenness_m=UNEVENNESS, action_mode="residual")
-    legs, right, feet = [p.sound for p in people], [p.other for p in people], [p.feet for p in people]
+    legs = [p.sound for p in people]
+    right = [p.other for p in people]
+    feet = [p.feet for p in people]
     total = np.zeros(len(people))
     seeds = [seed + index % LEVEL for index in range(LEVEL * len(people))]
     walked = walk(settings, legs, seeds, threads, foreign=(), right=right, feet=feet)

@@ -38,7 +38,7 @@ class Person:
         return INTACT, foot_setting("foot", self.foot).foot
 
     def setting(self, speed: float) -> dict[str, Any]:
-        """The foot as a setting, with `adapted` for `speed` [m/s]."""
+        """Return the foot as a setting, with `adapted` for `speed` [m/s]."""
         foot = {"kind": self.foot} if isinstance(self.foot, str) else dict(self.foot)
         legs = dict(zip(LEGS, (asdict(self.sound), asdict(self.other)), strict=True))
         return foot | {ADAPTED: {f"{speed:g}": {leg: _listed(values) for leg, values in legs.items()}}}
@@ -54,7 +54,8 @@ class PersonSearch:
     """
 
     def __init__(self, start: Person, speed: float, design: float):
-        self._start, self._design = start, design
+        self._start = start
+        self._design = design
         self._legs = [Search(start.sound, speed), Search(start.other, speed)]
         foot = foot_setting("foot", start.foot)
         device = foot.foot.ankle.device is not None
@@ -68,8 +69,9 @@ class PersonSearch:
         self.size = sum(int(free.sum()) for free in self._free) + len(self._numbers)
 
     def person(self, vector: NDArray) -> Person:
-        """The candidate at a vector (size,)."""
-        place, legs = 0, []
+        """Return the candidate at a vector (size,)."""
+        place = 0
+        legs = []
         for search, free in zip(self._legs, self._free, strict=True):
             own = np.zeros(search.size)
             own[free] = vector[place : place + int(free.sum())]

@@ -1,4 +1,4 @@
-"""What is a foot worth to the person who wears it on the right: rigid, a passive spring, adaptive, intact?
+"""The worth of a right foot to the person who wears it: rigid, a passive spring, adaptive, intact.
 
     springfoot study prosthesis
     springfoot study prosthesis --train
@@ -97,7 +97,8 @@ class Prosthesis(TrainingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Train what is asked for and missing, and walk."""
         failed = self._train() if self.train else False
-        kept, rows = Kept(self.keep), []
+        kept = Kept(self.keep)
+        rows = []
         for row, policy, given in self._rows():
             how = self._how(row)
             asked = [row, policy, _digest(policy, given), given, {**how, "threads": 0}, PUSH_NEWTON, NAMES]
@@ -117,7 +118,7 @@ class Prosthesis(TrainingStudy):
         return Answer(text="\n\n".join(text.values()), files=files, failed=failed)
 
     def _how(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """How the episodes of a row are recorded."""
+        """Return how the episodes of a row are recorded."""
         if not (_here(row) or row["asked_m_s"] == _held_speed()):
             return {**self.how, "episodes": self.episodes_elsewhere}
         if row["person"] == WITH_POLICY:
@@ -126,8 +127,12 @@ class Prosthesis(TrainingStudy):
         return {**self.how, "episodes": each, "seed": self.seed + each * row["seed"]}
 
     def _rows(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """What a row is of, its policy, and its settings; `seed` is that of a training, or a group of episodes."""
-        feet, quick = committed_feet(), self.quick
+        """Return the labels of a row, its policy, and its settings.
+
+        `seed` is that of a training, or a group of episodes.
+        """
+        feet = committed_feet()
+        quick = self.quick
         for (height, mass), speed in PLACES[: 1 if quick else None]:
             given = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
             where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
@@ -156,7 +161,7 @@ class Prosthesis(TrainingStudy):
         yield from self._held()
 
     def _held(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """The rigid foot whose toe is held, and the passive feet, at the speed at which it was found."""
+        """Return the rigid foot whose toe is held, and the passive feet, at the speed at which it was found."""
         if (speed := _held_speed()) is None:
             return
         (height, mass), feet = BODIES[0], committed_feet()
@@ -190,7 +195,7 @@ class Prosthesis(TrainingStudy):
 
 
 def _here(where: Mapping[str, Any]) -> bool:
-    """Whether a row is of the body and the speed that was searched for and trained on."""
+    """Return whether a row is of the body and the speed that was searched for and trained on."""
     return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
 
 
@@ -218,8 +223,9 @@ def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
 
 
 def _digest(policy: str, given: Mapping[str, Any]) -> str:
-    """Of the policy's file, and of the legs and the foot that go by a name."""
-    path, foot = Path(policy), given.get("right_foot")
+    """Return of the policy's file, and of the legs and the foot that go by a name."""
+    path = Path(policy)
+    foot = given.get("right_foot")
     name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
     content = path.read_bytes() if path.is_file() else b""
     return hashlib.sha256(content + json.dumps(committed_feet().get(name)).encode()).hexdigest()

@@ -26,8 +26,9 @@ Row = Mapping[str, Any]
 
 
 def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """What adaptive stiffness changes against the passive spring found, by place, person, number and search, in pairs:
-    of the same seed of the trainings, or the same episodes where nobody learned.
+    """Return the changes of adaptive stiffness against the passive spring found, by place, person, number and search.
+
+    Pairs are of the same seed of the trainings, or of the same episodes where nobody learned.
 
     `share` is that change over the gap between the passive and the intact foot; where the intact one is not better,
     or by no more than the interval of the gap over the pairs, there is no gap to close and no share. Of `both` searches
@@ -46,7 +47,7 @@ def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list[dict[str, Any]]:
-    """Of each search by itself, and of both."""
+    """Return of each search by itself, and of both."""
     known = [row[asked.key] for row in rows if row["foot"] == "intact" and row[asked.key] is not None]
     intact = float(np.mean(known)) if known else None
     pairs = {each: pairs_of(rows, (("passive", each), ("adaptive", each)), asked.key) for each in searches}
@@ -61,7 +62,7 @@ def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list
 
 
 def pairs_of(rows: Sequence[Row], worn: Sequence[tuple[str, Any]], key: str) -> np.ndarray:
-    """(n, 2) a number of two feet, each with its search, in pairs of the same `seed` in which both have it."""
+    """Return (n, 2) a number of two feet, each with its search, in pairs of the same `seed` in which both have it."""
     of = [{row["seed"]: row[key] for row in rows if (row["foot"], row["search"]) == each} for each in worn]
     pairs = [(of[0][seed], of[1][seed]) for seed in of[0] if seed in of[1]]
     return np.array([pair for pair in pairs if None not in pair], float).reshape(-1, 2)
@@ -144,7 +145,8 @@ def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
 
 def _passive_against(rows: Sequence[Row], foot: str) -> str:
     """In which numbers the passive feet found are better, person adapted to both; a foot with searches by search."""
-    own, told = [row for row in rows if row["person"] == ADAPTED_ALONE], []
+    own = [row for row in rows if row["person"] == ADAPTED_ALONE]
+    told = []
     theirs = {row["search"] for row in own if row["foot"] == foot}
     for search in sorted({row["search"] for row in own if row["foot"] == "passive"}):
         said: dict[str, list[str]] = {"better": [], "worse": [], "not told apart": []}

@@ -15,12 +15,12 @@ ADAPTED_FEET = CONSTANTS.with_name("adapted.json")
 
 
 def read_constants(path: Path) -> dict[str, Any]:
-    """A file of constants."""
+    """Return a file of constants."""
     return _read(path, "constants", "leg constants")
 
 
 def read_feet(path: Path) -> dict[str, Any]:
-    """A file of adapted feet; an empty one where there is none."""
+    """Return a file of adapted feet; an empty one where there is none."""
     return _read(path, "feet", "adapted feet") if path.exists() else {"found_by": {}, "feet": {}}
 
 

@@ -8,8 +8,11 @@ GENERIC = "generic"
 
 
 def generic_constants() -> LegConstants:
-    """No correction of any curve, all moments fed forward, the same stiff springs at every phase, an upright trunk."""
-    level, stiff = (0.0,) * len(KNOTS), (200.0, 200.0)
+    """Return no correction of any curve, all moments fed forward, the same stiff springs at every phase, an upright
+    trunk.
+    """
+    level = (0.0,) * len(KNOTS)
+    stiff = (200.0, 200.0)
     return LegConstants(
         hip_knots_deg=level,
         knee_knots_deg=level,

@@ -24,7 +24,7 @@ NOT_ASKED = frozenset(
 
 
 def asked_of(study: Study) -> dict[str, Any]:
-    """What a study that searches was asked for, as plain JSON values."""
+    """Return the settings of a study that searches, as plain JSON values."""
     asked = {name: value for name, value in vars(study).items() if name not in NOT_ASKED}
     return {name: str(value) if isinstance(value, Path) else value for name, value in asked.items()}
 
@@ -42,11 +42,13 @@ def generations(
     gone on with. `asked`, plain JSON values, says what is searched for: raises `SpringfootError` for the file of
     another search.
     """
-    asked, known = json.loads(json.dumps(asked)), []
+    asked = json.loads(json.dumps(asked))
+    known = []
     if kept is not None and kept.is_file():
         try:
             table = json.loads(kept.read_text(encoding="utf-8"))
-            before, known = table["asked"], [np.array(paid, float) for paid in table["paid"]]
+            before = table["asked"]
+            known = [np.array(paid, float) for paid in table["paid"]]
         except (ValueError, TypeError, KeyError) as error:
             raise SpringfootError(f"{kept} is not what a search paid: {error}") from None
         if before != asked:

@@ -105,8 +105,9 @@ def cost(
     pays: Pays = "likeness",
     impact: float = 1.0,
 ) -> NDArray:
-    """(C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks with
-    springs that nobody tuned; an undisturbed walk `pays` for what it misses, or for its effort, and for its `impact` at
+    """Return (C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks
+    with springs that nobody tuned; an undisturbed walk `pays` for what it misses, or for its effort, and for its
+    `impact` at
     this price (`walk_effort`)."""
     springs, pushed_springs = foreign_springs(settings)
     walks = SCHEDULED + len(springs)
@@ -138,7 +139,8 @@ def cost(
         total += FALL_COST * missing.reshape(len(candidates), SET_OFF).mean(1)
     if push == 0:
         return total
-    pushed, walks = replace(settings, push_newton=push, push_interval=2.5), PUSHED + len(pushed_springs)
+    pushed = replace(settings, push_newton=push, push_interval=2.5)
+    walks = PUSHED + len(pushed_springs)
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
     missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs).missing
     missing = missing.reshape(len(candidates), walks)
@@ -158,13 +160,13 @@ def _paid(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -
 
 
 def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:
-    """What a walk with springs that nobody tuned pays for a fall, or for its mean speed [m/s]."""
+    """Return the price of a walk with springs that nobody tuned: of a fall, or of its mean speed [m/s]."""
     fall = missing * FALL_COST / len(FOREIGN)
     return fall or abs(speed - settings.speed) / TOLERANCE["foreign_speed"]
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
-    """The misses of each candidate on the walks of `REFINED`; None if it falls in one of them."""
+    """Return the misses of each candidate on the walks of `REFINED`; None if it falls in one of them."""
     found: list[list[NDArray] | None] = [[] for _ in candidates]
     for start, seed in REFINED:
         own = replace(settings, start=start, unevenness_m=UNEVENNESS)
@@ -226,7 +228,7 @@ def mean_speed(tally: StrideTally) -> float:
 
 
 def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
-    """What of a difference lies beyond a band about 0."""
+    """Return the part of a difference beyond a band about 0."""
     return np.sign(difference) * np.maximum(np.abs(difference) - band, 0.0)
 
 

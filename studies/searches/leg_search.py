@@ -53,8 +53,9 @@ class Search:
         self.size = len(self.names)
 
     def constants(self, vector: NDArray) -> LegConstants:
-        """The constants at a vector (size,)."""
-        values, place = {}, 0
+        """Return the constants at a vector (size,)."""
+        values = {}
+        place = 0
         leads = dict(zip(LED, vector[-len(LED) :], strict=True))
         for name, start in self._start.items():
             step = vector[place : place + start.size]

@@ -74,7 +74,9 @@ class LegSets(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with each."""
-        lines, numbers, front = [], [], {}
+        lines = []
+        numbers = []
+        front = {}
         for label, given, legs in _sets(read_constants(self.constants)):
             name, own = SCHEDULE
             level, pushed = (self._walk(name, {**given, **own, **more}, legs, progress) for more in ({}, PUSHED))

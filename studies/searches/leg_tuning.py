@@ -174,7 +174,7 @@ class LegTuning(Study):
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
     def _style(self, settings: BipedSettings) -> dict[str, Any] | None:
-        """The style of the plan that is followed; None where people are."""
+        """Return the style of the plan that is followed; None where people are."""
         return least_work(self.speed, self.plan_file).to_json() if settings.follows_plan else None
 
     def _refined(
@@ -184,7 +184,8 @@ class LegTuning(Study):
         keep: Callable[[LegConstants], None],
         progress: OnProgress,
     ) -> tuple[LegConstants, list[float]]:
-        """The constants with the least squares of `leg_cost.all_misses` near `start`, and the length after each step.
+        """Return the constants with the least squares of `leg_cost.all_misses` near `start`, and the length after each
+        step.
 
         Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
         the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
@@ -196,18 +197,21 @@ class LegTuning(Study):
             found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)
             return [None if each is None else np.append(each, KEPT * v) for each, v in zip(found, vectors, strict=True)]
 
-        place, identity = np.zeros(search.size), np.eye(search.size)
+        place = np.zeros(search.size)
+        identity = np.eye(search.size)
         (here,) = missed(place[None])
         if here is None:
             raise SpringfootError(
                 "the constants to start from fall, so that they cannot be refined: refinements must be 0"
             )
-        lengths, damping = [float(np.linalg.norm(here))], 1.0
+        lengths = [float(np.linalg.norm(here))]
+        damping = 1.0
         for _ in range(self.refinements):
             there = missed(place + DIFFERENCE * identity)
             columns = [np.zeros(len(here)) if each is None else (each - here) / DIFFERENCE for each in there]
             slopes = np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST)
-            normal, downhill = slopes.T @ slopes, -slopes.T @ here
+            normal = slopes.T @ slopes
+            downhill = -slopes.T @ here
             tried = []
             for each in damping * DAMPINGS:
                 step = np.linalg.solve(normal + each * (identity + np.diag(np.diag(normal))), downhill)

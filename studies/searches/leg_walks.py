@@ -131,7 +131,7 @@ def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED)
 
 
 def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
-    """(C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
+    """Return (C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
     walk = reference_walk_at(settings, settings.speed, candidates)
     curves = [
         [foot_curves(kind, c, walk)[0] for c in candidates]

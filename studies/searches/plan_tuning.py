@@ -76,12 +76,13 @@ IMPOSSIBLE = 30.0
 
 
 def style_at(vector: NDArray) -> WalkStyle:
-    """The style at a vector of the search."""
+    """Return the style at a vector of the search."""
     values = {}
     for (name, (start, unit, least, most)), step in zip(CHOICES.items(), vector, strict=True):
         values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
     groups = {name: [values.pop(f"{name}_{k + 1}") for k in range(count)] for name, count in GROUPS.items()}
-    travel, way = [values.pop("zmp_from"), values.pop("zmp_to")], groups["zmp_way"]
+    travel = [values.pop("zmp_from"), values.pop("zmp_to")]
+    way = groups["zmp_way"]
     way[1] = max(way[1], way[0] + LEAST_ADVANCE)
     both = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
     walk = {field.name: both.pop(field.name) for field in fields(WalkStyle) if field.name in both}
@@ -89,7 +90,7 @@ def style_at(vector: NDArray) -> WalkStyle:
 
 
 def vector_of(style: WalkStyle) -> NDArray:
-    """The vector of the search at a style of its own; the inverse of `style_at`."""
+    """Return the vector of the search at a style of its own; the inverse of `style_at`."""
     values: dict[str, Any] = style.to_json()
     values |= values.pop("foot")
     values["zmp_from"], values["zmp_to"] = values.pop("zmp_travel")
@@ -104,7 +105,7 @@ def vector_of(style: WalkStyle) -> NDArray:
 def price(
     body: Body, speed: float, vector: NDArray, weights: tuple[float, ...] = PRICES, muscle: Muscle = AS_IS
 ) -> tuple[float, WalkPlan | None, Effort | None]:
-    """What the plan at a vector costs, the plan and its effort; none for a plan that cannot be.
+    """Return the cost of the plan at a vector, the plan and its effort; none for a plan that cannot be.
 
     `weights` are those of work, activation, its rate, and acceleration.
     """
@@ -179,7 +180,8 @@ class PlanTuning(Study):
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         begin = np.zeros(len(CHOICES)) if self.start is None else vector_of(least_work(self.speed, self.start))
         strategy = cma.CMAEvolutionStrategy(begin, self.sigma, options)
-        lines, best = [], (np.inf, begin)
+        lines = []
+        best = (np.inf, begin)
 
         def priced(_: int, vectors: list[NDArray]) -> NDArray:
             return np.array([self._price(body, vector)[0] for vector in vectors])

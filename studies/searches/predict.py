@@ -114,7 +114,8 @@ class Predict(WalkingStudy):
             return self._staged(progress)
 
     def _staged(self, progress: OnProgress) -> Answer:
-        found, took = self.folder / FOUND, {}
+        found = self.folder / FOUND
+        took = {}
 
         def stage(name: str, make: Callable[[], Any]) -> Any:
             began = perf_counter()

@@ -52,21 +52,22 @@ PREDICTION = (
 
 
 def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers of `PREDICTION` of a walk that was measured."""
+    """Return the numbers of `PREDICTION` of a walk that was measured."""
     found = numbers(dict(metrics))
     settings = BipedSettings(speed=metrics["environment"]["speed"], height=metrics["environment"]["height"])
-    support, human = found["double_support_s"], reference_gait(settings)
+    support = found["double_support_s"]
+    human = reference_gait(settings)
     away = None if support is None else abs(support - _double_support(human))
     return found | {"off": found["off"] | {"double_support_s": away}}
 
 
 def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
-    """The numbers of `PREDICTION` of the plan that `settings` follow, from its own inverse dynamics."""
+    """Return the numbers of `PREDICTION` of the plan that `settings` follow, from its own inverse dynamics."""
     return numbers_of(reference_walk_at(settings, settings.speed).target, reference_gait(settings))
 
 
 def people_numbers(settings: BipedSettings) -> dict[str, Any]:
-    """The numbers of `PREDICTION` of people's mean curves."""
+    """Return the numbers of `PREDICTION` of people's mean curves."""
     human = reference_gait(settings)
     return numbers_of(human, human)
 
@@ -105,19 +106,20 @@ def _double_support(gait: HumanGait) -> float:
 
 
 def _positive_work(gait: HumanGait) -> float:
-    """Of hip, knee and ankle of both legs in a stride over body weight [m]."""
+    """Return of hip, knee and ankle of both legs in a stride over body weight [m]."""
     power = np.stack([gait.mean(f"{joint}_power", PERCENT / 100) for joint in ("hip", "knee", "ankle")])
     return 2 * float(stride_work(power, np.full(3, gait.stride_time))[0].sum()) / GRAVITY
 
 
 def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
-    """The numbers of `PREDICTION` of mean curves against people's; falls and speed are not known of them."""
+    """Return the numbers of `PREDICTION` of mean curves against people's; falls and speed are not known of them."""
     phase = PERCENT / 100
 
     def pair(name: str) -> tuple[Any, Any]:
         return gait.mean(name, phase), human.mean(name, phase)
 
-    vertical, forward = pair("grf_vertical"), pair("grf_forward")
+    vertical = pair("grf_vertical")
+    forward = pair("grf_forward")
     features = force_features(vertical[0], forward[0])
     return {
         "off": {"double_support_s": abs(_double_support(gait) - _double_support(human))},

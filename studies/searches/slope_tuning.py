@@ -47,13 +47,13 @@ JUDGED_WALKS, JUDGED_SECONDS = 16, 10.0
 
 
 def constants_of(vector: NDArray) -> SlopeConstants:
-    """The constants of a vector (10,): hip, knee, ankle, trunk."""
+    """Return the constants of a vector (10,): hip, knee, ankle, trunk."""
     hip, knee, ankle = np.round(vector[:9], 3).reshape(3, 3).tolist()
     return slope_constants_from({"hip": hip, "knee": knee, "ankle": ankle, "trunk": round(float(vector[9]), 3)})
 
 
 def vector_of(constants: SlopeConstants) -> NDArray:
-    """The vector (10,) of constants."""
+    """Return the vector (10,) of constants."""
     return np.hstack([getattr(constants, field.name) for field in fields(SlopeConstants)])
 
 
@@ -65,7 +65,8 @@ def walk(
     `missing` of the walk after a fall, 0 without one; `speed` too fast [m/s] and `heel` force peak [body weights], once
     settled; mean `reward` of a step. `constants` None: the committed ones.
     """
-    settings, num = BipedSettings(episode_seconds=seconds + 1), len(slopes_deg) * walks
+    settings = BipedSettings(episode_seconds=seconds + 1)
+    num = len(slopes_deg) * walks
     biped = Biped(settings, num, threads, slope=constants)
     biped.subjects.slope[:] = np.repeat(np.radians(slopes_deg), walks)
     biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
@@ -100,7 +101,7 @@ def walk(
 
 
 def cost(walked: dict[str, NDArray], level_reward: float) -> float:
-    """What the `walk` of a candidate pays, the mean over its walks."""
+    """Return the price of the `walk` of a candidate, the mean over its walks."""
     errors = {
         "speed": walked["speed"],
         "reward": 1.0 - walked["reward"] / level_reward,
@@ -190,7 +191,8 @@ class SlopeTuning(Study):
         write_constants(self.constants, table)
 
     def _judge(self, constants: SlopeConstants) -> tuple[float, str]:
-        """What these constants pay on walks whose starts the search did not use, and how those walks go."""
+        """Return the price of these constants on walks whose starts the search did not use, and a report of those
+        walks."""
         walks, seconds = (1, 3.0) if self.quick else (JUDGED_WALKS, JUDGED_SECONDS)
         seed = self.seed + 1_000_000
         level = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()

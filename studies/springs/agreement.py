@@ -125,7 +125,7 @@ def agreement_table(found: Sequence[Agreement]) -> str:
 
 
 def _stretches(mask: NDArray) -> str:
-    """Where a mask over percent is true, in words: "2–60, 95–100"."""
+    """Return where a mask over percent is true, in words: "2–60, 95–100"."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
 
@@ -139,7 +139,8 @@ def criteria_table(
     open-loop `copies` follow, unless none has one.
     """
     measured = [numbers(each) for each in metrics]
-    lines, missed = [], [0] * len(measured)
+    lines = []
+    missed = [0] * len(measured)
     for criterion in HUMAN_LIKE:
         cells = []
         for column, values in enumerate(measured):
@@ -184,7 +185,8 @@ def save_figure(path: Path, found: Sequence[Agreement]) -> None:
             for ax, curves, title, unit in zip(
                 row, (each.stiffness, each.equilibrium, each.torque), titles, units, strict=True
             ):
-                mean, sd = curves.mean(axis=0), curves.std(axis=0, ddof=1)
+                mean = curves.mean(axis=0)
+                sd = curves.std(axis=0, ddof=1)
                 ax.fill_between(PERCENT, mean - sd, mean + sd, color=COLORS[each.joint], alpha=0.22, lw=0)
                 ax.plot(PERCENT, curves.T, color=COLORS[each.joint], lw=0.9, alpha=0.8)
                 ax.fill_between(
@@ -225,7 +227,8 @@ class SeedAgreement(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every policy."""
         walked = [[self._walk(each, progress) for each in and_copy(name)] for name in self.policies]
-        gaits, copies = [first for first, *_ in walked], [rest[0].metrics if rest else None for _, *rest in walked]
+        gaits = [first for first, *_ in walked]
+        copies = [rest[0].metrics if rest else None for _, *rest in walked]
         found = agreements(gaits)
         labels = [policy_label(name) for name in self.policies]
         ran = (

@@ -63,7 +63,7 @@ class MeanSprings:
 
 
 def mean_springs(recording: Recording) -> MeanSprings:
-    """What the springs of a recorded gait did at each phase, the first `WARM_UP` seconds of each episode left out."""
+    """Return the mean springs of a recorded gait at each phase, without the first `WARM_UP` seconds of each episode."""
     begin = round(WARM_UP / TICK)
     phase = recording.series["phase"][:, begin:].ravel()
     walked = np.isfinite(phase)
@@ -94,7 +94,7 @@ def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
 
 
 def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
-    """(PHASE_SEGMENTS, 2) K of ankle and toe [N m/rad]: one of `STIFFNESSES`, or those with other numbers."""
+    """Return (PHASE_SEGMENTS, 2) K of ankle and toe [N m/rad]: one of `STIFFNESSES`, or those with other numbers."""
     kind, _, text = name.partition(":")
     try:
         number = float(text) if text else nan
@@ -144,7 +144,7 @@ def any_stiffness(
     progress: OnProgress = lambda seconds: None,
     **how: Any,
 ) -> tuple[list[Row], dict[str, StiffnessSchedule]]:
-    """The policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
+    """Return the policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
 
     Args:
         name: any policy of `policies.prepare`.
@@ -165,7 +165,8 @@ def any_stiffness(
 
     own = walk(name, lambda _: policy, settings)
     springs = mean_springs(own["undisturbed"])
-    rows, schedules = [walk_row(name, own)], {}
+    rows = [walk_row(name, own)]
+    schedules = {}
     lowest, highest = stiffness_ranges(settings, springs.body)
     for each in stiffnesses:
         schedules[each] = rebuilt(springs, np.clip(stiffness_named(each, springs), lowest, highest))

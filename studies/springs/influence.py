@@ -122,12 +122,14 @@ class Influence(Study):
     @property
     def total(self) -> float:
         """Simulated time [s], without falls."""
-        walks, stride = (1 + len(CELLS) * len(DURATIONS)) * self.seeds, reference_gait(BipedSettings()).stride_time
+        walks = (1 + len(CELLS) * len(DURATIONS)) * self.seeds
+        stride = reference_gait(BipedSettings()).stride_time
         return len(self.conditions) * walks * (WARM_UP + (self.strides + 1) * stride)
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk under every condition."""
-        seeds, responses = range(self.seed, self.seed + self.seeds), {}
+        seeds = range(self.seed, self.seed + self.seeds)
+        responses = {}
         for condition in self.conditions:
             policy, settings, change = self._under(condition)
             how = {"strides": self.strides, "threads": self.threads, "progress": progress}
@@ -145,7 +147,7 @@ class Influence(Study):
 
 
 def headline(study: Influence, responses: Mapping[str, Response]) -> str:
-    """What moves the walk most, and how far the acceleration foretells it."""
+    """Return name the change that moves the walk most, and how far the acceleration foretells it."""
     first = next(iter(responses.values()))
     mean = first.mean[MANY_STRIDES_SPEED]
     most = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
@@ -174,7 +176,7 @@ def _number(own: Response, key: Key, cell: int, pattern: str, unit: float = 1.0,
 
 
 def _signed(value: float, pattern: str) -> str:
-    """The number in a table; 0 has no sign."""
+    """Return the number in a table; 0 has no sign."""
     text = format(value, pattern)
     return MISSING if not isfinite(value) else text.lstrip("+-") if float(text) == 0 else text
 

@@ -93,7 +93,8 @@ def _foretold(ax: Axes, responses: Mapping[str, Response]) -> None:
             color=PEOPLE,
             label="" if number else "other conditions",
         )
-    x, y = 1e3 * first.mean[IMPULSE], 1e3 * first.mean[MANY_STRIDES_SPEED]
+    x = 1e3 * first.mean[IMPULSE]
+    y = 1e3 * first.mean[MANY_STRIDES_SPEED]
     ax.plot(x, y, "o", ms=5, color=MODEL, label=name)
     for cell, (joint, phase) in enumerate(CELLS):
         if abs(y[cell]) >= 1e3 * LABELLED:

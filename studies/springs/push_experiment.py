@@ -137,7 +137,7 @@ class Row:
 
 
 def identified(pushed: Samples, undisturbed: Samples | None = None, margin: float = 0.0) -> list[Row]:
-    """The springs of ankle and toe in every phase of `BOUNDS`, `margin` [stride] left out at both ends of each."""
+    """Return the springs of ankle and toe in every phase of `BOUNDS`, without `margin` [stride] at both ends."""
     rows = []
     at = (np.arange(COURSE) + 0.5) / COURSE
     for column, joint in enumerate(SPRINGS):

@@ -56,7 +56,7 @@ class Experiment:
         return [row for row in self.rows if row.joint == joint and row.loaded]
 
     def repeated(self, row: Row) -> list[Row]:
-        """What the repeats found where `row` is."""
+        """Return the findings of the repeats where `row` is."""
         return [repeat[self.rows.index(row)] for repeat in self.repeats]
 
 
@@ -77,7 +77,8 @@ def springs_table(experiment: Experiment) -> str:
     lines = []
     for row in (row for joint in SPRINGS for row in experiment.of(joint)):
         mean, low, high = row.applied
-        found, alone = row.pushed, row.undisturbed and row.undisturbed.stiffness
+        found = row.pushed
+        alone = row.undisturbed and row.undisturbed.stiffness
         lines.append(
             (
                 row.joint,
@@ -96,7 +97,7 @@ def springs_table(experiment: Experiment) -> str:
 
 
 def sentence(experiment: Experiment) -> str:
-    """What the table says of each joint."""
+    """Say in a sentence the table's verdict on each joint."""
     said = []
     for joint in SPRINGS:
         rows = experiment.of(joint)
@@ -116,7 +117,8 @@ def coverage_table(experiments: Sequence[Experiment]) -> str:
     lines = []
     for experiment in experiments:
         for column, joint in enumerate(SPRINGS):
-            rows, beta = experiment.of(joint), experiment.damping_time[column]
+            rows = experiment.of(joint)
+            beta = experiment.damping_time[column]
             found = [experiment.repeated(row) for row in rows]
             shares = [
                 [[_holds(row.pushed.stiffness, row.applied[0]) for row in each] for each in found],
@@ -141,7 +143,8 @@ def springs_csv(experiments: Sequence[Experiment]) -> str:
     for experiment in experiments:
         for repeat, rows in enumerate((experiment.rows, *experiment.repeats)):
             for row in rows:
-                found, alone = row.pushed, row.undisturbed and row.undisturbed.stiffness
+                found = row.pushed
+                alone = row.undisturbed and row.undisturbed.stiffness
                 estimates = [*(found.stiffness or [None] * 3), *(found.damping_time or [None] * 3)]
                 numbers = (found.explained, found.reaction, found.reaction_p, found.angle_spread)
                 where = (experiment.policy, repeat, row.joint, row.start, row.end, row.load, *row.applied)
@@ -243,7 +246,7 @@ class Identify(WalkingStudy):
         )
 
     def _push(self, name: str, progress: OnProgress) -> Experiment:
-        """The experiment on one policy, and its repeats."""
+        """Return the experiment on one policy, and its repeats."""
         pushes = ("push_newton", "push_seconds", "push_interval")
         given: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
         given |= {"decisions": self.decisions} if self.decisions else {}
@@ -253,7 +256,8 @@ class Identify(WalkingStudy):
         alone = replace(settings, push_newton=0.0)
         quiet = record(policy, alone, episodes=UNDISTURBED_EPISODES, seed=self.seed, **said)
         rows = identified(samples(pushed, self.noise_percent, self.seed), samples(quiet), self.margin)
-        repeats, shorter = [], replace(settings, episode_seconds=REPEAT_SECONDS)
+        repeats = []
+        shorter = replace(settings, episode_seconds=REPEAT_SECONDS)
         for repeat in range(self.repeats):
             first = self.seed + self.episodes + repeat * REPEAT_EPISODES
             again = record(policy, shorter, episodes=REPEAT_EPISODES, seed=first, **said)

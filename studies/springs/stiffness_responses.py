@@ -80,7 +80,8 @@ def response(walks: PairedWalks, change: float) -> Response:
         how = {"n_resamples": RESAMPLES, "method": "percentile", "rng": np.random.default_rng(0)}
         spread = bootstrap((rows,), np.mean, axis=-1, **how).confidence_interval
         for key, own, low, high in zip(values, rows.mean(-1), spread.low, spread.high, strict=True):
-            mean[key][cell], interval[key][cell] = own, (low, high)
+            mean[key][cell] = own
+            interval[key][cell] = (low, high)
     return Response(
         change=change,
         mean=mean,
@@ -93,14 +94,15 @@ def response(walks: PairedWalks, change: float) -> Response:
 
 
 def _values(walks: PairedWalks) -> dict[Key, NDArray]:
-    """Each (C, S); "many" is the mean of the second half of the strides, of `com_ahead_m` its value as they end."""
+    """Return each (C, S); "many" is the mean of the second half of the strides, of `com_ahead_m` its end."""
     found: dict[Key, NDArray] = {("fixed state", name, ""): walks.fixed[..., k] for k, name in enumerate(FIXED)}
     found[VELOCITY] = walks.velocity
     half = walks.movement.shape[3] // 2
     for d, duration in enumerate(DURATIONS):
         for m, name in enumerate(MOVEMENT):
             own = walks.movement[:, d, :, :, m]
-            found[duration, name, "1"], found[duration, name, "2"] = own[..., 0], own[..., 1]
+            found[duration, name, "1"] = own[..., 0]
+            found[duration, name, "2"] = own[..., 1]
             found[duration, name, "many"] = own[..., -1] if name == "com_ahead_m" else own[..., half:].mean(-1)
     return found
 
@@ -108,7 +110,8 @@ def _values(walks: PairedWalks) -> dict[Key, NDArray]:
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
     """As in `Response.links`, from (C, S) of either end."""
     whole = np.isfinite(x + y).all(0)
-    x, y = x[:, whole], y[:, whole]
+    x = x[:, whole]
+    y = y[:, whole]
     if x.shape[1] < 2 or not (np.ptp(x.mean(1)) > 0 and np.ptp(y.mean(1)) > 0):
         return np.nan, np.nan, np.nan, np.nan
 
@@ -116,7 +119,8 @@ def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
         ends: Any = pearsonr(x[:, seeds].mean(axis), y[:, seeds].mean(axis), axis=0)
         return ends.statistic
 
-    seeds, rng = np.arange(x.shape[1]), np.random.default_rng(0)
+    seeds = np.arange(x.shape[1])
+    rng = np.random.default_rng(0)
     spread = bootstrap((seeds,), r, n_resamples=RESAMPLES, method="percentile", rng=rng)
     low, high = spread.confidence_interval
     how = PermutationMethod(n_resamples=RESAMPLES, rng=rng)

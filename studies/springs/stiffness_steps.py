@@ -72,7 +72,7 @@ class PairedWalks:
 
 
 def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
-    """(2,) what is added to ankle and toe actions to multiply their stiffness by 1 + `change`."""
+    """Return (2,) what is added to ankle and toe actions to multiply their stiffness by 1 + `change`."""
     if settings.action_mode == "residual":
         return np.full(len(SPRINGS), np.log1p(change))
     low, high = stiffness_ranges(settings, body)
@@ -80,14 +80,15 @@ def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
 
 
 def step_at(model: mujoco.MjModel, data: mujoco.MjData, change: float) -> tuple[NDArray, NDArray]:
-    """What changing one spring's K by the share `change` does at the state of `data`, theta_eq kept.
+    """Compute the effect of changing one spring's K by the share `change` at the state of `data`, with θ_eq kept.
 
     Contacts respond as the solver has them respond. Returns torque (side, (ankle, toe)) [N m], dorsiflexion positive,
     and the CoM's acceleration (side, (ankle, toe), (forward, up)) [m/s^2]. Leaves `data` after `mj_forward`.
     """
     control = data.ctrl.reshape(len(SIDES), len(JOINTS), 2)[:, FEET]
     joints = model.nv - len(SIDES) * len(JOINTS)  # those of the base come first
-    guess, jacobian = data.qacc_warmstart.copy(), np.zeros((3, model.nv))
+    guess = data.qacc_warmstart.copy()
+    jacobian = np.zeros((3, model.nv))
 
     def forward() -> tuple[NDArray, NDArray]:
         data.qacc_warmstart[:] = guess  # so that no change gives the same bits
@@ -96,7 +97,8 @@ def step_at(model: mujoco.MjModel, data: mujoco.MjData, change: float) -> tuple[
 
     torque, acceleration = forward()
     mujoco.mj_jacSubtreeCom(model, data, jacobian, model.body("trunk").id)
-    torques, accelerations = np.zeros((len(SIDES), len(SPRINGS))), np.zeros((len(SIDES), len(SPRINGS), 2))
+    torques = np.zeros((len(SIDES), len(SPRINGS)))
+    accelerations = np.zeros((len(SIDES), len(SPRINGS), 2))
     for spring in np.ndindex(*torques.shape):
         kept = control[spring].copy()
         control[spring] *= 1.0 + change  # K and K theta_eq
@@ -130,10 +132,12 @@ def paired_walks(
 
     Raises `SpringfootError` if fewer than two unchanged walks stay up.
     """
-    num, copies = len(seeds), 1 + len(CELLS) * len(DURATIONS)
+    num = len(seeds)
+    copies = 1 + len(CELLS) * len(DURATIONS)
     biped = Biped(settings, copies * num, threads)
     biped.reset(np.arange(copies * num), list(seeds) * copies)
-    changes, record = _Changes(action_step(settings, biped.body, change), num), _Record(biped, change, num)
+    changes = _Changes(action_step(settings, biped.body, change), num)
+    record = _Record(biped, change, num)
     before = np.zeros((copies * num, len(SIDES)))
     stride = np.full(copies * num, -1)
     asked, cut = np.zeros((2, copies), int)
@@ -177,7 +181,7 @@ class _Changes:
         self._step, (self._begin, self._end) = own[:, None], edges.T[..., None]
 
     def added(self, phase: NDArray, stride: NDArray) -> NDArray:
-        """(N, 4) what is added to actions at `phase` (N, side) of the left foot's `stride` (N,), 0 the first."""
+        """Return (N, 4) what is added to actions at `phase` (N, side) of the left foot's `stride` (N,), 0 the first."""
         left = (stride == 0) | (self._lasts & (stride > 0))
         due = np.stack([left, left & self._lasts], -1)
         return ((due & (phase >= self._begin) & (phase < self._end))[..., None] * self._step).reshape(len(phase), -1)
@@ -189,13 +193,16 @@ class _Record:
     def __init__(self, biped: Biped, change: float, num: int):
         self.stride = np.full(num, -1)
         """(S,) of each unchanged walk, before the next step; 0 is the first."""
-        self._biped, self._change, self._num = biped, change, num
+        self._biped = biped
+        self._change = change
+        self._num = num
         self._ticks: list[tuple[NDArray, ...]] = []
         self._samples = np.zeros((len(CELLS), num, 4))  # count; sums of torque [N m], acceleration (x, z) [m/s^2]
         biped.on_tick = self._keep
 
     def _keep(self, tick: Tick) -> None:
-        m, own = tick.measurement, slice(self._num)
+        m = tick.measurement
+        own = slice(self._num)
         walks = m.com.copy(), m.com_velocity[:, 0].copy(), m.ankle[..., 0].copy(), m.force[..., 1].sum(-1)
         self._ticks.append((*walks, tick.phase[own, LEFT].copy(), self.stride.copy()))
         for index in np.flatnonzero(self.stride == 0).tolist():
@@ -209,7 +216,7 @@ class _Record:
                 self._samples[cell, index] += 1.0, -torque[side, joint], *acceleration[side, joint]
 
     def paired(self, strides: int, active: NDArray, cut: NDArray) -> PairedWalks:
-        """Each changed walk less the unchanged one of its seed."""
+        """Return each changed walk less the unchanged one of its seed."""
         com, velocity, ankle, load, phase, stride = (np.stack(each) for each in zip(*self._ticks, strict=True))
         load /= self._biped.body.total_mass * GRAVITY
         movement = np.full((len(active), strides, len(MOVEMENT)), np.nan)
@@ -243,14 +250,14 @@ class _Record:
 
 
 def _ends(phase: NDArray, stride: NDArray) -> list[int]:
-    """The tick with which each of `PHASES` of the first stride ends, from a leg's `phase` and `stride` (T,)."""
+    """Return the tick with which each of `PHASES` of the first stride ends, from a leg's `phase` and `stride` (T,)."""
     gone = np.where(stride <= 0, phase, 1.0)
     begun = np.argmax(stride == 0)
     return [int(begun + np.argmax(gone[begun:] >= end)) - 1 for _, end in PHASES.values()]
 
 
 def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: NDArray, clock: NDArray) -> NDArray:
-    """(K, len(MOVEMENT)) of one walk's `com` (T, 2), `ankle` (T, side) [m] and contacts.
+    """Return (K, len(MOVEMENT)) of one walk's `com` (T, 2), `ankle` (T, side) [m] and contacts.
 
     `landed` (K + 1,) are the left foot's heel strikes, `clock` (K,) the ends of the unchanged walk's mean strides [s].
     """

@@ -104,7 +104,8 @@ RESULT = "ablation.json"
 
 
 def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
-    """The planned equilibrium and fixed schedule of `settings`, constant on and between the plateaus of K: ten springs.
+    """Return the planned equilibrium and fixed schedule of `settings`, constant on and between the plateaus of K: ten
+    springs.
 
     Each has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer, as between gait events,
     the fixed schedule falls.
@@ -116,13 +117,14 @@ def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
     segments: list[list[Segment]] = [[], []]
     for index, start in enumerate(PLATEAUS):
         for joint, own in enumerate(segments):
-            k, theta = stiffness[place == index, joint], rest[place == index, joint]
+            k = stiffness[place == index, joint]
+            theta = rest[place == index, joint]
             own.append(Segment(start, float(k.mean()), float((k * theta).mean() / k.mean())))
     return StiffnessSchedule(**dict(zip(SPRINGS, map(tuple, segments), strict=True)))
 
 
 def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> TrainingConfig:
-    """The training of a row: as much walking as the preset's, or as `timesteps` of 20 ms, whatever the step."""
+    """Return the training of a row: as much walking as the preset's, or as `timesteps` of 20 ms, whatever the step."""
     preset = PRESETS["walk"]
     own = dict(ABLATIONS[name])
     if name == "phase":
@@ -140,7 +142,7 @@ def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> Trainin
 
 
 def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> list[tuple[TrainingConfig, Path, str]]:
-    """Each row and seed to train: configuration, folder and what it is called."""
+    """Return each row and seed to train: configuration, folder and what it is called."""
     order = product(range(seeds), names)  # every row once before any twice
     return [
         (config_of(name, seed, timesteps), out / name / f"seed-{seed}", f"{name}, seed {seed}") for seed, name in order
@@ -159,7 +161,7 @@ def trained(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
 
 
 def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
-    """Each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
+    """Return each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
     own = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
     rows: dict[str, list[dict[str, Any]]] = {}
     for number, (name, change) in enumerate(INPUTS.items()):
@@ -171,7 +173,7 @@ def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
 
 
 def fixed(out: Path, how: Protocol, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
-    """The thesis's straight lines, and before them the best `constant` (ankle, toe) [N m/rad] where it is known."""
+    """Return the thesis's straight lines, and before them a `constant` (ankle, toe) [N m/rad] if given."""
     names = {"thesis lines": "thesis"}
     if constant is not None:
         names = {"best fixed spring": "constant:{:g},{:g}".format(*constant)} | names
@@ -204,7 +206,7 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
 
 
 def _known(metrics: dict[str, Any], quantity: Quantity) -> str:
-    """A number of people's, where there is one."""
+    """Return a number of people's, where there is one."""
     value: Any = metrics
     for key in quantity.path[1:]:
         value = value.get(key) if isinstance(value, dict) else None

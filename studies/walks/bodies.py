@@ -68,7 +68,8 @@ def walk_pairs(
     block: int = BATCH,
     progress: OnProgress = lambda seconds: None,
 ) -> list[dict[str, Any]]:
-    """One episode of each pair, and its numbers as in pairs.csv (docs/reference/metrics.md); None where there is none.
+    """Return one episode of each pair, and its numbers as in pairs.csv (docs/reference/metrics.md); None where there is
+    none.
 
     Arguments as for `recording.record_each`; `block` pairs at a time, whose series are then let go.
     """
@@ -83,7 +84,8 @@ def walk_pairs(
 
 
 def _row(recording: Recording) -> dict[str, Any]:
-    metrics, settings = measure(recording).metrics, recording.settings
+    metrics = measure(recording).metrics
+    settings = recording.settings
     speed = metrics["speed_m_s"]["mean"]
     return {
         "height_m": settings.height,
@@ -125,7 +127,7 @@ def _falls(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
-    """The pairs that did not fall, the worst last."""
+    """Return the pairs that did not fall, the worst last."""
     return sorted(
         (row for row in rows if not row["fall"] and row[column] is not None), key=lambda row: badness(row[column])
     )
@@ -177,7 +179,8 @@ class Bodies(Study):
         """Walk every pair."""
         conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
         settings = prepare(self.policy, conditions, self.seed)[1]
-        who, how = draw_pairs(settings, self.pairs, self.seed), {"seed": self.seed, "threads": self.threads}
+        who = draw_pairs(settings, self.pairs, self.seed)
+        how = {"seed": self.seed, "threads": self.threads}
         walks = []
         for name in and_copy(self.policy):
             prepared = prepare(name, conditions, self.seed, self.threads)
@@ -194,7 +197,7 @@ class Bodies(Study):
 
 
 def _ranges(settings: BipedSettings) -> str:
-    """What was drawn from, in words."""
+    """Return the ranges of the draw, in words."""
     units = dict(zip(DRAWN, ("m", "kg", "m/s"), strict=True))
     spans = {name: getattr(settings, f"{name}_range") for name in DRAWN}
     return ", ".join(f"{span[0]:g}–{span[1]:g} {units[name]}" for name, span in spans.items())

@@ -150,7 +150,7 @@ def springs_beside(
 
 
 def rivals(constant: tuple[float, float] | None, factor: float | None) -> list[str]:
-    """The names of the baselines among the contenders."""
+    """Return the names of the baselines among the contenders."""
     names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
     names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
     return [*names, "constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]
@@ -165,7 +165,8 @@ def comparison_table(rows: Sequence[Row]) -> str:
         m = row.metrics
         low, high = share_interval(m["falls"], m["episodes"])
         falls = f"{m['falls']} of {m['episodes']} [{100 * low:.0f}, {100 * high:.0f} %]"
-        ahead, p = "", ""
+        ahead = ""
+        p = ""
         if row is not first:
             difference = row.difference(first)
             ahead = "–" if difference is None else "{:.1f} [{:.1f}, {:.1f}]".format(*difference)
@@ -315,7 +316,7 @@ class Compare(WalkingStudy):
 
 
 def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
-    """What a row's line in compare.csv begins with."""
+    """Return the first columns of a row of compare.csv."""
     difference = row.difference(first) or (None, None, None)
     falls = share_interval(row.metrics["falls"], row.metrics["episodes"])
     return {
@@ -329,7 +330,7 @@ def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
 
 
 def what_ran(study: WalkingStudy, row: Row) -> str:
-    """The episodes of a table in one sentence."""
+    """Return the episodes of a table in one sentence."""
     ran = row.metrics["environment"]
     pushes = "no pushes"
     if ran["push_newton"]:

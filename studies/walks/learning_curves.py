@@ -32,7 +32,7 @@ KEYS = ("timesteps", "seconds", "return_mean", "falls")
 
 
 def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """The first periodic evaluation in which, and after which, no episode fell."""
+    """Return the first periodic evaluation in which, and after which, no episode fell."""
     steady = None
     for entry in evaluations:
         steady = None if entry["falls"] else steady or entry
@@ -82,7 +82,8 @@ class LearningCurves(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Judge every run."""
         runs = {folder.name: _read(folder) for folder in self.runs}
-        lines, walks = [], []
+        lines = []
+        walks = []
         for folder, (name, run) in zip(self.runs, runs.items(), strict=True):
             policy, settings = prepare(str(folder), {"episode_seconds": self.seconds}, self.seed)
             metrics = measure(record(policy, settings, name=name, progress=progress, **self.how)).metrics
@@ -106,7 +107,7 @@ class LearningCurves(WalkingStudy):
 
 
 def _read(folder: Path) -> dict[str, Any]:
-    """The record of a finished run, with the time of every evaluation."""
+    """Return the record of a finished run, with the time of every evaluation."""
     record_of_run = read_object(folder / RUN, "record of a run") if (folder / RUN).is_file() else {}
     try:
         numbers = [entry[key] for entry in record_of_run["evaluations"] for key in KEYS]

@@ -108,7 +108,10 @@ class Play(WalkingStudy):
         return Answer(text=text, files={PAGE_NAME: page.text})
 
     def _walks(self, foot: str, speed: float, progress: OnProgress) -> Iterator[Recording]:
-        """A recording of each pair of factors, the ankle's changing fastest; as many side by side as a batch takes."""
+        """Return a recording of each pair of factors, the ankle's changing fastest.
+
+        As many side by side as a batch takes.
+        """
         conditions = {"right_foot": foot, "speed": speed, "episode_seconds": self.seconds}
         policy, settings = prepare(self.policy, conditions, self.seed, self.threads)
         if settings.action_mode != "absolute":
