@@ -4,10 +4,9 @@ A name is imported when it is first asked for: a policy can be loaded and run wh
 configuration of a training needs no simulator.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from springfoot.extras import naming_extras
+from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .policies.baselines import BASELINES, PolicyFunction, baseline
@@ -61,9 +60,4 @@ _MODULE = {
 }
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
-
-    def __getattr__(name: str) -> Any:
-        if name not in _MODULE:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        with naming_extras():
-            return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
+    __getattr__ = lazy_names(__name__, _MODULE)

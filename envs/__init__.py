@@ -3,10 +3,11 @@
 Settings need no simulator; MuJoCo and numba are imported with the first name that walks.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import gymnasium as gym
+
+from springfoot.lazy import lazy_names
 
 from .settings.settings import BipedSettings, body_of, reference_gait, settings_from, settings_to_json
 
@@ -42,8 +43,4 @@ gym.register(
 )
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
-
-    def __getattr__(name: str) -> Any:
-        if name not in _MODULE:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
+    __getattr__ = lazy_names(__name__, _MODULE)

@@ -3,10 +3,9 @@
 A name is imported when it is first asked for: what draws needs matplotlib and Pillow, criteria and curves no simulator.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from springfoot.extras import naming_extras
+from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .numbers.criteria import HUMAN_LIKE, WALKS, Criterion, unmet
@@ -63,9 +62,4 @@ _MODULE = {
 }
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
-
-    def __getattr__(name: str) -> Any:
-        if name not in _MODULE:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        with naming_extras():
-            return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
+    __getattr__ = lazy_names(__name__, _MODULE)

@@ -1,9 +1,8 @@
 """Many walks held against each other; each runs as `springfoot study NAME`."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from springfoot.extras import naming_extras
+from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .base.study import Answer, Study, WalkingStudy
@@ -42,9 +41,4 @@ _MODULE = {
 }
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
-
-    def __getattr__(name: str) -> Any:
-        if name not in _MODULE:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        with naming_extras():
-            return getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
+    __getattr__ = lazy_names(__name__, _MODULE)

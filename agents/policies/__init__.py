@@ -1,1 +1,37 @@
 """Policies: files, networks trained elsewhere, schedules and baselines."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .baselines import CONSTANT_STIFFNESS, PolicyFunction, and_copy, has_feedback, leg_phase, own_settings, schedule
+    from .policy import BEST, RUN
+
+__all__ = [
+    "BEST",
+    "CONSTANT_STIFFNESS",
+    "RUN",
+    "PolicyFunction",
+    "and_copy",
+    "has_feedback",
+    "leg_phase",
+    "own_settings",
+    "schedule",
+]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "BEST": "policy",
+            "CONSTANT_STIFFNESS": "baselines",
+            "RUN": "policy",
+            "PolicyFunction": "baselines",
+            "and_copy": "baselines",
+            "has_feedback": "baselines",
+            "leg_phase": "baselines",
+            "own_settings": "baselines",
+            "schedule": "baselines",
+        },
+    )

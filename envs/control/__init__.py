@@ -1,1 +1,86 @@
 """The control of the body: stiffness of ankles and toes, rest angles, hips and knees, standing."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
+    from .foot_springs import FEET, action_of, stiffness_of, stiffness_ranges
+    from .leg_constants import (
+        TUNED_SPEED,
+        LegConstants,
+        SlopeConstants,
+        constants_from,
+        constants_name,
+        leg_constants,
+        slope_constants_from,
+    )
+    from .legs import KNOTS
+    from .person import HELD_BY_SOUND, person_constants
+    from .phase_table import GRID
+    from .reference_walk import FED, reference_walk_at, tabulated_speeds
+    from .standing import SLOW_SPEED
+    from .subjects import DRAWN, Subjects
+
+__all__ = [
+    "DRAWN",
+    "FED",
+    "FEET",
+    "GRID",
+    "HELD_BY_SOUND",
+    "KNOTS",
+    "PLATEAUS",
+    "REFERENCE_STIFFNESS",
+    "SLOW_SPEED",
+    "TOE_OFF",
+    "TUNED_SPEED",
+    "LegConstants",
+    "SlopeConstants",
+    "Subjects",
+    "action_of",
+    "constants_from",
+    "constants_name",
+    "foot_curves",
+    "leg_constants",
+    "person_constants",
+    "plateau_curve",
+    "reference_walk_at",
+    "slope_constants_from",
+    "stiffness_of",
+    "stiffness_ranges",
+    "tabulated_speeds",
+]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "DRAWN": "subjects",
+            "FED": "reference_walk",
+            "FEET": "foot_springs",
+            "GRID": "phase_table",
+            "HELD_BY_SOUND": "person",
+            "KNOTS": "legs",
+            "PLATEAUS": "equilibrium",
+            "REFERENCE_STIFFNESS": "equilibrium",
+            "SLOW_SPEED": "standing",
+            "TOE_OFF": "equilibrium",
+            "TUNED_SPEED": "leg_constants",
+            "LegConstants": "leg_constants",
+            "SlopeConstants": "leg_constants",
+            "Subjects": "subjects",
+            "action_of": "foot_springs",
+            "constants_from": "leg_constants",
+            "constants_name": "leg_constants",
+            "foot_curves": "equilibrium",
+            "leg_constants": "leg_constants",
+            "person_constants": "person",
+            "plateau_curve": "equilibrium",
+            "reference_walk_at": "reference_walk",
+            "slope_constants_from": "leg_constants",
+            "stiffness_of": "foot_springs",
+            "stiffness_ranges": "foot_springs",
+            "tabulated_speeds": "reference_walk",
+        },
+    )

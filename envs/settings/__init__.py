@@ -1,1 +1,70 @@
 """The settings of the walking task, and the feet that they name."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .adapted import ADAPTED, LEGS, committed_feet, without_person
+    from .checks import LONGEST_EPISODE
+    from .feet import FOOT_SETTINGS, KINDS, SPRING_NUMBERS, foot_setting
+    from .settings import (
+        CONDITION_SETTINGS,
+        THEME_OF,
+        THEMES,
+        BipedSettings,
+        Feedforward,
+        Guide,
+        body_of,
+        reference_gait,
+        settings_from,
+        settings_to_json,
+    )
+
+__all__ = [
+    "ADAPTED",
+    "CONDITION_SETTINGS",
+    "FOOT_SETTINGS",
+    "KINDS",
+    "LEGS",
+    "LONGEST_EPISODE",
+    "SPRING_NUMBERS",
+    "THEMES",
+    "THEME_OF",
+    "BipedSettings",
+    "Feedforward",
+    "Guide",
+    "body_of",
+    "committed_feet",
+    "foot_setting",
+    "reference_gait",
+    "settings_from",
+    "settings_to_json",
+    "without_person",
+]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "ADAPTED": "adapted",
+            "CONDITION_SETTINGS": "settings",
+            "FOOT_SETTINGS": "feet",
+            "KINDS": "feet",
+            "LEGS": "adapted",
+            "LONGEST_EPISODE": "checks",
+            "SPRING_NUMBERS": "feet",
+            "THEMES": "settings",
+            "THEME_OF": "settings",
+            "BipedSettings": "settings",
+            "Feedforward": "settings",
+            "Guide": "settings",
+            "body_of": "settings",
+            "committed_feet": "adapted",
+            "foot_setting": "feet",
+            "reference_gait": "settings",
+            "settings_from": "settings",
+            "settings_to_json": "settings",
+            "without_person": "adapted",
+        },
+    )

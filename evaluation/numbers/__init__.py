@@ -1,1 +1,54 @@
 """The one measurer of a gait: strides, curves over the stride, metrics and criteria."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, numbers, unmet
+    from .metrics import MOMENT_CURVES, Gait, measure
+    from .per_leg import asymmetry, leg_numbers
+    from .series import foot_contacts, strides_within
+    from .tally import StrideTally, add_episode
+
+__all__ = [
+    "HUMAN_LIKE",
+    "MOMENT_CURVES",
+    "NO_FALLS",
+    "WALKS",
+    "Criterion",
+    "Gait",
+    "StrideTally",
+    "add_episode",
+    "asymmetry",
+    "foot_contacts",
+    "leg_numbers",
+    "measure",
+    "number_text",
+    "numbers",
+    "strides_within",
+    "unmet",
+]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "HUMAN_LIKE": "criteria",
+            "MOMENT_CURVES": "metrics",
+            "NO_FALLS": "criteria",
+            "WALKS": "criteria",
+            "Criterion": "criteria",
+            "Gait": "metrics",
+            "StrideTally": "tally",
+            "add_episode": "tally",
+            "asymmetry": "per_leg",
+            "foot_contacts": "series",
+            "leg_numbers": "per_leg",
+            "measure": "metrics",
+            "number_text": "criteria",
+            "numbers": "criteria",
+            "strides_within": "series",
+            "unmet": "criteria",
+        },
+    )

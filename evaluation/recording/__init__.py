@@ -1,1 +1,54 @@
 """The one loop over a walk: a policy's episodes as 100 Hz series."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .policies import policy_label, prepare
+    from .recording import (
+        BATCH,
+        TICK,
+        WARM_UP,
+        Episodes,
+        Recording,
+        planned_course,
+        record,
+        record_each,
+        record_feet,
+        record_walk,
+    )
+
+__all__ = [
+    "BATCH",
+    "TICK",
+    "WARM_UP",
+    "Episodes",
+    "Recording",
+    "planned_course",
+    "policy_label",
+    "prepare",
+    "record",
+    "record_each",
+    "record_feet",
+    "record_walk",
+]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "BATCH": "recording",
+            "TICK": "recording",
+            "WARM_UP": "recording",
+            "Episodes": "recording",
+            "Recording": "recording",
+            "planned_course": "recording",
+            "policy_label": "policies",
+            "prepare": "policies",
+            "record": "recording",
+            "record_each": "recording",
+            "record_feet": "recording",
+            "record_walk": "recording",
+        },
+    )

@@ -1,1 +1,23 @@
 """The files of an evaluation: tables, figures, pictures, and files for other tools."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .gait_figure import MODEL, PEOPLE, PLAN, STYLE
+    from .gait_table import people_metrics
+
+__all__ = ["MODEL", "PEOPLE", "PLAN", "STYLE", "people_metrics"]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "MODEL": "gait_figure",
+            "PEOPLE": "gait_figure",
+            "PLAN": "gait_figure",
+            "STYLE": "gait_figure",
+            "people_metrics": "gait_table",
+        },
+    )

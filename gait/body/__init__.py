@@ -1,1 +1,24 @@
 """The body: lengths, masses and inertias, the mechanics of a leg, passive tissue, and rolling feet."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .body import GRAVITY, HEEL_RADIUS, REFERENCE_HEIGHT, REFERENCE_MASS, Body
+    from .tissue import TOE_STIFFNESS
+
+__all__ = ["GRAVITY", "HEEL_RADIUS", "REFERENCE_HEIGHT", "REFERENCE_MASS", "TOE_STIFFNESS", "Body"]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "GRAVITY": "body",
+            "HEEL_RADIUS": "body",
+            "REFERENCE_HEIGHT": "body",
+            "REFERENCE_MASS": "body",
+            "TOE_STIFFNESS": "tissue",
+            "Body": "body",
+        },
+    )

@@ -1,1 +1,63 @@
 """How people walk: curves by walking speed or from files of your own, their strides, and scores against them."""
+
+from typing import TYPE_CHECKING
+
+from springfoot.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .cycle import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
+    from .human import HumanGait, human_gait
+    from .own_data import read_gait
+    from .scores import (
+        LOADING_END_PERCENT,
+        PUSH_OFF_BEGIN_PERCENT,
+        correlation,
+        force_features,
+        mean_sd,
+        rmse,
+        stride_work,
+    )
+
+__all__ = [
+    "CONTACT_THRESHOLD_BW",
+    "LOADING_END_PERCENT",
+    "PERCENT",
+    "PUSH_OFF_BEGIN_PERCENT",
+    "Contacts",
+    "HumanGait",
+    "correlation",
+    "find_contacts",
+    "find_steps",
+    "force_features",
+    "human_gait",
+    "mean_sd",
+    "on_percent",
+    "read_gait",
+    "rmse",
+    "sample",
+    "stride_work",
+]
+
+if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
+    __getattr__ = lazy_names(
+        __name__,
+        {
+            "CONTACT_THRESHOLD_BW": "cycle",
+            "LOADING_END_PERCENT": "scores",
+            "PERCENT": "cycle",
+            "PUSH_OFF_BEGIN_PERCENT": "scores",
+            "Contacts": "cycle",
+            "HumanGait": "human",
+            "correlation": "scores",
+            "find_contacts": "cycle",
+            "find_steps": "cycle",
+            "force_features": "scores",
+            "human_gait": "human",
+            "mean_sd": "scores",
+            "on_percent": "cycle",
+            "read_gait": "own_data",
+            "rmse": "scores",
+            "sample": "cycle",
+            "stride_work": "scores",
+        },
+    )

@@ -14,13 +14,11 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
-from springfoot.envs.settings.feet import FOOT_SETTINGS
-from springfoot.envs.settings.settings import CONDITION_SETTINGS, THEME_OF, THEMES, BipedSettings
+from springfoot.envs.settings import CONDITION_SETTINGS, FOOT_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.errors import quoted
 from springfoot.files.json_file import json_fault, keys_once, read_object
-from springfoot.gait.people.own_data import read_gait
-from springfoot.gait.springs.foot_file import read_foot
-from springfoot.gait.springs.stiffness import StiffnessSchedule
+from springfoot.gait.people import read_gait
+from springfoot.gait.springs import StiffnessSchedule, read_foot
 
 from .flag_words import NOT_GIVEN, flag_of, spec
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import prepare, record
 
 from .kept import Kept
 from .study import OnProgress

@@ -6,7 +6,7 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
-from springfoot.agents.policies.baselines import and_copy
+from springfoot.agents.policies import and_copy
 from springfoot.files.markdown import text_of
 from springfoot.files.writing import csv_text
 

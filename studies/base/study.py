@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 from tqdm import tqdm
 
-from springfoot.envs.settings.checks import LONGEST_EPISODE
+from springfoot.envs.settings import LONGEST_EPISODE
 from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, require_count, require_number
 from springfoot.files.writing import whole_folder
 

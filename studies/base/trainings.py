@@ -7,8 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
-from springfoot.agents.training.config import TrainingConfig
-from springfoot.agents.training.multi_seed import train_missing
+from springfoot.agents.training import TrainingConfig, train_missing
 from springfoot.errors import require_count
 
 from .study import WalkingStudy

@@ -22,13 +22,9 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.leg_constants import TUNED_SPEED, leg_constants
-from springfoot.envs.control.person import person_constants
-from springfoot.envs.physics.model import LEFT, RIGHT
-from springfoot.envs.settings.adapted import without_person
-from springfoot.envs.settings.checks import LONGEST_EPISODE
-from springfoot.envs.settings.feet import SPRING_NUMBERS, foot_setting
-from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.control import TUNED_SPEED, leg_constants, person_constants
+from springfoot.envs.physics import LEFT, RIGHT
+from springfoot.envs.settings import LONGEST_EPISODE, SPRING_NUMBERS, BipedSettings, foot_setting, without_person
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.markdown import table, text_of
 from springfoot.files.writing import csv_text, write_atomically

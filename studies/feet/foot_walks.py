@@ -6,13 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from springfoot.envs.physics.model import JOINT_RANGE_DEG
-from springfoot.envs.settings.feet import SPRING_NUMBERS
-from springfoot.evaluation.numbers.metrics import Gait, measure
-from springfoot.evaluation.numbers.per_leg import asymmetry, leg_numbers
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record
-from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
+from springfoot.envs.physics import JOINT_RANGE_DEG
+from springfoot.envs.settings import SPRING_NUMBERS
+from springfoot.evaluation.numbers import Gait, asymmetry, leg_numbers, measure
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record
+from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
 PUSH_NEWTON = 150.0
 """Of the pushed walks [N]."""

@@ -18,14 +18,11 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.envs.physics.foot import Spring
-from springfoot.envs.physics.model import ANKLE, RIGHT, damping_times
-from springfoot.envs.settings.adapted import ADAPTED, committed_feet, without_person
-from springfoot.envs.settings.settings import body_of
+from springfoot.envs.physics import ANKLE, RIGHT, Spring, damping_times
+from springfoot.envs.settings import ADAPTED, body_of, committed_feet, without_person
 from springfoot.errors import require_count
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record_feet
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record_feet
 from springfoot.files.writing import csv_text
 
 from ..base.kept import Kept

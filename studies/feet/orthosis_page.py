@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
 
-from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.intervals import share_interval

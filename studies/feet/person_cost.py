@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.physics.model import RIGHT
-from springfoot.envs.settings.settings import BipedSettings
-from springfoot.evaluation.recording.recording import TICK
-from springfoot.gait.people.cycle import PERCENT
+from springfoot.envs.batch import Biped
+from springfoot.envs.physics import RIGHT
+from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.recording import TICK
+from springfoot.gait.people import PERCENT
 
 from ..searches.leg_cost import FALL_COST, UNEVENNESS
 from ..searches.leg_walks import SETTLED, measured, walk

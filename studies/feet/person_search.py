@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.leg_constants import LegConstants, constants_from
-from springfoot.envs.control.person import HELD_BY_SOUND
-from springfoot.envs.physics.foot import INTACT, Feet
-from springfoot.envs.settings.adapted import ADAPTED, LEGS
-from springfoot.envs.settings.feet import KINDS, SPRING_NUMBERS, foot_setting
+from springfoot.envs.control import HELD_BY_SOUND, LegConstants, constants_from
+from springfoot.envs.physics import INTACT, Feet
+from springfoot.envs.settings import ADAPTED, KINDS, LEGS, SPRING_NUMBERS, foot_setting
 
 from ..searches.leg_search import GAIN_STEP, Search
 

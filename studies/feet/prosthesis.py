@@ -21,13 +21,13 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
-from springfoot.agents.policies.policy import BEST
-from springfoot.agents.training.config import PRESETS, TrainingConfig
-from springfoot.envs.control.leg_constants import TUNED_SPEED
-from springfoot.envs.settings.adapted import ADAPTED, committed_feet, without_person
+from springfoot.agents.policies import BEST
+from springfoot.agents.training import PRESETS, TrainingConfig
+from springfoot.envs.control import TUNED_SPEED
+from springfoot.envs.settings import ADAPTED, committed_feet, without_person
 from springfoot.errors import SpringfootError, require_count
 from springfoot.files.writing import csv_text
-from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
+from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress

@@ -8,9 +8,9 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
-from springfoot.gait.people.scores import mean_sd
+from springfoot.gait.people import mean_sd
 
 from ..base.intervals import t_interval
 from .foot_walks import ABOUT_STOPS, ASKED, PUSH_NEWTON, TOLD, Asked

@@ -1,7 +1,6 @@
 """Leg constants that nobody tuned: where a search begins that is to know nothing."""
 
-from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.legs import KNOTS
+from springfoot.envs.control import KNOTS, LegConstants
 
 GENERIC = "generic"
 """Name by which a search starts from them."""

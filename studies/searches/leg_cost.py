@@ -13,18 +13,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springfoot.agents.policies.baselines import own_settings
+from springfoot.agents.policies import own_settings
 from springfoot.arrays import NDArray
-from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.reference_walk import FED
-from springfoot.envs.control.standing import SLOW_SPEED
-from springfoot.envs.settings.settings import BipedSettings
-from springfoot.evaluation.numbers.tally import StrideTally
-from springfoot.evaluation.recording.recording import planned_course
-from springfoot.gait.people.cycle import PERCENT
-from springfoot.gait.people.human import HumanGait
-from springfoot.gait.people.scores import force_features, stride_work
+from springfoot.envs.batch import Biped
+from springfoot.envs.control import FED, SLOW_SPEED, LegConstants
+from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.numbers import StrideTally
+from springfoot.evaluation.recording import planned_course
+from springfoot.gait.people import PERCENT, HumanGait, force_features, stride_work
 
 from .leg_walks import FOREIGN, foreign_springs, measured, walk
 from .walk_effort import effort_price

@@ -5,10 +5,9 @@ from dataclasses import asdict
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from
-from springfoot.envs.control.legs import KNOTS
-from springfoot.gait.people.human import HumanGait, human_gait
-from springfoot.gait.springs.stiffness import LOWEST_STIFFNESS
+from springfoot.envs.control import KNOTS, TUNED_SPEED, LegConstants, constants_from
+from springfoot.gait.people import HumanGait, human_gait
+from springfoot.gait.springs import LOWEST_STIFFNESS
 
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
 """One unit of the search: degrees of a knot, relative change of a gain."""

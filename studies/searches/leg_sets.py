@@ -14,12 +14,11 @@ import numpy as np
 import tyro
 from matplotlib.figure import Figure
 
-from springfoot.envs.control.leg_constants import LegConstants, constants_from, constants_name
-from springfoot.envs.settings.settings import BipedSettings
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import record
-from springfoot.evaluation.report.gait_figure import MODEL, STYLE
+from springfoot.envs.control import LegConstants, constants_from, constants_name
+from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.report import MODEL, STYLE
 from springfoot.files.markdown import table, text_of
 from springfoot.files.writing import csv_text
 

@@ -20,13 +20,11 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name
-from springfoot.envs.control.reference_walk import reference_walk_at
-from springfoot.envs.settings.settings import BipedSettings, Feedforward, Guide
+from springfoot.envs.control import TUNED_SPEED, LegConstants, constants_from, constants_name, reference_walk_at
+from springfoot.envs.settings import BipedSettings, Feedforward, Guide
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.writing import csv_text
-from springfoot.gait.plan.plan import Cadence
-from springfoot.gait.plan.walk_style import least_work
+from springfoot.gait.plan import Cadence, least_work
 
 from ..base.study import Answer, OnProgress, Study
 from .constants_file import CONSTANTS, read_constants, write_constants

@@ -8,20 +8,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from springfoot.agents.policies.baselines import CONSTANT_STIFFNESS
+from springfoot.agents.policies import CONSTANT_STIFFNESS
 from springfoot.arrays import NDArray
-from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, foot_curves, plateau_curve
-from springfoot.envs.control.foot_springs import action_of, stiffness_ranges
-from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.phase_table import GRID
-from springfoot.envs.control.reference_walk import reference_walk_at
-from springfoot.envs.physics.foot import Feet
-from springfoot.envs.settings.settings import BipedSettings
-from springfoot.evaluation.numbers.tally import StrideTally, add_episode
-from springfoot.evaluation.recording.recording import TICK, Episodes, record_walk
-from springfoot.gait.body.body import Body
-from springfoot.gait.body.tissue import TOE_STIFFNESS
+from springfoot.envs.batch import Biped
+from springfoot.envs.control import (
+    GRID,
+    REFERENCE_STIFFNESS,
+    LegConstants,
+    action_of,
+    foot_curves,
+    plateau_curve,
+    reference_walk_at,
+    stiffness_ranges,
+)
+from springfoot.envs.physics import Feet
+from springfoot.envs.settings import BipedSettings
+from springfoot.evaluation.numbers import StrideTally, add_episode
+from springfoot.evaluation.recording import TICK, Episodes, record_walk
+from springfoot.gait.body import TOE_STIFFNESS, Body
 
 SECONDS = 6.5
 """Length of each walk [s]."""

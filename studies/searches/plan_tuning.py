@@ -20,12 +20,23 @@ from tqdm import tqdm
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.writing import csv_text, write_atomically
-from springfoot.gait.body.body import HEEL_RADIUS, Body
-from springfoot.gait.people.human import human_gait
-from springfoot.gait.plan.effort import AS_IS, PER_DEGREE, PRICES, Effort, Muscle, effort_of
-from springfoot.gait.plan.plan import WalkPlan, plan_walk
-from springfoot.gait.plan.plan_gait import gait_of
-from springfoot.gait.plan.walk_style import STYLES, WalkStyle, least_work, style_from
+from springfoot.gait.body import HEEL_RADIUS, Body
+from springfoot.gait.people import human_gait
+from springfoot.gait.plan import (
+    AS_IS,
+    PER_DEGREE,
+    PRICES,
+    STYLES,
+    Effort,
+    Muscle,
+    WalkPlan,
+    WalkStyle,
+    effort_of,
+    gait_of,
+    least_work,
+    plan_walk,
+    style_from,
+)
 
 from ..base.study import Answer, OnProgress, Study
 from .kept_search import asked_of, generations

@@ -18,12 +18,10 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
-from springfoot.agents.policies.policy import RUN
-from springfoot.agents.training.config import PRESETS, config_from_json
-from springfoot.agents.training.multi_seed import is_finished
-from springfoot.agents.training.run_record import read_record
-from springfoot.envs.control.leg_constants import constants_name
-from springfoot.envs.settings.settings import BipedSettings
+from springfoot.agents.policies import RUN
+from springfoot.agents.training import PRESETS, config_from_json, is_finished, read_record
+from springfoot.envs.control import constants_name
+from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError, require_count
 from springfoot.files.locks import owned
 from springfoot.files.markdown import table

@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from springfoot.envs.control.reference_walk import reference_walk_at
-from springfoot.envs.settings.settings import BipedSettings, reference_gait
-from springfoot.evaluation.numbers.criteria import NO_FALLS, Criterion, numbers
+from springfoot.envs.control import reference_walk_at
+from springfoot.envs.settings import BipedSettings, reference_gait
+from springfoot.evaluation.numbers import NO_FALLS, Criterion, numbers
 from springfoot.files.markdown import MISSING, table
-from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.people.cycle import PERCENT
-from springfoot.gait.people.human import HumanGait
-from springfoot.gait.people.scores import correlation, force_features, rmse, stride_work
+from springfoot.gait.body import GRAVITY
+from springfoot.gait.people import PERCENT, HumanGait, correlation, force_features, rmse, stride_work
 
 from ..base.quantities import COMPARED_JOINTS
 

@@ -18,15 +18,12 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.arrays import NDArray
-from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.batch.walk import walked_steps
-from springfoot.envs.control.foot_springs import action_of
-from springfoot.envs.control.leg_constants import SlopeConstants, slope_constants_from
-from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.batch import Biped, Tick, walked_steps
+from springfoot.envs.control import SlopeConstants, action_of, slope_constants_from
+from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.writing import csv_text
-from springfoot.gait.body.body import GRAVITY
+from springfoot.gait.body import GRAVITY
 
 from ..base.study import Answer, OnProgress, Study
 from .constants_file import CONSTANTS, read_constants, write_constants

@@ -8,14 +8,12 @@ are among the criteria that Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.batch.biped_batch import Biped
-from springfoot.evaluation.numbers.metrics import MOMENT_CURVES
-from springfoot.evaluation.numbers.series import foot_contacts, strides_within
-from springfoot.evaluation.numbers.tally import StrideTally
-from springfoot.evaluation.recording.recording import TICK
-from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.people.cycle import on_percent
-from springfoot.gait.plan.effort import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_stride
+from springfoot.envs.batch import Biped
+from springfoot.evaluation.numbers import MOMENT_CURVES, StrideTally, foot_contacts, strides_within
+from springfoot.evaluation.recording import TICK
+from springfoot.gait.body import GRAVITY
+from springfoot.gait.people import on_percent
+from springfoot.gait.plan import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_stride
 
 from .leg_walks import SETTLED
 

@@ -20,17 +20,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from springfoot.agents.policies.baselines import and_copy
+from springfoot.agents.policies import and_copy
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers.criteria import HUMAN_LIKE, Criterion, number_text, numbers
-from springfoot.evaluation.numbers.metrics import Gait, measure
-from springfoot.evaluation.recording.policies import policy_label, prepare
-from springfoot.evaluation.recording.recording import record
-from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.evaluation.numbers import HUMAN_LIKE, Criterion, Gait, measure, number_text, numbers
+from springfoot.evaluation.recording import policy_label, prepare, record
+from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
-from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.people import PERCENT
 
 from ..base.quantities import OPEN_LOOP, falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy

@@ -18,22 +18,18 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from springfoot.agents.policies.baselines import schedule
+from springfoot.agents.policies import schedule
 from springfoot.arrays import NDArray
-from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, plateau_curve
-from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
-from springfoot.envs.control.phase_table import GRID
-from springfoot.envs.physics.model import damping_times
-from springfoot.envs.settings.settings import BipedSettings, body_of
-from springfoot.envs.task.scales import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
+from springfoot.envs.control import FEET, GRID, REFERENCE_STIFFNESS, plateau_curve, stiffness_ranges
+from springfoot.envs.physics import damping_times
+from springfoot.envs.settings import BipedSettings, body_of
+from springfoot.envs.task import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record
 from springfoot.files.markdown import table, text_of
-from springfoot.gait.body.body import Body
-from springfoot.gait.body.tissue import TOE_STIFFNESS
-from springfoot.gait.springs.stiffness import SPRINGS, Segment, StiffnessSchedule
+from springfoot.gait.body import TOE_STIFFNESS, Body
+from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 
 from ..base.quantities import falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy

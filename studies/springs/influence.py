@@ -16,14 +16,13 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.policies.baselines import has_feedback
-from springfoot.envs.settings.settings import BipedSettings, reference_gait
+from springfoot.agents.policies import has_feedback
+from springfoot.envs.settings import BipedSettings, reference_gait
 from springfoot.errors import SpringfootError, require_count, require_number
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import WARM_UP
+from springfoot.evaluation.recording import WARM_UP, prepare
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
-from springfoot.gait.body.body import REFERENCE_HEIGHT
+from springfoot.gait.body import REFERENCE_HEIGHT
 
 from ..base.study import Answer, OnProgress, Study
 from ..walks.ablations import phase_schedule

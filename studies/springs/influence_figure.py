@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from springfoot.evaluation.report.gait_figure import MODEL, PEOPLE, PLAN, STYLE
+from springfoot.evaluation.report import MODEL, PEOPLE, PLAN, STYLE
 
 from .stiffness_responses import ACCELERATION, IMPULSE, MANY_STRIDES_SPEED, TORQUE, VELOCITY, Key, Response
 from .stiffness_steps import CELLS, PHASES, SPRINGS

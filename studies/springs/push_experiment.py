@@ -11,18 +11,14 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from springfoot.agents.policies.baselines import PolicyFunction, has_feedback
+from springfoot.agents.policies import PolicyFunction, has_feedback
 from springfoot.arrays import NDArray
-from springfoot.envs.control.equilibrium import PLATEAUS
-from springfoot.envs.control.foot_springs import FEET
-from springfoot.envs.physics.model import ANKLE
-from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.control import FEET, PLATEAUS
+from springfoot.envs.physics import ANKLE
+from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording
-from springfoot.gait.springs.identification import PhaseSpring, identify
-from springfoot.gait.springs.perturbation import PushedSpring, identify_pushed
-from springfoot.gait.springs.stiffness import SPRINGS
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare
+from springfoot.gait.springs import SPRINGS, PhaseSpring, PushedSpring, identify, identify_pushed
 
 BOUNDS = (*PLATEAUS, 1.0)
 """Phases: the plateaus of the fixed schedule, on which its K is constant, and the ramps between them."""

@@ -14,16 +14,14 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import tyro
 
-from springfoot.envs.control.foot_springs import FEET
-from springfoot.envs.physics.model import damping_times
-from springfoot.envs.settings.settings import body_of
+from springfoot.envs.control import FEET
+from springfoot.envs.physics import damping_times
+from springfoot.envs.settings import body_of
 from springfoot.errors import SpringfootError, require_count, require_number
-from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.recording import record
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
-from springfoot.gait.springs.perturbation import REACTS, SPRING
-from springfoot.gait.springs.spring_fit import Estimate
-from springfoot.gait.springs.stiffness import SPRINGS
+from springfoot.gait.springs import REACTS, SPRING, SPRINGS, Estimate
 
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .push_experiment import Row, identified, prepare_pushed, samples

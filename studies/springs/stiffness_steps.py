@@ -12,21 +12,26 @@ from math import ceil
 import mujoco
 import numpy as np
 
-from springfoot.agents.policies.baselines import PolicyFunction, leg_phase
+from springfoot.agents.policies import PolicyFunction, leg_phase
 from springfoot.arrays import NDArray
-from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.batch.walk import walked_steps
-from springfoot.envs.control.equilibrium import PLATEAUS, TOE_OFF
-from springfoot.envs.control.foot_springs import FEET, stiffness_ranges
-from springfoot.envs.physics.model import JOINTS, LEFT, RIGHT, SIDES
-from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.batch import Biped, Tick, walked_steps
+from springfoot.envs.control import FEET, PLATEAUS, TOE_OFF, stiffness_ranges
+from springfoot.envs.physics import JOINTS, LEFT, RIGHT, SIDES
+from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording.recording import TICK, WARM_UP
-from springfoot.gait.body.body import GRAVITY, Body
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, Contacts, find_contacts, find_steps, on_percent, sample
-from springfoot.gait.people.scores import LOADING_END_PERCENT, PUSH_OFF_BEGIN_PERCENT
-from springfoot.gait.springs.stiffness import SPRINGS
+from springfoot.evaluation.recording import TICK, WARM_UP
+from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.people import (
+    CONTACT_THRESHOLD_BW,
+    LOADING_END_PERCENT,
+    PUSH_OFF_BEGIN_PERCENT,
+    Contacts,
+    find_contacts,
+    find_steps,
+    on_percent,
+    sample,
+)
+from springfoot.gait.springs import SPRINGS
 
 _EDGES = (0.0, LOADING_END_PERCENT / 100, PLATEAUS[4], PUSH_OFF_BEGIN_PERCENT / 100, 0.5, TOE_OFF[0], 1.0)
 _NAMES = ("loading", "early mid-stance", "late mid-stance", "heel-off", "push-off", "swing")

@@ -17,20 +17,16 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.training.config import PRESETS, TrainingConfig
-from springfoot.agents.training.multi_seed import is_finished
-from springfoot.envs.control.equilibrium import PLATEAUS, foot_curves
-from springfoot.envs.control.leg_constants import LegConstants
-from springfoot.envs.control.phase_table import GRID
-from springfoot.envs.control.reference_walk import reference_walk_at
-from springfoot.envs.physics.timing import ACTION_STEP
-from springfoot.envs.settings.settings import BipedSettings, reference_gait, settings_from, settings_to_json
+from springfoot.agents.training import PRESETS, TrainingConfig, is_finished
+from springfoot.envs.control import GRID, PLATEAUS, LegConstants, foot_curves, reference_walk_at
+from springfoot.envs.physics import ACTION_STEP
+from springfoot.envs.settings import BipedSettings, reference_gait, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.report.gait_table import people_metrics
+from springfoot.evaluation.report import people_metrics
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.files.writing import csv_text
-from springfoot.gait.people.scores import mean_sd
-from springfoot.gait.springs.stiffness import SPRINGS, Segment, StiffnessSchedule
+from springfoot.gait.people import mean_sd
+from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 
 from ..base.protocol import Protocol, measured
 from ..base.quantities import COMPARED_JOINTS, Quantity

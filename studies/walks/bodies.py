@@ -13,16 +13,14 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.policies.baselines import PolicyFunction, and_copy
-from springfoot.agents.training.config import PRESETS
+from springfoot.agents.policies import PolicyFunction, and_copy
+from springfoot.agents.training import PRESETS
 from springfoot.arrays import NDArray
-from springfoot.envs.control.reference_walk import tabulated_speeds
-from springfoot.envs.control.subjects import DRAWN, Subjects
-from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait
+from springfoot.envs.control import DRAWN, Subjects, tabulated_speeds
+from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.errors import require_count
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import policy_label, prepare
-from springfoot.evaluation.recording.recording import BATCH, Recording, record_each
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import BATCH, Recording, policy_label, prepare, record_each
 from springfoot.files.markdown import table
 from springfoot.files.writing import csv_text
 

@@ -14,15 +14,14 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import tyro
 
-from springfoot.agents.policies.baselines import PolicyFunction, and_copy, own_settings
+from springfoot.agents.policies import PolicyFunction, and_copy, own_settings
 from springfoot.arrays import NDArray
-from springfoot.envs.settings.settings import BipedSettings, settings_to_json
+from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.errors import SpringfootError, require_count
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import prepare, record
 from springfoot.files.markdown import plus_minus, table, text_of
-from springfoot.gait.people.scores import mean_sd
+from springfoot.gait.people import mean_sd
 
 from ..base.flags import SettingsFlags, given
 from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval

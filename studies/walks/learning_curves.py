@@ -13,13 +13,11 @@ import matplotlib
 import tyro
 from matplotlib.figure import Figure
 
-from springfoot.agents.policies.policy import RUN
+from springfoot.agents.policies import RUN
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers.criteria import WALKS, unmet
-from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import record
-from springfoot.evaluation.report.gait_figure import STYLE
+from springfoot.evaluation.numbers import WALKS, measure, unmet
+from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.report import STYLE
 from springfoot.files.json_file import read_object
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text

@@ -10,20 +10,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from springfoot.agents.policies.baselines import PolicyFunction
+from springfoot.agents.policies import PolicyFunction
 from springfoot.arrays import NDArray
-from springfoot.envs.control.foot_springs import action_of, stiffness_of
-from springfoot.envs.physics.model import SIDES
-from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.envs.control import action_of, stiffness_of
+from springfoot.envs.physics import SIDES
+from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.errors import SpringfootError, require_count
-from springfoot.evaluation.page.play_data import episodes_of
-from springfoot.evaluation.page.play_page import Grid, play_page
-from springfoot.evaluation.page.report_page import PAGE_PACKAGES
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import BATCH, WARM_UP, Recording, record
+from springfoot.evaluation.page import PAGE_PACKAGES, Grid, episodes_of, play_page
+from springfoot.evaluation.recording import BATCH, WARM_UP, Recording, prepare, record
 from springfoot.files.markdown import table
 from springfoot.files.provenance import source
-from springfoot.gait.springs.stiffness import SPRINGS
+from springfoot.gait.springs import SPRINGS
 
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
 

@@ -2,6 +2,7 @@
 
 import ast
 from collections import defaultdict
+from importlib import import_module
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
@@ -42,3 +43,15 @@ def test_nothing_executes_what_a_file_says():
                 called = ast.unparse(node.func)
                 assert ".".join(called.split(".")[-2:]) not in LOADERS, f"{path}:{node.lineno}"
                 assert "allow_pickle" not in {keyword.arg for keyword in node.keywords}, f"{path}:{node.lineno}"
+
+
+def test_studies_import_the_public_names_of_other_rooms_only():
+    for path in sorted((REPOSITORY / "studies").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("springfoot."):
+                continue
+            room, *inside = node.module.split(".")[1:]
+            if room in ("gait", "envs", "agents", "evaluation"):
+                assert len(inside) <= 1, f"{path}:{node.lineno}: {node.module}"
+                public = import_module(node.module).__all__
+                assert {alias.name for alias in node.names} <= set(public), f"{path}:{node.lineno}"
