@@ -182,7 +182,7 @@ class Predict(WalkingStudy):
 
     def _train(self, settings: BipedSettings, out: Path) -> None:
         """Train what is left of the training in `out`."""
-        from springfoot.agents.training import training  # torch takes seconds, which --help need not wait for
+        from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
 
         preset = PRESETS["predict"]
         config = replace(
@@ -195,7 +195,7 @@ class Predict(WalkingStudy):
         if is_finished(out):
             return
         begun = (out / RUN).is_file()
-        record = training.resume(out, threads=self.threads) if begun else training.train(config, out)
+        record = resume(out, threads=self.threads) if begun else train(config, out)
         if record["status"] == "interrupted":
             raise KeyboardInterrupt
 
