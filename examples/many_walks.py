@@ -30,8 +30,7 @@ def main() -> None:
 
     envs.reset(seed=0)
     walking = np.ones(args.num, bool)
-    seconds = np.zeros(args.num)
-    distance = np.zeros(args.num)
+    seconds, distance = np.zeros(args.num), np.zeros(args.num)
     while walking.any():  # who has fallen is put back and walks on, and is not looked at any more
         _, _, terminated, truncated, info = envs.step(actions)
         seconds[walking] = info["time"][walking]

@@ -27,9 +27,7 @@ def main() -> None:
     action = np.array([ankle, toe, ankle, toe], np.float32)  # ankle_left, toe_left, ankle_right, toe_right
 
     _, info = env.reset(seed=args.seed)
-    total = 0.0
-    work = 0.0
-    ended = False
+    total, work, ended = 0.0, 0.0, False
     while not ended:
         _, reward, terminated, truncated, info = env.step(action)
         total += float(reward)

@@ -36,8 +36,7 @@ def main() -> None:
     for row, (label, curves) in zip(axes, ROWS.items(), strict=True):
         row[0].set_ylabel(label)
         for panel, curve in zip(row, curves, strict=True):
-            mean = gait.both.mean(curve)
-            sd = gait.both.sd(curve)
+            mean, sd = gait.both.mean(curve), gait.both.sd(curve)
             panel.plot(PERCENT, mean)
             panel.fill_between(PERCENT, mean - sd, mean + sd, alpha=0.3, linewidth=0)
             panel.axvline(gait.metrics["toe_off_percent"], color="grey", linestyle=":")

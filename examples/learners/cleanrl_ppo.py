@@ -13,9 +13,7 @@ from torch.distributions import Normal
 from springfoot.agents import policy_from_mlp, save_policy
 
 TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
-ENVS = 64
-STEPS = 32
-GAMMA = 0.98
+ENVS, STEPS, GAMMA = 64, 32, 0.98
 
 
 def main(out: str = "cleanrl.safetensors", timesteps: int = 131_072, seed: int = 0) -> None:
@@ -30,8 +28,7 @@ def main(out: str = "cleanrl.safetensors", timesteps: int = 131_072, seed: int =
     log_std = nn.Parameter(torch.full((4,), -0.9))
     parameters = [*actor.parameters(), *critic.parameters(), log_std]
     adam = torch.optim.Adam(parameters, lr=1e-3, eps=1e-5)
-    now = torch.as_tensor(envs.reset(seed=seed)[0])
-    over = torch.zeros(ENVS, dtype=torch.bool)
+    now, over = torch.as_tensor(envs.reset(seed=seed)[0]), torch.zeros(ENVS, dtype=torch.bool)
     for _ in range(timesteps // (ENVS * STEPS)):
         rows = []
         for _ in range(STEPS):
@@ -39,13 +36,11 @@ def main(out: str = "cleanrl.safetensors", timesteps: int = 131_072, seed: int =
                 action = (noise := Normal(actor(now), log_std.exp())).sample()
             observation, *step = (torch.as_tensor(each) for each in envs.step(action.numpy())[:4])
             rows.append((now, action, noise.log_prob(action).sum(-1), *step, ~over))  # after an end a step only resets
-            now = observation
-            over = step[1] | step[2]
+            now, over = observation, step[1] | step[2]
         seens, actions, log_probs, rewards, fell, late, real = map(torch.stack, zip(*rows, strict=True))
         with torch.no_grad():
             values = critic(torch.cat([seens, now[None]]))[..., 0]
-        advantages = rewards + GAMMA * values[1:] * ~fell - values[:-1]
-        later = torch.zeros(ENVS)
+        advantages, later = rewards + GAMMA * values[1:] * ~fell - values[:-1], torch.zeros(ENVS)
         for t in reversed(range(STEPS)):
             advantages[t] = later = advantages[t] + GAMMA * 0.95 * ~(fell | late)[t] * later
         data = [each[real] for each in (seens, actions, log_probs, advantages, advantages + values[:-1])]

@@ -17,8 +17,7 @@ from torch import nn
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID = "springfoot.envs:SegmentedFootBiped-v0"
-TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
+ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 
 
 def _batch(config: dict) -> gym.vector.VectorEnv:
@@ -47,8 +46,7 @@ def main(out: str = "rllib.safetensors", timesteps: int = 131_072, seed: int = 0
     algorithm = ppo.build_algo()
     for _ in range(timesteps // 2048):
         algorithm.train()
-    module = algorithm.get_module()
-    seen = algorithm.env_runner.env.env.env.obs_rms
+    module, seen = algorithm.get_module(), algorithm.env_runner.env.env.env.obs_rms
     norm = {"observation_mean": seen.mean, "observation_variance": seen.var}
     layers = [
         (layer.weight, layer.bias) for layer in [*module.encoder.actor_encoder.net.mlp[::2], module.pi.net.mlp[-1]]

@@ -13,19 +13,14 @@ from torch import nn
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID = "springfoot.envs:SegmentedFootBiped-v0"
-TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
+ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 
 
 class _Batch(VecEnv):
     def __init__(self, num_envs: int, seed: int) -> None:
         self.batch = gym.make_vec(ID, num_envs=num_envs, autoreset_mode="SameStep", **TASK)
-        self.num_envs = num_envs
-        self.num_actions = 4
-        self.device = "cpu"
-        self.cfg = TASK
-        self.max_episode_length = 500
-        self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
+        self.num_envs, self.num_actions, self.device, self.cfg = num_envs, 4, "cpu", TASK
+        self.max_episode_length, self.episode_length_buf = 500, torch.zeros(num_envs, dtype=torch.long)
         self.observation = self.batch.reset(seed=seed)[0]
 
     def get_observations(self) -> TensorDict:
@@ -50,8 +45,7 @@ def main(out: str = "rsl_rl.safetensors", timesteps: int = 131_072, seed: int = 
     config = {"num_steps_per_env": 32, "obs_groups": {"actor": ["policy"], "critic": ["policy"]}, "algorithm": ppo}
     config |= {"actor": network | {"distribution_cfg": noise}, "critic": dict(network), "save_interval": 1000}
     runner = OnPolicyRunner(_Batch(64, seed), config)
-    actor = runner.alg.actor
-    seen = runner.alg.actor.obs_normalizer
+    actor, seen = runner.alg.actor, runner.alg.actor.obs_normalizer
     nn.init.normal_(actor.mlp[-1].weight, std=0.001)
     nn.init.zeros_(actor.mlp[-1].bias)
     runner.learn(timesteps // (64 * 32))

@@ -49,14 +49,12 @@ def _trained() -> tuple[Any, Any]:
 def act(observation: np.ndarray) -> np.ndarray:
     """Actions (N, 4) for observations (N, D) of the same N episodes, step after step."""
     model, statistics = _trained()
-    starts = ~observation[:, LAST_ACTION].any(axis=1)
-    seen = statistics.normalize_obs(observation)
+    starts, seen = ~observation[:, LAST_ACTION].any(axis=1), statistics.normalize_obs(observation)
     known = act.memory if act.memory is not None and act.memory[0].shape[1] == len(observation) else None
     action, act.memory = model.predict(seen, known, episode_start=starts, deterministic=True)
     return action
 
 
-act.settings = TASK
-act.memory = None
+act.settings, act.memory = TASK, None
 if __name__ == "__main__":
     tyro.cli(main)

@@ -14,8 +14,7 @@ from torch import nn
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID = "springfoot.envs:SegmentedFootBiped-v0"
-TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
+ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 
 
 class _Actor(GaussianMixin, Model):
@@ -51,8 +50,7 @@ def main(out: str = "skrl.safetensors", timesteps: int = 131_072, seed: int = 0)
     models = {"policy": _Actor(**spaces), "value": _Critic(**spaces)}
     agent = PPO(models=models, memory=RandomMemory(memory_size=32, num_envs=64), cfg=cfg, **spaces)
     SequentialTrainer(env=env, agents=agent, cfg={"timesteps": timesteps // 64, "headless": True}).train()
-    seen = agent.checkpoint_modules["observation_preprocessor"]
-    layers = models["policy"].net[::2]
+    seen, layers = agent.checkpoint_modules["observation_preprocessor"], models["policy"].net[::2]
     norm = {"observation_mean": seen.running_mean, "observation_variance": seen.running_variance}
     layers = [(layer.weight, layer.bias) for layer in layers]
     save_policy(out, policy_from_mlp(layers, TASK, activation="tanh", observation_clip=5.0, **norm))

@@ -20,8 +20,7 @@ from torch.distributions import Independent, Normal
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID = "springfoot.envs:SegmentedFootBiped-v0"
-TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
+ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 
 
 def main(out: str = "tianshou.safetensors", timesteps: int = 131_072, seed: int = 0) -> None:
@@ -42,8 +41,7 @@ def main(out: str = "tianshou.safetensors", timesteps: int = 131_072, seed: int 
         dist_fn=lambda output: Independent(Normal(*output), 1),
         action_space=gym.spaces.Box(-1, 1, (4,)),
     )
-    critic = ContinuousCritic(preprocess_net=bodies[1])
-    adam = AdamOptimizerFactory(lr=1e-3)
+    critic, adam = ContinuousCritic(preprocess_net=bodies[1]), AdamOptimizerFactory(lr=1e-3)
     ppo = PPO(policy=policy, critic=critic, optim=adam, gamma=0.98, ent_coef=0.0, max_grad_norm=0.5)
     collector = Collector(ppo, envs, VectorReplayBuffer(2048, 16))
     schedule = {"collection_step_num_env_steps": 2048, "batch_size": 256, "update_step_num_repetitions": 8}
@@ -51,8 +49,7 @@ def main(out: str = "tianshou.safetensors", timesteps: int = 131_072, seed: int 
     if timesteps:
         ppo.run_training(OnPolicyTrainerParams(training_collector=collector, **schedule, **length))
     seen = envs.get_obs_rms()
-    mean = np.broadcast_to(seen.mean, 43)
-    variance = np.broadcast_to(seen.var, 43)
+    mean, variance = np.broadcast_to(seen.mean, 43), np.broadcast_to(seen.var, 43)
     norm = {"observation_mean": mean, "observation_variance": variance, "variance_floor": seen.eps}
     layers = [(layer.weight, layer.bias) for layer in [*bodies[0].model.model[::2], head]]
     save_policy(out, policy_from_mlp(layers, TASK, activation="tanh", observation_clip=seen.clip_max, **norm))

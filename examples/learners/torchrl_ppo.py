@@ -18,8 +18,7 @@ from torchrl.objectives.value import GAE
 
 from springfoot.agents import policy_from_mlp, save_policy
 
-ID = "springfoot.envs:SegmentedFootBiped-v0"
-TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
+ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 Face = Literal["vector", "GymEnv", "GymWrapper"]
 
 

@@ -150,7 +150,7 @@ def test_two_trainings_into_one_folder_are_one_training(tmp_path):
 STARTS = {
     "train": [train.__file__, "--out", "new"],
     "evaluate": [evaluate.__file__, "pretrained", "--out", "new"],
-    "study": ["-c", "from springfoot.cli.main import main; exit(main())", "study", "criteria", "--out", "new"],
+    "study": ["-c", "from springfoot.cli.main import main; exit(main())", "study", "compare", "--out", "new"],
 }
 
 

@@ -51,5 +51,5 @@ def test_every_example_is_a_learner_short_and_in_the_page():
     examples = {path.stem: path.read_text(encoding="utf-8") for path in learners.EXAMPLES.glob("*.py")}
     assert set(examples) == {learner.example for learner in learners.LEARNERS}
     assert max(len(text.splitlines()) for text in examples.values()) <= 60
-    page = (learners.ROOT / "docs" / "learners.md").read_text(encoding="utf-8")
-    assert all(f"(../examples/learners/{name}.py)" in page for name in examples)
+    page = (learners.ROOT / "docs" / "how-to" / "learners.md").read_text(encoding="utf-8")
+    assert all(f"(../../examples/learners/{name}.py)" in page for name in examples)

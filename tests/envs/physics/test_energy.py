@@ -89,7 +89,7 @@ def test_torque_and_work_equal_a_replay_step_by_step(name):
         ("schedule", {}),
         ("constant", {}),
         ("schedule", {"height": 1.9, "mass": 100.0, "carried_ratio": 0.2}),
-        ("pretrained", {"slope_deg": 5.0}),
+        ("schedule", {"slope_deg": 5.0}),
         ("pretrained", {"push_newton": 150.0, "unevenness_m": 0.01}),
     ],
 )
