@@ -5,7 +5,6 @@ cannot be computed (no data, no spread) is None, never NaN. The windows are thos
 the valley between them lie at every walking speed.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import SupportsFloat
@@ -14,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError
 
 from ..body.body import GRAVITY
 
@@ -55,32 +53,6 @@ def share_within_sd(curve: ArrayLike, mean: ArrayLike, sd: ArrayLike) -> float |
     return _number(100 * np.mean(inside)) if np.all(np.isfinite(curve)) else None
 
 
-def gait_variable_scores(
-    curves: Mapping[str, ArrayLike], reference: Mapping[str, ArrayLike]
-) -> dict[str, float | None]:
-    """Gait Variable Scores: RMS difference of each of one leg's angle curves to people's mean, in their unit.
-
-    Baker et al., Gait & Posture 30 (2009) 265-269, with the sagittal angles at hand. Curves (n,) over the stride,
-    each with its namesake in `reference`; a score of curves with missing values is None.
-    """
-    missing = sorted(set(curves) - set(reference))
-    if missing:
-        raise SpringfootError(f"no reference for {', '.join(missing)}; there is {', '.join(reference)}")
-    return {name: rmse(curve, reference[name]) for name, curve in curves.items()}
-
-
-def gait_profile_score(*legs: Mapping[str, float | None]) -> float | None:
-    """Gait Profile Score: RMS of the variable scores of one leg, or of both; None if any is missing.
-
-    Baker's GPS takes nine angles of each leg in three planes; of sagittal angles alone it is not to be compared with
-    published ones. A variable that both legs share (a pelvis or trunk angle) is to be given with one leg only.
-    """
-    scores = [score for leg in legs for score in leg.values()]
-    if not scores or any(score is None for score in scores):
-        return None
-    return _number(np.sqrt(np.mean(np.square(np.array(scores, float)))))
-
-
 @dataclass(frozen=True, kw_only=True)
 class ForceFeatures:
     """Landmarks of one foot's ground reaction force (GRF) over the stride, in the curves' unit (body weights)."""
@@ -108,47 +80,12 @@ def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class ForceTiming:
-    """Where the landmarks of `ForceFeatures` lie [percent of stride]; the first of several equal samples."""
-
-    vertical_peak1: int | None
-    vertical_valley: int | None
-    vertical_peak2: int | None
-    braking_peak: int | None
-    forward_peak: int | None
-
-
-def force_timing(vertical: NDArray, forward: NDArray) -> ForceTiming:
-    """Percent of the stride at which one foot's mean force curves have their peaks and valley.
-
-    A percent at the end of its window is no peak: the curve still rises, or falls, beyond it.
-    """
-
-    def first(curve: NDArray, percent: tuple[int, int] = (0, 100)) -> int | None:
-        inside = _window(curve, percent)
-        return percent[0] + int(np.argmax(inside)) if np.all(np.isfinite(inside)) else None
-
-    return ForceTiming(
-        vertical_peak1=first(vertical, FIRST_PEAK_PERCENT),
-        vertical_valley=first(-vertical, VALLEY_PERCENT),
-        vertical_peak2=first(vertical, SECOND_PEAK_PERCENT),
-        braking_peak=first(-forward),
-        forward_peak=first(forward),
-    )
-
-
 def largest(curve: NDArray) -> tuple[float | None, int | None]:
     """Largest value of a curve and the percent at which it stands."""
     if not np.all(np.isfinite(curve)):
         return None, None
     percent = int(np.argmax(curve))
     return float(curve[percent]), percent
-
-
-def positive_work(power: NDArray, tick: float) -> NDArray:
-    """Work done at positive power: integral of max(0, power) over the first axis (T, ...), sampled every `tick` [s]."""
-    return np.maximum(power, 0.0).sum(axis=0) * tick
 
 
 def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]:
@@ -160,20 +97,6 @@ def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]
     negative = np.maximum(-power, 0.0)
     spacing = np.asarray(stride_time) / 100
     return np.trapezoid(positive, axis=-1) * spacing, np.trapezoid(negative, axis=-1) * spacing
-
-
-def loop_area(angle: ArrayLike, torque: ArrayLike) -> NDArray:
-    """Area of closed angle-torque loops (..., n): the joint's net work in one stride, the integral of torque d angle.
-
-    Angle [rad], torque [N m, or per kg] positive as the angle (an extension or plantarflexion moment with its sign
-    turned), so that the area [J, or J/kg] is positive where the joint works on the body (an ankle's loop of moment
-    over dorsiflexion then runs counter-clockwise, as in Hansen et al. 2004) and negative where it absorbs. The last
-    sample is joined to the first by a straight line; a spring of constant stiffness has area 0.
-    """
-    angle = np.asarray(angle, float)
-    torque = np.asarray(torque, float)
-    turned = np.roll(angle, -1, axis=-1) - angle
-    return (turned * (torque + np.roll(torque, -1, axis=-1)) / 2).sum(axis=-1)
 
 
 def cost_of_transport(work: float, mass: float, distance: float) -> float | None:

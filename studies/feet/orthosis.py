@@ -11,24 +11,29 @@ speeds, and energy is compared where they walk equally fast. Last, two people wh
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
+from itertools import pairwise, permutations, product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+import matplotlib
 import numpy as np
 import tyro
+from matplotlib.figure import Figure
+from scipy.stats import rankdata
 
 from springfoot.envs.physics import ANKLE, RIGHT, Spring, damping_times
 from springfoot.envs.settings import ADAPTED, body_of, committed_feet, without_person
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record_feet
+from springfoot.evaluation.report import STYLE
+from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
+from ..base.intervals import share_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .foot_walks import NAMES, SCHEDULE, UNSEARCHED, numbers_of, walked
-from .orthosis_page import at_walked_speeds, best_springs, draw_drop, draw_weak, drop_text, people_text, weak_text
+from .foot_walks import ABOUT_STOPS, NAMES, SCHEDULE, TOLD, UNSEARCHED, numbers_of, walked
 
 PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
@@ -217,3 +222,257 @@ def _renamed(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return csv_text(list(rows[0]), [list(row.values()) for row in rows])
+
+
+Row = Mapping[str, Any]
+OF_A_CELL = ("mass_kg", "speed_m_s", "strength")
+COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#555555")
+
+
+def at_walked_speeds(rows: Sequence[Row], speeds: Sequence[float]) -> list[dict[str, Any]]:
+    """Rows of the same form for `speeds` that are walked [m/s], not asked for.
+
+    The energy of each spring is linear between two speeds asked for, next to each other, at which nobody falls; with a
+    spring that reaches a speed nowhere everybody falls there.
+    """
+    found = []
+    keys = ("mass_kg", "strength", "spring_Nm_deg")
+    for speed in speeds:
+        for own in dict.fromkeys(tuple(row[key] for key in keys) for row in rows):
+            walks = sorted(
+                (row for row in rows if tuple(row[key] for key in keys) == own), key=lambda row: row["speed_m_s"]
+            )
+            line = {**dict(zip(keys, own, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
+            energy = next((e for pair in pairwise(walks) if (e := _energy_at(speed, *pair)) is not None), None)
+            found.append({**line, "falls": float(energy is None), "energy_J_kg_m": energy})
+    return found
+
+
+def _energy_at(speed: float, slow: Row, fast: Row) -> float | None:
+    if slow["falls"] or fast["falls"] or None in (slow["energy_J_kg_m"], fast["energy_J_kg_m"]):
+        return None
+    low = slow["walked_m_s"]
+    high = fast["walked_m_s"]
+    if not low <= speed <= high:
+        return None
+    return float(np.interp(speed, [low, high], [slow["energy_J_kg_m"], fast["energy_J_kg_m"]]))
+
+
+def best_springs(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return of the springs with which nobody falls, for each body, speed and strength: that with which muscles take
+    least energy for a metre, by how much the worst of them takes more, and that which slows the walk least."""
+    found = []
+    for cell in _cells(rows):
+        walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row["energy_J_kg_m"] is not None]
+        line = {**dict(zip(OF_A_CELL, cell, strict=True)), "springs_without_falls": len(walking)}
+        names = ("best_Nm_deg", "energy_J_kg_m", "walked_m_s", "worst_Nm_deg", "worst_more_percent", "fastest_Nm_deg")
+        line |= dict.fromkeys(names)
+        if walking:
+            best, worst = (of(walking, key=lambda row: row["energy_J_kg_m"]) for of in (min, max))
+            line |= {"best_Nm_deg": best["spring_Nm_deg"], "worst_Nm_deg": worst["spring_Nm_deg"]}
+            line |= {"energy_J_kg_m": best["energy_J_kg_m"], "walked_m_s": best["walked_m_s"]}
+            line["fastest_Nm_deg"] = max(walking, key=lambda row: row["walked_m_s"])["spring_Nm_deg"]
+            line["worst_more_percent"] = 100 * (worst["energy_J_kg_m"] / best["energy_J_kg_m"] - 1)
+        found.append(line)
+    return found
+
+
+def _cells(rows: Sequence[Row]) -> list[tuple[float, ...]]:
+    return list(dict.fromkeys(tuple(row[name] for name in OF_A_CELL) for row in rows))
+
+
+def _of(rows: Sequence[Row], cell: tuple[float, ...]) -> list[Row]:
+    return [row for row in rows if tuple(row[name] for name in OF_A_CELL) == cell]
+
+
+def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row], what_ran: str) -> str:
+    """Return the section of the weak calf: all `rows`, and `best_springs` where people walk, and where they are asked
+    to walk, equally fast."""
+    speeds = sorted({row["speed_m_s"] for row in best})
+    lines = []
+    for strength in sorted({row["strength"] for row in best}):
+        for mass in sorted({row["mass_kg"] for row in best}):
+            cells = []
+            for speed in speeds:
+                (row,) = _of(best, (mass, speed, strength))
+                more = text_of(row["worst_more_percent"], ".0f")
+                told = f"{row['best_Nm_deg']:g} (+{more} %, {row['springs_without_falls']})"
+                cells.append(told if more != MISSING else "none")
+            lines.append([f"{100 * strength:.0f} %", f"{mass:g}", *cells])
+    head = ["calf", "kg", *(f"N·m/deg, walking {speed:g} m/s" for speed in speeds)]
+    springs, asked = (sorted({row[name] for row in rows}) for name in ("spring_Nm_deg", "speed_m_s"))
+    alone = [row for row in rows if row["spring_Nm_deg"] == springs[0]]
+    fallen = sum(1 for row in alone if row["falls"] > 0)
+    return (
+        f"![The best orthosis](weak.png)\n\n{table(head, lines)}\n\nIn each cell, of the springs that walk that fast "
+        "without a fall, that with which muscles take least energy for a metre; in brackets, by how much the worst "
+        "takes more, and how many they are. It is the stiffest of the map and the weakest, where a best one may lie "
+        f"beyond, in {at_the_ends(best, springs)}.\n\n"
+        f"The spring of least energy where all walk equally fast, against {directions(best, 'best_Nm_deg')}.\n\n"
+        "The same where all are asked for the same speed, and walk the slower the more a spring slows them, against "
+        f"{directions(as_asked, 'best_Nm_deg')}.\n\n"
+        f"The spring that slows the walk asked for least, against {directions(as_asked, 'fastest_Nm_deg')}.\n\n"
+        "ρ is Spearman's correlation over the cells, in brackets the mean at each level [N·m/deg] and, of pairs of "
+        "cells that differ in nothing else, in how many the spring is stiffer, softer or the same with more weakness, "
+        "mass or speed. Waterval et al. found more with weakness, mass and speed, by energy. Energy at the speed asked "
+        "for was looked at first, slowing second, equal speeds last. Without a spring someone falls in "
+        f"{fallen} of {len(alone)} cells. "
+        f"{what_ran} of each of {len(springs)} springs of 0 to {springs[-1]:g} N·m/deg at rest at 0°, and each of "
+        f"{len(asked)} speeds asked for, {asked[0]:g} to {asked[-1]:g} m/s, between which energy is linear in the "
+        "speed walked; legs and stiffness of both feet as of sound feet. A calf's strength is a share of the largest "
+        "moment that the model's calf can give, of which a sound walk at 1.2 m/s needs 40 %. Energy: positive work of "
+        "all muscles / 0.25 + negative / 1.2, without the orthosis's own."
+    )
+
+
+def directions(best: Sequence[Row], column: str) -> str:
+    """Return whether a stiffness of `best_springs` rises with weakness, mass and speed, in words: over all cells, and
+    in pairs of cells that differ in nothing else."""
+    known = [row for row in best if row[column] is not None]
+    told = []
+    for name, label, sign in (("strength", "weakness", -1), ("mass_kg", "mass", 1), ("speed_m_s", "speed", 1)):
+        levels = sorted({row[name] for row in known}, key=lambda value: sign * value)
+        means = [np.mean([row[column] for row in known if row[name] == level]) for level in levels]
+        pairs = np.array([(sign * row[name], row[column]) for row in known]).reshape(-1, 2)
+        varies = len(levels) > 1 and np.ptp(pairs[:, 1]) > 0
+        ranks = np.apply_along_axis(rankdata, 0, pairs)
+        rho = f"ρ {np.corrcoef(ranks.T)[0, 1]:+.2f}" if varies else "ρ –"
+        steps = ", ".join(f"{level:g}: {mean:.1f}" for level, mean in zip(levels, means, strict=True))
+        others = [other for other in OF_A_CELL if other != name]
+        alike = [
+            np.sign(more[column] - less[column])
+            for less, more in permutations(known, 2)
+            if sign * less[name] < sign * more[name] and all(less[other] == more[other] for other in others)
+        ]
+        counts = f"stiffer {alike.count(1)}, softer {alike.count(-1)}, same {alike.count(0)}"
+        told.append(f"{label} {rho} ({steps}; {len(alike)} pairs: {counts})")
+    return "; ".join(told)
+
+
+def at_the_ends(best: Sequence[Row], springs: Sequence[float]) -> str:
+    """In how many cells, at each speed, the best of the `springs` is the stiffest or the weakest of them, in words."""
+    told = []
+    for speed in sorted({row["speed_m_s"] for row in best}):
+        own = [row["best_Nm_deg"] for row in best if row["speed_m_s"] == speed]
+        told.append(f"{own.count(springs[-1])} and {own.count(springs[0])} of {len(own)} at {speed:g} m/s")
+    return "; ".join(told)
+
+
+def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
+    """Return the weakest spring with which, and with all stiffer ones of its rest angle, none falls."""
+    cures = []
+    for rest in sorted({row["rest_deg"] for row in rows}):
+        own = sorted((row for row in rows if row["rest_deg"] == rest), key=lambda row: -row["spring_Nm_rad"])
+        standing = []
+        for row in own:
+            if row[column] > 0:
+                break
+            standing.append(row)
+        cures += standing[-1:]
+    return min(cures, key=lambda row: row["spring_Nm_rad"], default=None)
+
+
+def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: float) -> str:
+    """Return the section of the drop foot; each cell is of `episodes`."""
+    parts = []
+    for speed in dict.fromkeys(row["speed_m_s"] for row in rows):
+        here = [row for row in rows if row["speed_m_s"] == speed]
+        rests = sorted({row["rest_deg"] for row in here})
+        lines = []
+        for stiffness in sorted({row["spring_Nm_rad"] for row in here}):
+            own = {row["rest_deg"]: row for row in here if row["spring_Nm_rad"] == stiffness}
+            lines.append([f"{stiffness:g}", *(_cell(own[rest]) for rest in rests)])
+        head = [f"K N·m/rad at {speed:g} m/s", *(f"rest {rest:g}°" for rest in rests)]
+        cures = [weakest_cure(here, column) for column in ("falls", "falls_pushed")]
+        told = [
+            "no spring of the map" if cure is None else f"{cure['spring_Nm_rad']:g} N·m/rad at {cure['rest_deg']:g}°"
+            for cure in cures
+        ]
+        parts.append(
+            f"{table(head, lines)}\n\nWeakest with which 0 of {episodes} fell: {told[0]}; under pushes: {told[1]}."
+        )
+    most = share_interval(0, episodes)[1]
+    return (
+        "![Drop foot](drop.png)\n\n"
+        + "\n\n".join(parts)
+        + (
+            f"\n\nShare that falls, undisturbed / pushed by ±{push_newton:g} N, and median toe clearance of the right "
+            f"foot in mid-swing [mm]. {what_ran} of each, legs and stiffness of both feet as of sound feet; muscles "
+            "of the right ankle are slack in swing, the spring is there always; clearance of walks that fell is of the "
+            "strides before. Weakest: none fell with it, nor with "
+            f"any stiffer one of its rest angle; where 0 of {episodes} fell, up to {most:.0%} may fall (95 %, Wilson)."
+        )
+    )
+
+
+def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
+    """Return the section of people who adapted; nothing where there are none."""
+    head = ["right foot", "person", *(each.label for each in TOLD)]
+    lines = [
+        [row["foot"], row["person"], *(_unless_all_fall(row, each.key, each.pattern) for each in TOLD)] for row in rows
+    ]
+    note = (
+        f"{what_ran}, undisturbed and, for `falls, pushed`, pushed by ±{push_newton:g} N; without an orthosis. "
+        f"{ABOUT_STOPS}"
+    )
+    return f"{table(head, lines)}\n\n{note}" if lines else ""
+
+
+def _unless_all_fall(row: Row, key: str, pattern: str) -> str:
+    return MISSING if row["falls"] == 1.0 and not key.startswith("falls") else text_of(row[key], pattern)
+
+
+def _cell(row: Row) -> str:
+    clearance = MISSING if row["clearance_m"] is None else f"{1000 * row['clearance_m']:.0f} mm"
+    return f"{row['falls']:.0%} / {row['falls_pushed']:.0%}, {clearance}"
+
+
+def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
+    """Write the picture: energy over stiffness, a panel a speed walked at the middle mass, a line a strength."""
+    masses = sorted({row["mass_kg"] for row in rows})
+    mass = masses[len(masses) // 2]
+    speeds = sorted({row["speed_m_s"] for row in rows})
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+        for ax, speed in zip(
+            np.ravel(figure.subplots(1, len(speeds), sharey=True, squeeze=False)), speeds, strict=True
+        ):
+            for strength, color in zip(sorted({row["strength"] for row in rows}), COLORS * 9, strict=False):
+                own = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
+                x = [row["spring_Nm_deg"] for row in own]
+                y = [row["energy_J_kg_m"] for row in own]
+                ax.plot(x, y, "o-", color=color, ms=3.5, lw=1.3, label=f"a calf of {100 * strength:.0f} %")
+                for row in _of(best, (mass, speed, strength)):
+                    if row["best_Nm_deg"] is not None:
+                        ax.plot(row["best_Nm_deg"], row["energy_J_kg_m"], "o", color=color, ms=9, mfc="none")
+            ax.set(title=f"walking {speed:g} m/s, {mass:g} kg", xlabel="orthosis (N·m/deg)")
+            ax.grid(color="#ededed", lw=0.6)
+        figure.axes[0].set_ylabel("energy of muscles (J/kg/m)")
+        figure.axes[0].legend(frameon=False)
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+def draw_drop(path: Path, rows: Sequence[Row]) -> None:
+    """Write the maps: toe clearance over stiffness and rest angle, a panel a speed, crosses where someone falls."""
+    speeds = list(dict.fromkeys(row["speed_m_s"] for row in rows))
+    stiffness, rests = (sorted({row[name] for row in rows}) for name in ("spring_Nm_rad", "rest_deg"))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+        image = None
+        for ax, speed in zip(
+            np.ravel(figure.subplots(1, len(speeds), sharey=True, squeeze=False)), speeds, strict=True
+        ):
+            grid = np.full((len(rests), len(stiffness)), np.nan)
+            for row in (row for row in rows if row["speed_m_s"] == speed):
+                place = rests.index(row["rest_deg"]), stiffness.index(row["spring_Nm_rad"])
+                grid[place] = np.nan if row["clearance_m"] is None else 1000 * row["clearance_m"]
+                mark = "x" if row["falls"] else "+" if row["falls_pushed"] else ""
+                ax.plot(place[1], place[0], mark or ",", color="#a03030", ms=7)
+            image = ax.imshow(grid, origin="lower", aspect="auto", cmap="viridis", vmin=0.0, vmax=35.0)
+            ax.set_xticks(range(len(stiffness)), [f"{value:g}" for value in stiffness])
+            ax.set_yticks(range(len(rests)), [f"{value:g}" for value in rests])
+            ax.set(title=f"{speed:g} m/s", xlabel="swing K (N·m/rad)")
+        figure.axes[0].set_ylabel("rest angle (deg)")
+        if image is not None:
+            figure.colorbar(image, ax=figure.axes, label="toe clearance (mm); x falls, + falls when pushed")
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})

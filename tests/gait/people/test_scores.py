@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.gait import GRAVITY, SpringfootError, human_gait
+from springfoot.gait import GRAVITY, human_gait
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.cycle import PERCENT
 
@@ -55,53 +55,6 @@ def test_force_windows_are_those_of_the_definitions():
     assert (features.vertical_peak1, features.vertical_valley, features.vertical_peak2) == (2, 0, 0.5)
 
 
-def test_force_timing_finds_the_landmarks_of_people():
-    human = human_gait(1.22, height=1.71)
-    timing = score.force_timing(human.mean("grf_vertical", PHASE), human.mean("grf_forward", PHASE))
-    # reference/README.md, checks at 1.22 m/s
-    assert timing.vertical_peak1 == pytest.approx(14, abs=1)
-    assert timing.vertical_valley == pytest.approx(29, abs=1)
-    assert timing.vertical_peak2 == pytest.approx(48, abs=1)
-    assert timing.braking_peak == pytest.approx(10, abs=1)
-    assert timing.forward_peak == pytest.approx(54, abs=1)
-
-
-def test_force_timing_belongs_to_the_force_features():
-    random = np.random.default_rng(0)
-    vertical, forward = random.uniform(size=(2, 101))
-    features, timing = score.force_features(vertical, forward), score.force_timing(vertical, forward)
-    for name in ("vertical_peak1", "vertical_valley", "vertical_peak2"):
-        assert vertical[getattr(timing, name)] == getattr(features, name)
-    for name in ("braking_peak", "forward_peak"):
-        assert forward[getattr(timing, name)] == getattr(features, name)
-    missing = score.force_timing(np.full(101, np.nan), np.full(101, np.nan))
-    assert set(vars(missing).values()) == {None}
-
-
-def test_gait_profile_score_is_the_rms_of_the_variable_scores_of_both_legs():
-    reference = {"thigh": WAVE, "knee": 2 * WAVE}
-    left = score.gait_variable_scores({"thigh": WAVE + 3, "knee": 2 * WAVE - 4}, reference)
-    assert left == pytest.approx({"thigh": 3.0, "knee": 4.0})
-    right = score.gait_variable_scores(reference, reference)
-    assert set(right.values()) == {0.0}
-    assert score.gait_profile_score(left) == pytest.approx(np.sqrt((9 + 16) / 2))
-    assert score.gait_profile_score(left, right) == pytest.approx(np.sqrt((9 + 16) / 4))
-
-
-def test_gait_profile_score_knows_what_is_missing():
-    lost = score.gait_variable_scores({"knee": np.full(101, np.nan)}, {"knee": WAVE})
-    assert lost == {"knee": None}
-    assert score.gait_profile_score(lost) is None and score.gait_profile_score() is None
-    with pytest.raises(SpringfootError, match="hip"):
-        score.gait_variable_scores({"hip": WAVE}, {"knee": WAVE})
-
-
-def test_positive_work_is_the_area_above_zero():
-    time = np.arange(0, 1, 0.001)
-    power = np.stack([np.sin(2 * np.pi * time), -np.ones_like(time)], -1)
-    assert score.positive_work(power, 0.001) == pytest.approx([1 / np.pi, 0.0], abs=1e-5)
-
-
 def test_stride_work_splits_into_positive_and_negative():
     positive, negative = score.stride_work(np.stack([WAVE, 3 * WAVE]), np.array([1.0, 2.0]))
     assert positive == pytest.approx(np.array([1, 6]) / np.pi, rel=1e-3)
@@ -114,31 +67,6 @@ def test_ankle_work_of_people_is_that_of_their_curves():
     positive, negative = score.stride_work(power[None], np.array([human.stride_time]))
     assert positive[0] - negative[0] == pytest.approx(np.trapezoid(power) / 100 * human.stride_time)
     assert 0.25 < positive[0] < 0.40 and 0.05 < negative[0] < 0.20  # design.md's figures: .35, .12
-
-
-def test_loop_area_of_an_ellipse_is_pi_a_b_and_changes_sign_with_the_sense_of_rotation():
-    turn = 2 * np.pi * np.arange(1000) / 1000
-    angle, torque = 0.3 * np.cos(turn), 40 * np.sin(turn)
-    assert score.loop_area(angle, torque) == pytest.approx(-np.pi * 0.3 * 40, rel=1e-4)
-    assert score.loop_area(np.stack([angle, angle]), np.stack([-torque, 0 * torque])) == pytest.approx(
-        np.pi * 0.3 * 40 * np.array([1, 0]), rel=1e-4
-    )
-    assert score.loop_area([0, 1, 1, 0], [0, 0, 2, 2]) == pytest.approx(-2.0)
-
-
-def test_a_spring_does_no_net_work_and_a_damper_absorbs():
-    turn = 2 * np.pi * PHASE[:-1]
-    angle, velocity = 0.3 * np.cos(turn), -0.3 * 2 * np.pi * np.sin(turn)  # one stride a second
-    assert score.loop_area(angle, 200 * (0.1 - angle)) == pytest.approx(0.0, abs=1e-12)
-    assert score.loop_area(angle, -5 * velocity) == pytest.approx(-5 * (0.3 * 2 * np.pi) ** 2 / 2, rel=1e-3)
-
-
-def test_loop_area_of_peoples_ankle_is_the_net_work_of_its_power():
-    human = human_gait(1.2)
-    net = score.loop_area(human.mean("ankle", PHASE), -human.mean("ankle_moment", PHASE))
-    positive, negative = score.stride_work(human.mean("ankle_power", PHASE)[None], np.array([human.stride_time]))
-    assert net == pytest.approx(positive[0] - negative[0], abs=0.03)
-    assert net > 0.1
 
 
 def test_cost_of_transport_is_work_per_weight_and_distance():

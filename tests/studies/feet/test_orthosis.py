@@ -9,8 +9,15 @@ from springfoot.cli.main import study_main
 from springfoot.envs.physics.model import ANKLE, RIGHT
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import TICK, WARM_UP, record_feet
-from springfoot.studies.feet.orthosis import EFFICIENCY, muscle_energy
-from springfoot.studies.feet.orthosis_page import at_the_ends, at_walked_speeds, best_springs, directions, weakest_cure
+from springfoot.studies.feet.orthosis import (
+    EFFICIENCY,
+    at_the_ends,
+    at_walked_speeds,
+    best_springs,
+    directions,
+    muscle_energy,
+    weakest_cure,
+)
 
 
 def walk(foot, **given):

@@ -19,13 +19,14 @@ from springfoot.studies.base.intervals import t_interval
 from springfoot.studies.base.kept import Kept
 from springfoot.studies.feet.adapt import kept_name
 from springfoot.studies.feet.foot_walks import NAMES, SCHEDULE, beyond_stop, for_body, numbers_of, walked
-from springfoot.studies.feet.prosthesis import SEARCHES, config_of
-from springfoot.studies.feet.prosthesis_page import (
+from springfoot.studies.feet.prosthesis import (
     ADAPTED_ALONE,
     NOT_ADAPTED,
+    SEARCHES,
     TOE_HELD,
     WHERE,
     WITH_POLICY,
+    config_of,
     sections,
     share_rows,
 )

@@ -10,8 +10,14 @@ from PIL import Image
 
 from springfoot.files.writing import csv_text
 from springfoot.gait import SpringfootError
-from springfoot.studies.springs.influence import INFLUENCE_CONDITIONS, Influence, headline, tables, walk_under
-from springfoot.studies.springs.influence_figure import save_influence_figure
+from springfoot.studies.springs.influence import (
+    INFLUENCE_CONDITIONS,
+    Influence,
+    headline,
+    save_influence_figure,
+    tables,
+    walk_under,
+)
 from springfoot.studies.springs.stiffness_responses import (
     CSV_HEAD,
     IMPULSE,
