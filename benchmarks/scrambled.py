@@ -21,7 +21,7 @@ import tyro
 from springfoot.agents.policies.policy import read_policy
 from springfoot.agents.training.config import PRESETS
 from springfoot.agents.training.training import train
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait.people.human import PEOPLE_FILE

@@ -13,10 +13,10 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
+from ..control.constants import LegConstants, SlopeConstants, slope_constants
 from ..control.decisions import DecisionTimes
 from ..control.equilibrium import foot_tables
 from ..control.foot_springs import FootSprings, draw_delay
-from ..control.leg_constants import LegConstants, SlopeConstants, slope_constants
 from ..control.legs import LegController, slope_table
 from ..control.reference_walk import rows, walks_of_legs
 from ..control.standing import WALKING, Standing, off_phase

@@ -5,9 +5,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
-    from .foot_springs import FEET, action_of, stiffness_of, stiffness_ranges
-    from .leg_constants import (
+    from .constants import (
         TUNED_SPEED,
         LegConstants,
         SlopeConstants,
@@ -16,6 +14,8 @@ if TYPE_CHECKING:
         leg_constants,
         slope_constants_from,
     )
+    from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
+    from .foot_springs import FEET, action_of, stiffness_of, stiffness_ranges
     from .legs import KNOTS
     from .person import HELD_BY_SOUND, person_constants
     from .phase_table import GRID
@@ -66,19 +66,19 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "REFERENCE_STIFFNESS": "equilibrium",
             "SLOW_SPEED": "standing",
             "TOE_OFF": "equilibrium",
-            "TUNED_SPEED": "leg_constants",
-            "LegConstants": "leg_constants",
-            "SlopeConstants": "leg_constants",
+            "TUNED_SPEED": "constants",
+            "LegConstants": "constants",
+            "SlopeConstants": "constants",
             "Subjects": "subjects",
             "action_of": "foot_springs",
-            "constants_from": "leg_constants",
-            "constants_name": "leg_constants",
+            "constants_from": "constants",
+            "constants_name": "constants",
             "foot_curves": "equilibrium",
-            "leg_constants": "leg_constants",
+            "leg_constants": "constants",
             "person_constants": "person",
             "plateau_curve": "equilibrium",
             "reference_walk_at": "reference_walk",
-            "slope_constants_from": "leg_constants",
+            "slope_constants_from": "constants",
             "stiffness_of": "foot_springs",
             "stiffness_ranges": "foot_springs",
             "tabulated_speeds": "reference_walk",

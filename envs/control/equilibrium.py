@@ -10,7 +10,7 @@ from springfoot.gait.people.human import FootHabits, HumanGait, foot_habits
 
 from ..physics.model import ANKLE, TOE, damping_times
 from ..settings.settings import BipedSettings
-from .leg_constants import LegConstants
+from .constants import LegConstants
 from .legs import knot_curve
 from .phase_table import GRID
 from .reference_walk import ReferenceWalk

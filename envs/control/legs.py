@@ -19,7 +19,7 @@ from springfoot.gait.body.body import GRAVITY, REFERENCE_MASS
 from ..physics.kernel import kernel, part
 from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..physics.timing import CONTROL_WINDOW
-from .leg_constants import LegConstants, SlopeConstants
+from .constants import LegConstants, SlopeConstants
 from .phase_table import GRID, PhaseTable, leg_phases, read
 from .reference_walk import ReferenceWalk
 from .state import GAINS, PLACE

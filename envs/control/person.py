@@ -15,7 +15,7 @@ from springfoot.errors import SpringfootError
 from ..settings.adapted import ADAPTED, LEGS, committed_feet
 from ..settings.feet import FOOT_SETTINGS
 from ..settings.settings import BipedSettings, plan_file_of
-from .leg_constants import TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
+from .constants import TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
 
 HELD_BY_SOUND = (
     *("period_factor", "period_speed_gain", "trunk_pitch_deg", "trunk_stiffness", "trunk_damping", "speed_torque"),

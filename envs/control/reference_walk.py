@@ -24,7 +24,7 @@ from springfoot.gait.plan.walk_style import least_work
 
 from ..physics.model import LEFT, RIGHT
 from ..settings.settings import BipedSettings, body_of, plan_file_of, reference_gait
-from .leg_constants import LegConstants
+from .constants import LegConstants
 from .person import adapted_foot, person_constants
 from .phase_table import GRID
 from .standing import SLOW_SPEED

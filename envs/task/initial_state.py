@@ -7,7 +7,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import ANGLES
 
-from ..control.leg_constants import LegConstants
+from ..control.constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable, leg_phases
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects

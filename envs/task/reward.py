@@ -12,8 +12,8 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
+from ..control.constants import LegConstants
 from ..control.foot_springs import muscle_stiffness
-from ..control.leg_constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from .play import Grid, play_page
     from .play_data import episodes_of
-    from .play_page import Grid, play_page
     from .report_page import PAGE_PACKAGES
 
 __all__ = ["PAGE_PACKAGES", "Grid", "episodes_of", "play_page"]
@@ -14,5 +14,5 @@ __all__ = ["PAGE_PACKAGES", "Grid", "episodes_of", "play_page"]
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
         __name__,
-        {"PAGE_PACKAGES": "report_page", "Grid": "play_page", "episodes_of": "play_data", "play_page": "play_page"},
+        {"PAGE_PACKAGES": "report_page", "Grid": "play", "episodes_of": "play_data", "play_page": "play"},
     )

@@ -10,7 +10,7 @@ import pytest
 
 from springfoot.agents.policies.schedules import schedule_file
 from springfoot.envs import BipedSettings
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import load_recording, record
 from springfoot.evaluation.report.schedule_tables import write_schedules

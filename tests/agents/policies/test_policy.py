@@ -11,7 +11,7 @@ from safetensors.numpy import load, save
 from springfoot.agents.policies.fingerprint import fingerprint
 from springfoot.agents.policies.policy import Policy, load_policy, read_policy, save_policy
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.errors import SpringfootError
 from springfoot.files.writing import write_atomically

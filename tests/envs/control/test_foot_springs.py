@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from springfoot.envs.control.constants import slope_constants
 from springfoot.envs.control.foot_springs import FootSprings, action_of, move, stiffen, stiffness_of, stiffness_ranges
-from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.control.legs import slope_table
 from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.control.subjects import Subjects

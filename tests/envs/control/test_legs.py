@@ -9,8 +9,8 @@ import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control import legs as legs
+from springfoot.envs.control.constants import constants_at, constants_from, constants_name, leg_constants
 from springfoot.envs.control.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
-from springfoot.envs.control.leg_constants import constants_at, constants_from, constants_name, leg_constants
 from springfoot.envs.control.legs import knot_curve
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at

@@ -8,9 +8,9 @@ import pytest
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
+from springfoot.envs.control.constants import slope_constants
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_springs import FootSprings, action_of, move
-from springfoot.envs.control.leg_constants import slope_constants
 from springfoot.envs.control.legs import LegController, drive, slope_table
 from springfoot.envs.control.reference_walk import rows as rows_of
 from springfoot.envs.control.reference_walk import tabulated_speeds

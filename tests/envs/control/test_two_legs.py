@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.physics.model import KNEE
 from springfoot.envs.settings.settings import settings_from
 

@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.agents.policies.fingerprint import fingerprint
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.control.person import HELD_BY_SOUND, person_constants
 from springfoot.envs.settings.adapted import ADAPTED, LEGS, committed_feet
 from springfoot.envs.settings.feet import foot_setting

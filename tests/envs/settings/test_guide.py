@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.scrambled import scrambled
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.leg_constants import constants_name, leg_constants
+from springfoot.envs.control.constants import constants_name, leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
 from springfoot.studies.searches.generic_constants import generic_constants

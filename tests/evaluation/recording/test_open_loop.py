@@ -10,8 +10,8 @@ import pytest
 from springfoot.agents.policies.baselines import BASELINES, and_copy, baseline
 from springfoot.cli.evaluate import evaluate_main
 from springfoot.cli.main import study_main
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.control.equilibrium import fixed_stiffness
-from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.evaluation.numbers.metrics import measure

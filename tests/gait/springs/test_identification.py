@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from springfoot.agents.policies.baselines import baseline
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.physics.model import ANKLE, LEFT, TOE, damping_times
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.gait import SpringfootError

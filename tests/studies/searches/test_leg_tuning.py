@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.envs.control.leg_constants import constants_from, leg_constants
+from springfoot.envs.control.constants import constants_from, leg_constants
 from springfoot.envs.control.legs import KNOTS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.evaluation import measure, prepare, record

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
 from springfoot.gait.plan.walk_style import STYLES

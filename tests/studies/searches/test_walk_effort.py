@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from springfoot.envs.control.leg_constants import leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
 from springfoot.gait import Body, plan_walk

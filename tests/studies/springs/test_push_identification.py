@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.control.foot_springs import FEET
-from springfoot.envs.control.leg_constants import leg_constants
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings.settings import body_of
 from springfoot.evaluation.recording.policies import prepare
