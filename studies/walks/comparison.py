@@ -20,7 +20,7 @@ from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import prepare, record
-from springfoot.files.markdown import plus_minus, table, text_of
+from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.gait.people import mean_sd
 
 from ..base.flags import SettingsFlags, given
@@ -217,7 +217,8 @@ def elsewhere_table(name: str, rows: Sequence[tuple[str, Sequence[Row]]]) -> str
         walked = [cell for copy in copies for cell in _walked(copy.metrics)]
         lines.append([words or "(none)", *_walked(m), peaks, largest, *walked])
     columns = ["falls", "speed m/s", "RMSE thigh / knee / ankle °"]
-    beside = [f"{OPEN_LOOP}: {column}" for column in columns] * (len(rows[0][1]) - 1)
+    beside = [f"{OPEN_LOOP}: {column}" for column in columns] * (max(len(row) for _, row in rows) - 1)
+    lines = [[*line, *[MISSING] * (6 + len(beside) - len(line))] for line in lines]
     return table([f"`{name}` with", *columns, "peaks 1 / 2 BW", "largest 10 ms BW", *beside], lines)
 
 
@@ -304,11 +305,19 @@ class Compare(WalkingStudy):
     def _conditions(self) -> dict[str, Any]:
         return {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)
 
+    def _with_copy_if_it_walks(self, name: str, conditions: dict[str, Any]) -> list[Contender]:
+        """Return a policy and its copy; the policy alone where it falls too soon for a copy of it."""
+        alone = Contender(name, *prepare(name, conditions, self.seed))
+        try:
+            return [alone, *with_copy(name, conditions, self.seed, self.threads)[1:]]
+        except SpringfootError:
+            return [alone]
+
     def _elsewhere(self, name: str, progress: OnProgress) -> list[tuple[str, list["Row"]]]:
         """Walk a policy and its copy under each of `WORLD`: the conditions in words, and the rows."""
         found = []
         for conditions in WORLD:
-            beside = with_copy(name, self._conditions | conditions, self.seed, self.threads)
+            beside = self._with_copy_if_it_walks(name, self._conditions | conditions)
             words = ", ".join(f"{key} {value}" for key, value in conditions.items())
             found.append((words, [run_row(*each, **self.how, progress=progress) for each in beside]))
         return found

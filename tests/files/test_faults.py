@@ -37,12 +37,12 @@ def on_tmpfs(folder, options, *command):
         ("size=64k", [*EVALUATE, "--out", "new"], "No space left on device"),
         (
             "size=8k",
-            [*SPRINGFOOT, "export", "pretrained", "--to", "numpy", "--out", "walk.npz"],
+            [*SPRINGFOOT, "export", "pretrained", "--out", "walk.onnx"],
             "No space left on device",
         ),
         ("ro", [*EVALUATE, "--out", "new"], "Read-only file system"),
         ("ro", [*SPRINGFOOT, "train", "--timesteps", "64", "--out", "new"], "Read-only file system"),
-        ("ro", [*SPRINGFOOT, "study", "criteria", "schedule", "--quick", "--out", "new"], "Read-only file system"),
+        ("ro", [*SPRINGFOOT, "study", "compare", "schedule", "--quick", "--out", "new"], "Read-only file system"),
     ],
     ids=["evaluate full", "export full", "evaluate read-only", "train read-only", "study read-only"],
 )
