@@ -7,6 +7,8 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 NARROWEST = 40
@@ -26,6 +28,7 @@ def at_terminal(command: Callable[[], int]) -> int:
     Until the command handles Ctrl-C and SIGTERM itself, as it does once it writes anything, they end the process with
     one line.
     """
+    _name_glfw_library()
     in_main = threading.current_thread() is threading.main_thread()
     before = {number: signal.signal(number, _end_at_once) for number in _SAID} if in_main else {}
     try:
@@ -35,11 +38,19 @@ def at_terminal(command: Callable[[], int]) -> int:
             signal.signal(number, handler)
 
 
+def _name_glfw_library() -> None:
+    """Name glfw's library, so that its import starts no process to ask for it, which a signal would reach too."""
+    found = find_spec("glfw")
+    if found is None or found.origin is None:
+        return
+    variant = "wayland" if os.environ.get("XDG_SESSION_TYPE") == "wayland" else "x11"
+    library = Path(found.origin).parent / variant / "libglfw.so"
+    if library.is_file():
+        os.environ.setdefault("PYGLFW_LIBRARY", str(library))
+
+
 def _end_at_once(number: int, _frame: Any) -> None:
     said, code = _SAID[signal.Signals(number)]
-    with suppress(OSError), open(f"/proc/self/task/{os.getpid()}/children", encoding="ascii") as children:  # Linux
-        for child in children.read().split():  # glfw asks a process about its library, which would print its own end
-            os.kill(int(child), signal.SIGKILL)
     with suppress(OSError):  # nobody reads it any more
         os.write(2, b"springfoot: " + said + b"\n")
     os._exit(code)  # an exception is lost in some imports, and is a traceback in others

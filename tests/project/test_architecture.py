@@ -50,8 +50,9 @@ def test_studies_import_the_public_names_of_other_rooms_only():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("springfoot."):
                 continue
-            room, *inside = node.module.split(".")[1:]
+            module = node.module or ""
+            room, *inside = module.split(".")[1:]
             if room in ("gait", "envs", "agents", "evaluation"):
-                assert len(inside) <= 1, f"{path}:{node.lineno}: {node.module}"
-                public = import_module(node.module).__all__
+                assert len(inside) <= 1, f"{path}:{node.lineno}: {module}"
+                public = import_module(module).__all__
                 assert {alias.name for alias in node.names} <= set(public), f"{path}:{node.lineno}"
