@@ -36,7 +36,7 @@ class TrainFlags:
     out: Annotated[Path | None, FOLDER] = None
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
-    """Folder of a run to continue, with its saved settings, by the bits of one that nothing interrupted; --timesteps
+    """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it; --timesteps
     is then how many more, --threads may be others, and --reward-weights others from there on."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one

@@ -123,7 +123,7 @@ def _part(out: Path) -> Iterator[Path]:
 
 
 def _settle(part: Path, out: Path) -> None:
-    """Give a folder its name; another, and say so, where somebody has taken that one meanwhile."""
+    """Rename a finished folder; if the name was taken meanwhile, use another and say so."""
     name = out
     for number in count(2):
         try:
@@ -140,7 +140,7 @@ def _settle(part: Path, out: Path) -> None:
 
 
 def _empty(folder: Path) -> None:
-    """Remove all that a folder holds but who owns it."""
+    """Empty a folder, except for its owner's file."""
     for path in folder.iterdir() if folder.is_dir() else ():
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)

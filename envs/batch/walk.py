@@ -1,4 +1,4 @@
-"""The one loop over a walk: training, recordings, searches and the live page step the batch here."""
+"""The loop over a walk that recordings, searches, training's evaluations and the live page share."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple

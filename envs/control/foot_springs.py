@@ -143,7 +143,7 @@ def _swings(row, force, side):
 def muscle_stiffness(springs, side, joint) -> float:
     """Return K of the muscles at one joint as it acts [N m/rad], 0 while they are slack or a device is in their place.
 
-    `springs` is of `SPRING_STATE`. The reward charges this K; with the device's it is the K of the control and `info`.
+    `springs` is of `SPRING_STATE`. The reward charges this K alone; the control and `info` hold the muscles' and the device's together.
     """
     return springs.acts[side, joint] * springs.stiffness[side, joint]
 
@@ -173,8 +173,8 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
         control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
-        rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; behind them, if so asked,
-            torques that act beside the springs, whatever their K [N m]: as shifts of the rest angle by torque / K.
+        rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; with 4, the last two are
+            torques [N m] that act beside the springs: each shifts the rest angle by torque / K.
         incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.legs.slope_table`).
         feet: `envs.control.foot_rows.FootLines`, as a plain tuple.
         options: (1,) of `SPRING_OPTIONS`.

@@ -43,7 +43,7 @@ class AdaptAll(Study):
             require_count("first", self.first)
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Search; with --quick for a moment, and nothing is written."""
+        """Search; with --quick for a moment, and no person is written."""
         known = read_feet(self.feet)
         lines = []
         for label, command in list(known["found_by"].items())[: self.first]:

@@ -295,9 +295,11 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
             cells = []
             for speed in speeds:
                 (row,) = _of(best, (mass, speed, strength))
+                if row["best_Nm_deg"] is None:
+                    cells.append("none")
+                    continue
                 more = text_of(row["worst_more_percent"], ".0f")
-                told = f"{row['best_Nm_deg']:g} (+{more} %, {row['springs_without_falls']})"
-                cells.append(told if more != MISSING else "none")
+                cells.append(f"{row['best_Nm_deg']:g} (+{more} %, {row['springs_without_falls']})")
             lines.append([f"{100 * strength:.0f} %", f"{mass:g}", *cells])
     head = ["calf", "kg", *(f"N·m/deg, walking {speed:g} m/s" for speed in speeds)]
     springs, asked = (sorted({row[name] for row in rows}) for name in ("spring_Nm_deg", "speed_m_s"))

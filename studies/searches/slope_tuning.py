@@ -3,7 +3,7 @@
     springfoot study slope-tuning --generations 20
 
 Every candidate walks with the fixed schedule at each of `SLOPES_DEG`. It pays for falls, for speeds other than the
-commanded one, for reward that the same walk earns on level ground, and for heels that strike hard. What was found is
+commanded one, for reward lost against the same walk on level ground, and for heels that strike hard. What was found is
 then held against what it began with, on longer walks from other starts, and written only if it pays less there.
 """
 
@@ -98,7 +98,7 @@ def walk(
 
 
 def cost(walked: dict[str, NDArray], level_reward: float) -> float:
-    """Return the price of the `walk` of a candidate, the mean over its walks."""
+    """Return what a candidate pays, averaged over its walks; `walked` comes from `walk`."""
     errors = {
         "speed": walked["speed"],
         "reward": 1.0 - walked["reward"] / level_reward,

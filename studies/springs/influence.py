@@ -111,7 +111,7 @@ class Influence(Study):
     QUICK: ClassVar[Mapping[str, Any]] = {"seeds": 2, "strides": 4, "conditions": INFLUENCE_CONDITIONS[:1]}
 
     def check(self) -> None:
-        """Refuse what cannot be."""
+        """Refuse counts too small, a bad change and an unknown condition."""
         for name, least in (("seeds", 2), ("seed", 0), ("strides", 4), ("threads", 1), ("conditions", 1)):
             count = getattr(self, name)
             require_count(name, len(count) if name == "conditions" else count, least)

@@ -169,7 +169,7 @@ def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
 
 
 def fixed(out: Path, how: Protocol, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
-    """Return the thesis's straight lines, and before them a `constant` (ankle, toe) [N m/rad] if given."""
+    """Measure the thesis's straight lines, and before them a `constant` (ankle, toe) [N m/rad] if given."""
     names = {"thesis lines": "thesis"}
     if constant is not None:
         names = {"best fixed spring": "constant:{:g},{:g}".format(*constant)} | names
