@@ -45,7 +45,7 @@ class ExactState(ABC):
     def restore(self, state: Mapping[str, Any], ids: NDArray | None = None) -> None:
         """Put environments `ids` (K,), all if None, into the state of K environments of a batch of the same settings.
 
-        From then on they behave bit for bit like the environments that the state came from. Random generators change in place.
+        From then on they behave bit for bit like the environments that the state came from. Generators change in place.
         Raises `SpringfootError`, leaving all state unchanged, for a state of other names, shapes or generators; it
         holds no settings, and they are not compared.
         """

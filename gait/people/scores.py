@@ -123,7 +123,8 @@ def travel(position: NDArray, force: NDArray, least: float) -> float:
     """Path [m] along the ground of contact points (T, C) that bear `force` (T, C) [N].
 
     Each point counts by its share of the foot's load, so that a rigid foot that slides by d travels d whatever the
-    number of its contact points; an interval between two samples counts only if the foot bears more than `least` [N] at both.
+    number of its contact points; an interval between two samples counts only if the foot bears more than `least`
+    [N] at both.
     """
     between = force[1:] + force[:-1]
     share = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
