@@ -143,7 +143,8 @@ def _swings(row, force, side):
 def muscle_stiffness(springs, side, joint) -> float:
     """Return K of the muscles at one joint as it acts [N m/rad], 0 while they are slack or a device is in their place.
 
-    `springs` is of `SPRING_STATE`. The reward charges this K alone; the control and `info` hold the muscles' and the device's together.
+    `springs` is of `SPRING_STATE`. The reward charges this K alone; the control and `info` hold the muscles' and the
+    device's together.
     """
     return springs.acts[side, joint] * springs.stiffness[side, joint]
 
