@@ -161,22 +161,6 @@ def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
     )
 
 
-def resultant(force: NDArray, point: NDArray) -> tuple[NDArray, NDArray]:
-    """Return one force (..., 2) [N] and its point (..., 2) [m] in place of several, (..., K, 2) each, on one segment.
-
-    Same force, same moment: the centre of pressure, at the mean height weighted by upward force. Without load 0, at
-    the mean of the points.
-    """
-    total = force.sum(-2)
-    up = total[..., 1]
-    loaded = up != 0.0
-    divisor = np.where(loaded, up, 1.0)
-    height = (point[..., 1] * force[..., 1]).sum(-1) / divisor
-    moment = _cross(point, force).sum(-1)
-    centre = np.stack([(moment + height * total[..., 0]) / divisor, height], -1)
-    return total, np.where(loaded[..., None], centre, point.mean(-2))
-
-
 # Moments ----------------------------------------------------------------------------------------------------
 
 

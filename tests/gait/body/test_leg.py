@@ -16,7 +16,6 @@ from springfoot.gait.body.leg import (
     leg_motion,
     load_at,
     projection_moments,
-    resultant,
 )
 from springfoot.gait.body.rockers import turned
 
@@ -28,6 +27,22 @@ def still(turn, hip=(0.0, 0.0)):
     return LegMotion(
         turn=np.array(turn, float), rate=zero, acceleration=zero, hip=np.array(hip, float), hip_acceleration=zero[:2]
     )
+
+
+def resultant(force, point):
+    """Return one force (..., 2) [N] and its point (..., 2) [m] in place of several, (..., K, 2) each, on one segment.
+
+    Same force, same moment: the centre of pressure, at the mean height weighted by upward force. Without load 0, at
+    the mean of the points.
+    """
+    total = force.sum(-2)
+    up = total[..., 1]
+    loaded = up != 0.0
+    divisor = np.where(loaded, up, 1.0)
+    height = (point[..., 1] * force[..., 1]).sum(-1) / divisor
+    moment = (point[..., 0] * force[..., 1] - point[..., 1] * force[..., 0]).sum(-1)
+    centre = np.stack([(moment + height * total[..., 0]) / divisor, height], -1)
+    return total, np.where(loaded[..., None], centre, point.mean(-2))
 
 
 def test_resultant_has_the_moment_of_its_parts_about_any_point():
