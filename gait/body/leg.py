@@ -128,12 +128,6 @@ def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion
     )
 
 
-def mass_acceleration(body: Body, motion: LegMotion) -> NDArray:
-    """Sum of mass times acceleration (..., 2) [N] over the segments of a leg."""
-    joints = list(joint_positions(body, motion.turn, motion.hip).values())
-    return np.sum([mass * _com(body, motion, joints, i)[1] for i, (mass, _) in enumerate(_inertial(body))], axis=0)
-
-
 def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
     """Rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive as a turn.
 

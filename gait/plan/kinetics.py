@@ -1,5 +1,5 @@
-"""Forces and joint moments of a walk: equations (2) and (3), the share of each foot, and inverse dynamics of a plan and
-of people. Frame, signs and the mechanics of one leg are those of `leg.py`, which takes any trajectory.
+"""Forces and joint moments of a walk: equations (2) and (3), the share of each foot, and inverse dynamics of a plan.
+Frame, signs and the mechanics of one leg are those of `leg.py`, which takes any trajectory.
 """
 
 from dataclasses import dataclass
@@ -11,31 +11,24 @@ from numpy.typing import ArrayLike
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
-from ..body.body import ANGLES, GRAVITY, Body, gravity
+from ..body.body import Body, gravity
 from ..body.leg import (
-    FOOT_SEGMENT,
     JOINTS,
     FootLoad,
     LegMotion,
     inverse_dynamics,
-    joint_positions,
     load_at,
-    mass_acceleration,
     motion_of,
     projection_moments,
     segment_turns,
 )
-from ..body.rockers import turned
 from ..people.fourier import PLAN_HARMONICS, fourier_jet
-from ..people.human import HumanGait, human_cop
 from ..people.scores import correlation
 from .plan import WalkPlan
 from .posture import POSTURE_SAMPLES
 
 ZMP_TOLERANCE = 1e-6
 """A ZMP up to this far outside the two centres of pressure is due to rounding [m]; chosen."""
-PEOPLE_SAMPLES = 100
-"""Samples of a stride for people's curves; chosen, as these have 12 harmonics."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,54 +147,11 @@ def planned_moments(plan: WalkPlan, stride_phase: ArrayLike) -> dict[str, NDArra
     return inverse_dynamics(plan.body, *planned_leg(plan, stride_phase), plan.slope).moment
 
 
-def people_leg(gait: HumanGait, body: Body, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
-    """Return one leg of people on level ground, as a `body`: motion and load, for the functions above.
-
-    Angles and forces are the gait's, the centre of pressure is `human_cop` times the foot's length. The foot stands on
-    its heel while its toes point up, on its ball while they point down, x from where its ankle is when flat. The hip
-    follows from the forces: the whole body, trunk upright and legs half a stride apart, has the CoM acceleration of
-    equation (2). In swing, where no force acts, the foot's place means nothing.
-    """
-    phase = np.mod(np.asarray(stride_phase, float), 1.0)
-    grid = np.arange(PEOPLE_SAMPLES) / PEOPLE_SAMPLES
-
-    def forces(at: NDArray) -> NDArray:
-        return np.stack([gait.mean("grf_forward", at), gait.mean("grf_vertical", at)], -1)
-
-    def legs(at: NDArray) -> LegMotion:
-        turns = segment_turns({name: gait.mean(name, grid) for name in ANGLES})
-        jet = fourier_jet(turns, PEOPLE_SAMPLES // 2 - 1, at, gait.stride_time)
-        still = np.zeros((*at.shape, 2))
-        return LegMotion(turn=jet[0], rate=jet[1], acceleration=jet[2], hip=still, hip_acceleration=still)
-
-    leg = legs(phase)
-    both_feet = forces(phase) + forces(phase + 0.5)
-    # People's mean forces do not quite add up to their weight: only what differs from the mean accelerates.
-    com_acceleration = GRAVITY * (both_feet - 2 * forces(grid).mean(0))
-    swinging = (mass_acceleration(body, leg) + mass_acceleration(body, legs(phase + 0.5))) / body.total_mass
-    pitch = leg.turn[..., FOOT_SEGMENT]
-    on_heel = _ankle_over(body, pitch, -body.heel_to_ankle, 0.0)
-    on_ball = _ankle_over(body, pitch, body.ankle_to_toe_joint, body.toe_joint_height)
-    ankle = np.where(pitch[..., None] > 0, on_heel, on_ball)
-    motion = LegMotion(
-        turn=leg.turn,
-        rate=leg.rate,
-        acceleration=leg.acceleration,
-        hip=ankle - joint_positions(body, leg.turn, leg.hip)["ankle"],
-        hip_acceleration=com_acceleration - swinging,
-    )
-    cop = body.foot_length * human_cop(phase / gait.toe_off)
-    force = body.total_mass * GRAVITY * forces(phase)
-    toe_joint = joint_positions(body, motion.turn, motion.hip)["toe"]
-    return motion, load_at(force, np.stack([cop, np.zeros(cop.shape)], -1), toe_joint[..., 0])
-
-
 def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> list[ProjectionError]:
     """Return how far the GRF projection (Wells 1981) is from inverse dynamics: per joint, in stance and in swing.
 
-    Stance is where the ground bears on the foot. For people `projection_table(body, *people_leg(gait, body, phase))`,
-    for a plan `planned_leg(plan, phase)` and its slope; samples weigh alike, so take phases evenly. Parts that do not
-    occur are left out.
+    Stance is where the ground bears on the foot. For a plan take `planned_leg(plan, phase)` and its slope.
+    Samples weigh alike, so take phases evenly. Parts that do not occur are left out.
     """
     projection = projection_moments(body, motion, load)
     dynamics = inverse_dynamics(body, motion, load, slope).moment
@@ -224,8 +174,3 @@ def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float
                 )
             )
     return rows
-
-
-def _ankle_over(body: Body, pitch: NDArray, x: float, z: float) -> NDArray:
-    """Ankle (..., 2) [m] of a foot at `pitch` that turns about its point (x, z) [m], x from the flat foot's ankle."""
-    return np.array([x, z]) + np.stack(turned(pitch, -x, body.ankle_height - z), -1)

@@ -90,18 +90,10 @@ class WalkPlan(ComPlan):
         """Thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
         return _named(self.joint_table(np.mod(stride_phase, 1.0)))
 
-    def joint_rates(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
-        """Time derivatives of `joint_angles` [rad/s]."""
-        return _named(self.joint_table(np.mod(stride_phase, 1.0), 1) / self.stride_time)
-
     def hip_position(self, stride_phase: ArrayLike) -> Point:
         """Hip (x, z) [m] in the frame of the foot whose stride it is."""
         x, z = np.moveaxis(self.hip_table(np.mod(stride_phase, 1.0)), -1, 0)
         return x, z
-
-    def ankle_position(self, stride_phase: ArrayLike) -> Point:
-        """Ankle (x, z) [m] in the foot's frame: x from 0 in stance to two step lengths at the next heel strike."""
-        return self.feet.ankle(stride_phase)
 
     def toe_joint_position(self, stride_phase: ArrayLike) -> Point:
         """Toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat until the toe rolls over."""

@@ -7,14 +7,24 @@ import numpy as np
 import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait, plan_walk
-from springfoot.gait.body.body import ANGLES
-from springfoot.gait.body.leg import JOINTS, FootLoad, inverse_dynamics, joint_positions, leg_motion, load_at
+from springfoot.gait.body.body import ANGLES, gravity
+from springfoot.gait.body.leg import (
+    FOOT_SEGMENT,
+    JOINTS,
+    FootLoad,
+    LegMotion,
+    inverse_dynamics,
+    joint_positions,
+    leg_motion,
+    load_at,
+    segment_turns,
+)
 from springfoot.gait.body.rockers import turned
+from springfoot.gait.people.fourier import fourier_jet
 from springfoot.gait.people.human import human_cop
 from springfoot.gait.plan.kinetics import (
     foot_force,
     ground_reaction,
-    people_leg,
     planned_leg,
     planned_moments,
     projection_table,
@@ -27,6 +37,8 @@ needs_data = pytest.mark.skipif(
     reason="the measured data are not ours to give away: ../shared/reference",
 )
 PHASE = np.arange(400) / 400
+PEOPLE_SAMPLES = 100
+"""Samples of a stride for people's curves; chosen, as these have 12 harmonics."""
 PLANS = [("people", 1.2, 0.0), ("thesis", 1.2, 0.0), ("people", 0.5, 0.0), ("people", 1.8, 0.0), ("people", 1.0, 0.05)]
 SLOPES = pytest.mark.parametrize(("cadence", "speed", "slope"), PLANS)
 
@@ -110,7 +122,7 @@ def test_legs_of_a_plan_carry_its_trunk_and_load(cadence, speed, slope, carried)
     assert np.sqrt(np.mean(error**2)) < 0.02
     # The leg stands where the plan has it.
     ankle = joint_positions(body, motion.turn, motion.hip)["ankle"]
-    np.testing.assert_allclose(ankle, np.stack(plan.ankle_position(PHASE), -1), atol=3e-3)
+    np.testing.assert_allclose(ankle, np.stack(plan.feet.ankle(PHASE), -1), atol=3e-3)
 
 
 def test_planned_moments_push_off_like_people_and_scale_with_the_body():
@@ -126,6 +138,60 @@ def test_planned_moments_push_off_like_people_and_scale_with_the_body():
     heavy = planned_moments(plan_walk(Body(1.7, 126.0), 1.2), PHASE)
     np.testing.assert_allclose(heavy["knee"], 2 * moments["knee"], rtol=1e-9)
     assert planned_moments(plan, np.zeros((2, 3)))["hip"].shape == (2, 3)
+
+
+def people_leg(gait, body, phase):
+    """Return one leg of people on level ground, as a `body`: motion and load.
+
+    Angles and forces are the gait's, the centre of pressure is `human_cop` times the foot's length. The foot stands on
+    its heel while its toes point up, on its ball while they point down, x from where its ankle is when flat. The hip
+    follows from the forces: the whole body, trunk upright and legs half a stride apart, has the CoM acceleration of
+    equation (2). In swing, where no force acts, the foot's place means nothing.
+    """
+    grid = np.arange(PEOPLE_SAMPLES) / PEOPLE_SAMPLES
+
+    def forces(at):
+        return np.stack([gait.mean("grf_forward", at), gait.mean("grf_vertical", at)], -1)
+
+    def legs(at):
+        turns = segment_turns({name: gait.mean(name, grid) for name in ANGLES})
+        jet = fourier_jet(turns, PEOPLE_SAMPLES // 2 - 1, at, gait.stride_time)
+        still = np.zeros((*at.shape, 2))
+        return LegMotion(turn=jet[0], rate=jet[1], acceleration=jet[2], hip=still, hip_acceleration=still)
+
+    leg = legs(phase)
+    both_feet = forces(phase) + forces(phase + 0.5)
+    # People's mean forces do not quite add up to their weight: only what differs from the mean accelerates.
+    com_acceleration = GRAVITY * (both_feet - 2 * forces(grid).mean(0))
+    swinging = (mass_acceleration(body, leg) + mass_acceleration(body, legs(phase + 0.5))) / body.total_mass
+    pitch = leg.turn[..., FOOT_SEGMENT]
+    on_heel = ankle_over(body, pitch, -body.heel_to_ankle, 0.0)
+    on_ball = ankle_over(body, pitch, body.ankle_to_toe_joint, body.toe_joint_height)
+    ankle = np.where(pitch[..., None] > 0, on_heel, on_ball)
+    motion = LegMotion(
+        turn=leg.turn,
+        rate=leg.rate,
+        acceleration=leg.acceleration,
+        hip=ankle - joint_positions(body, leg.turn, leg.hip)["ankle"],
+        hip_acceleration=com_acceleration - swinging,
+    )
+    cop = body.foot_length * human_cop(phase / gait.toe_off)
+    force = body.total_mass * GRAVITY * forces(phase)
+    toe_joint = joint_positions(body, motion.turn, motion.hip)["toe"]
+    return motion, load_at(force, np.stack([cop, np.zeros(cop.shape)], -1), toe_joint[..., 0])
+
+
+def ankle_over(body, pitch, x, z):
+    """Return the ankle (..., 2) [m] of a foot at `pitch` turned about (x, z) [m], x from the flat foot's ankle."""
+    return np.array([x, z]) + np.stack(turned(pitch, -x, body.ankle_height - z), -1)
+
+
+def mass_acceleration(body, motion):
+    """Return the sum of mass times acceleration (..., 2) [N] over the segments of a leg, by the force at its hip."""
+    none = np.zeros((*motion.hip.shape[:-1], 2, 2))
+    hip_force = inverse_dynamics(body, motion, FootLoad(force=none, point=none)).force["hip"]
+    leg_mass = body.thigh_mass + body.shank_mass + body.foot_mass + body.toe_mass
+    return hip_force + leg_mass * gravity(0.0)
 
 
 @pytest.mark.parametrize(("speed", "ankle", "knee", "hip"), [(0.85, 0.98, 0.87, 0.87), (1.2, 0.97, 0.94, 0.9)])

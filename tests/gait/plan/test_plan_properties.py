@@ -48,8 +48,8 @@ def walks(draw) -> tuple[Body, float, dict]:
 def assert_valid(plan: WalkPlan) -> None:
     body, feet = plan.body, plan.feet
     everything = [*plan.com(PHASE), *plan.com_velocity(PHASE), *plan.com_acceleration(PHASE), plan.zmp(PHASE)]
-    everything += [*plan.joint_angles(PHASE).values(), *plan.joint_rates(PHASE).values(), *plan.hip_position(PHASE)]
-    everything += [*plan.ankle_position(PHASE), *plan.toe_joint_position(PHASE), feet.pitch(PHASE)]
+    everything += [*plan.joint_angles(PHASE).values(), *plan.hip_position(PHASE)]
+    everything += [*plan.feet.ankle(PHASE), *plan.toe_joint_position(PHASE), feet.pitch(PHASE)]
     assert all(np.isfinite(values).all() for values in everything)
 
     rear, front = plan.support(PHASE)
@@ -101,7 +101,7 @@ def assert_rebuilt(plan: WalkPlan) -> None:
     thigh, shank = along(angles["thigh"]), along(angles["thigh"] - angles["knee"])
     knee = hip + body.thigh_length * thigh
     ankle = knee + body.shank_length * shank
-    np.testing.assert_allclose(ankle, plan.ankle_position(phase), atol=1e-9)
+    np.testing.assert_allclose(ankle, plan.feet.ankle(phase), atol=1e-9)
     np.testing.assert_allclose(angles["thigh"] - angles["knee"] + angles["ankle"] - plan.slope, pitch, atol=1e-9)
     joint = ankle + foot(pitch, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
     tip = (joint + foot(pitch + angles["toe"], body.toe_length, -body.toe_joint_height))[1]

@@ -51,7 +51,7 @@ def toe_tip(plan, phase):
     body, pitch, toe = plan.body, plan.feet.pitch(phase), plan.joint_angles(phase)["toe"]
     to_joint = turned(pitch, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
     to_tip = turned(pitch + toe, body.toe_length, -body.toe_joint_height)
-    return np.sum([plan.ankle_position(phase), to_joint, to_tip], 0)
+    return np.sum([plan.feet.ankle(phase), to_joint, to_tip], 0)
 
 
 def test_default_and_shorter_double_supports_have_a_flat_toe_and_the_default_travel():
