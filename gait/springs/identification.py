@@ -4,7 +4,8 @@ In each phase of the stride the joint is taken as one spring and damper, torque 
 which is linear in K theta_eq, K and K beta: ordinary least squares. Intervals are exact if the torque's errors are
 independent, normal and of one size, and angle and velocity are without error. Neither holds in a gait laboratory:
 smoothed or averaged curves have errors that last for many samples, and then the intervals are too narrow (a warning
-says so); noise on the angle makes K too small (`noise_study`).
+says so); white noise of standard deviation d on the angle makes K too small, by s^2 / (s^2 + d^2) with s the angle's
+spread (`PhaseSpring.angle_spread`).
 
 What it cannot do: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle.
 What is found is the slope of the loop of torque over angle (quasi-stiffness), the spring's K only if theta_eq stood
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, require_count, require_number, require_within
+from springfoot.errors import SpringfootError, require_number, require_within
 
 from .spring_fit import Estimate, fit_spring, intervals
 
@@ -67,10 +68,6 @@ class PhaseSpring:
     warning: str
     """One line on why not to trust the numbers; "" if nothing speaks against them."""
 
-    def attenuation(self, angle_sd: float) -> float:
-        """Factor by which white noise of `angle_sd` [rad] on the angle shrinks K: s^2 / (s^2 + sd^2), s its spread."""
-        return self.angle_spread**2 / (self.angle_spread**2 + angle_sd**2)
-
 
 def identify(
     torque: ArrayLike,
@@ -95,81 +92,6 @@ def identify(
         P results, in the order of `bounds`. Raises `SpringfootError` for bad arrays or bounds.
     """
     return tuple(_spring(edges, *curves) for edges, curves in _windows(torque, angle, velocity, phase, bounds, margin))
-
-
-@dataclass(frozen=True, kw_only=True)
-class NoiseOutcome:
-    """What noise does to one phase's estimates; keys of the mappings are `PARAMETERS`."""
-
-    start: float
-    """Stride phase at which it begins."""
-    end: float
-    """Stride phase at which it ends."""
-    coverage: dict[str, float]
-    """Percent of the repeats whose 95 % interval holds the true value."""
-    bias: dict[str, float]
-    """Median estimate minus the true value: K [N m/rad], beta [s], theta_eq [rad]."""
-    stiffness_bias_percent: float
-    """The bias of K in percent of K."""
-    expected_percent: float
-    """The same as theory has it for many samples: errors in variables."""
-
-
-def noise_study(
-    torque: ArrayLike,
-    angle: ArrayLike,
-    velocity: ArrayLike,
-    phase: ArrayLike,
-    bounds: Sequence[float],
-    margin: float = 0,
-    *,
-    torque_sd: float = 0.0,
-    angle_sd: float = 0.0,
-    velocity_sd: float = 0.0,
-    repeats: int = 1000,
-    seed: int = 0,
-) -> tuple[NoiseOutcome, ...]:
-    """Identify each phase `repeats` times under white noise: how often intervals hold the truth, how far off one is.
-
-    The truth is the spring identified from the data as given, whose own torque gets the noise `torque_sd` [N m].
-    `angle_sd` [rad] and `velocity_sd` [rad/s] are noise on the measured angle and velocity alone. A velocity taken by
-    central differences of that angle, every h [s], has velocity_sd = angle_sd / (sqrt(2) h), independent of the
-    angle's noise at the same sample. Raises `SpringfootError` if the data do not say what the truth is.
-    """
-    noises = [
-        require_number(name, sd, 0.0)
-        for name, sd in (("torque_sd", torque_sd), ("angle_sd", angle_sd), ("velocity_sd", velocity_sd))
-    ]
-    require_count("repeats", repeats)
-    random = np.random.default_rng(seed)
-    outcomes = []
-    for edges, curves in _windows(torque, angle, velocity, phase, bounds, margin):
-        count = len(curves[0])
-        fit = fit_spring(*curves) if count > 3 else None
-        if fit is None or not fit.solvable:
-            raise SpringfootError(
-                f"no spring to be identified from {edges[0]:g} to {edges[1]:g}: see identify's warning"
-            )
-        offset, K, c = fit.coefficients
-        clean = (offset - K * curves[1] - c * curves[2], *curves[1:])
-        noisy = [curve + sd * random.standard_normal((repeats, count)) for curve, sd in zip(clean, noises, strict=True)]
-        truth = np.array([ratio[0] for ratio in intervals(fit)])
-        value, low, high = np.moveaxis(np.array(intervals(fit_spring(*noisy))), 1, 0)
-        held = np.mean((truth >= low.T) & (truth <= high.T), axis=0) * 100
-        bias = np.median(value.T - truth, axis=0)
-        spread = np.cov(np.stack(clean[1:]), bias=True)
-        expected = np.linalg.solve(spread + np.diag(np.square(noises[1:])), spread @ fit.coefficients[1:])
-        outcomes.append(
-            NoiseOutcome(
-                start=edges[0],
-                end=edges[1],
-                coverage=dict(zip(PARAMETERS, held.tolist(), strict=True)),
-                bias=dict(zip(PARAMETERS, bias.tolist(), strict=True)),
-                stiffness_bias_percent=float(100 * bias[0] / truth[0]),
-                expected_percent=float(100 * (expected[0] / truth[0] - 1)),
-            )
-        )
-    return tuple(outcomes)
 
 
 def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:

@@ -14,7 +14,8 @@ at a time (`jackknife`), so that errors may last a whole trial. And whatever els
 joint that reacts to it is no spring, whatever K is fitted.
 
 What no such experiment can tell: a reflex of the joint's own angle at the same instant is a spring to it, a reaction to
-a state that was not recorded is noise, and noise of the angle makes K too small (`PushedSpring.attenuation`).
+a state that was not recorded is noise, and white noise of standard deviation d on the angle makes K too
+small, by s^2 / (s^2 + d^2) with s the angle's spread (`PushedSpring.angle_spread`).
 """
 
 from collections.abc import Sequence
@@ -79,10 +80,6 @@ class PushedSpring:
     """`SPRING`, `REACTS` or `UNKNOWN`."""
     reason: str
     """One line on why it is no spring; "" for one."""
-
-    def attenuation(self, angle_sd: float) -> float:
-        """Factor by which white noise of `angle_sd` [rad] on the angle shrinks K: s^2 / (s^2 + sd^2), s its spread."""
-        return self.angle_spread**2 / (self.angle_spread**2 + angle_sd**2)
 
 
 def identify_pushed(

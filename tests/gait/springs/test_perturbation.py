@@ -158,7 +158,7 @@ def test_noise_of_the_angle_makes_the_spring_too_soft_as_told():
     sd = 0.003
     (found,) = identify_pushed(**walks(trials=200, angle_noise=sd), bounds=BOUNDS[1:], spacing=None)
     (clean,) = identify_pushed(**walks(trials=200), bounds=BOUNDS[1:], spacing=None)
-    factor = clean.attenuation(sd)
+    factor = clean.angle_spread**2 / (clean.angle_spread**2 + sd**2)
     assert 0.8 < factor < 0.97
     assert known(found)[0].value / PLANTED[1] == pytest.approx(factor, rel=0.02)
 
