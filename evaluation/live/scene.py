@@ -1,8 +1,8 @@
 """The body of a live walk in 3-D: its capsules and spheres, the ground that runs below it, arrows of its ground forces.
 
 The body stays in the middle of the picture, however far it walks: ground and forces are moved back by its place.
-Meshes are coarse, and lights cast no shadow and reflect nothing, so that a processor can draw it too: in a browser
-without a GPU that is what a picture costs (`python -m benchmarks.live_pictures`).
+Meshes are coarse, and lights cast no shadow and reflect nothing, so that a processor can draw it too, in a browser
+without a GPU.
 """
 
 import mujoco
