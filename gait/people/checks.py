@@ -16,6 +16,7 @@ from springfoot.errors import SpringfootError
 from ..body.body import ANGLES, GRAVITY, REFERENCE_MASS
 from .cycle import PERCENT
 from .human import COLUMNS, HumanGait
+from .strides import MeasuredWalk, cut_strides
 
 _ALL_ANGLES = (*ANGLES, "hip")
 _ZEROS = {"thigh": "upright", "hip": "a thigh in line with the pelvis", "ankle": "a shank at right angles to the sole"}
@@ -125,6 +126,35 @@ def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | N
             raise SpringfootError(
                 f"{name}: {COLUMNS[curve]}_sd must lie from 0 to twice the range of its curve; {AS_IT_IS}"
             )
+
+
+def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, people: HumanGait) -> None:
+    """Raise `SpringfootError` unless each leg alone walks as people do: a mean over both would hide one.
+
+    A leg with too few strides for a mean of its own is not checked. Arguments as of `cut_strides`.
+    """
+    for leg, series in walk.legs.items():
+        if side not in ("both", leg):
+            continue
+        name = f"{walk.name}, the {leg} leg"
+        if _bears_downward(series.get("grf_vertical", np.zeros(1))):
+            raise SpringfootError(
+                f"{name}: the vertical force is below 0 where it bears: up must be positive; {AS_IT_IS}"
+            )
+        try:
+            _, curves = cut_strides(walk, leg, mass)
+        except SpringfootError:  # too few strides
+            continue
+        require_plausible(name, {curve: values.mean(axis=0) for curve, values in curves.items()}, people)
+
+
+def _bears_downward(force: NDArray) -> bool:
+    """Return whether a vertical force (T,) is that of a walk upside down: below 0 often, but not always.
+
+    A plate that nobody trod on shows noise, or an offset.
+    """
+    least = force.min(initial=0.0)
+    return bool(-least > force.max(initial=0.0) and 0.25 < np.mean(force < 0.5 * least) < 0.9)
 
 
 def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
