@@ -35,7 +35,6 @@ from .checks import (
     refusing_unknown,
 )
 from .feet import FOOT_SETTINGS, INTACT_FOOT, FootSetting, foot_setting
-from .themes import CONDITION_THEMES, THEMES
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
 Feedforward = Literal["people", "plan"]
@@ -43,6 +42,21 @@ Guide = Literal["people", "plan"]
 ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
+
+THEMES = {
+    "body": "Whose body walks.",
+    "feet": "What its feet are: intact, prosthetic, weak.",
+    "speed": "How fast it is commanded to walk.",
+    "reference": "Whose walk it is held to.",
+    "springs": "What its ankle and toe springs do, and which part of that the action decides.",
+    "episode": "How an episode starts and ends.",
+    "ground": "What it walks on.",
+    "disturbance": "What disturbs it: pushes, noise of the sensors, delay of the actuators.",
+    "reward": "What it is rewarded for.",
+}
+"""Themes of the settings, the groups of `--help` and of the table of `SegmentedFootBiped`, each with its sentence."""
+CONDITION_THEMES = ("body", "speed", "episode", "ground", "disturbance")
+"""Themes that say who walks where, whatever the policy was trained on."""
 
 FRICTION_RANGE = (0.4, 1.2)
 """Allowed coefficients of friction, from a wet floor to rough rubber [-]; chosen."""
