@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..recording.recording import Recording
-from .page_parts import as_json, filled
+from .template import as_json, filled
 from .play_data import PANELS, drawn_body, packed, people_behind, walk_of
 
 

@@ -18,7 +18,7 @@ from ..numbers.metrics import Gait
 from ..recording.recording import Recording
 from ..report.gait_table import leg_rows, people_metrics, table_rows
 from .page_data import policy_data
-from .page_parts import as_json, filled
+from .template import as_json, filled
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
 JUDGED_SPEED = 1.2

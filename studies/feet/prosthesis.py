@@ -38,7 +38,7 @@ from springfoot.gait.people import mean_sd
 from ..base.intervals import t_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress
-from ..base.trainings import TrainingStudy
+from ..base.training_study import TrainingStudy
 from .adapt import kept_name
 from .foot_walks import ABOUT_STOPS, ASKED, NAMES, PUSH_NEWTON, SCHEDULE, TOLD, UNSEARCHED, Asked, for_body, walked
 

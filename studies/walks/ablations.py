@@ -31,7 +31,7 @@ from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 from ..base.protocol import Protocol, measured
 from ..base.quantities import COMPARED_JOINTS, Quantity
 from ..base.study import Answer, OnProgress
-from ..base.trainings import TrainingStudy
+from ..base.training_study import TrainingStudy
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
