@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..recording.recording import Recording
-from .template import as_json, filled
 from .play_data import PANELS, drawn_body, packed, people_behind, walk_of
+from .template import as_json, filled
 
 
 class Grid(NamedTuple):

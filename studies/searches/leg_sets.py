@@ -22,7 +22,7 @@ from springfoot.evaluation.report import MODEL, STYLE
 from springfoot.files.markdown import table, text_of
 from springfoot.files.writing import csv_text
 
-from ..base.quantities import COMPARED_JOINTS, Quantity
+from ..base.columns import COMPARED_JOINTS, Column
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .constants_file import CONSTANTS, read_constants
 from .leg_cost import REFINED_SECONDS, all_misses
@@ -42,15 +42,15 @@ UNTUNED = ("constant", "quasi_stiffness", "untrained", "thesis")
 """Policies that set stiffness which no set was tuned with."""
 PUSHED = {"push_newton": 150.0}
 WALKED = (
-    Quantity("m/s", ".3f", ("speed_m_s", "mean")),
-    *(Quantity(f"{joint} °", ".1f", ("joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
-    Quantity("hip moment r", ".2f", ("moments", "hip", "r")),
-    Quantity("in ± 2 SD %", ".0f", ("moments", "hip", "within_2sd_percent")),
-    Quantity("late swing N·m/kg", ".2f", ("moments", "hip", "late_swing_peak_Nm_kg")),
-    Quantity("knee moment r", ".2f", ("moments", "knee", "r")),
-    Quantity("hip work + J/kg", ".2f", ("joint_work_J_kg", "hip", "positive")),
-    Quantity("cost of transport", ".3f", ("cost_of_transport",)),
-    Quantity("CoP off m", ".3f", ("zmp", "cop_rmse_m")),
+    Column("m/s", ".3f", ("speed_m_s", "mean")),
+    *(Column(f"{joint} °", ".1f", ("joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
+    Column("hip moment r", ".2f", ("moments", "hip", "r")),
+    Column("in ± 2 SD %", ".0f", ("moments", "hip", "within_2sd_percent")),
+    Column("late swing N·m/kg", ".2f", ("moments", "hip", "late_swing_peak_Nm_kg")),
+    Column("knee moment r", ".2f", ("moments", "knee", "r")),
+    Column("hip work + J/kg", ".2f", ("joint_work_J_kg", "hip", "positive")),
+    Column("cost of transport", ".3f", ("cost_of_transport",)),
+    Column("CoP off m", ".3f", ("zmp", "cop_rmse_m")),
 )
 """Numbers of a walk."""
 
@@ -101,7 +101,14 @@ class LegSets(WalkingStudy):
             f"{names} on these legs under the same pushes. "
             "K in N·m/rad: loading / early stance / late stance / push-off / swing."
         )
-        columns = ["set", "falls", "falls_pushed", "misses", "untuned_falls_percent", *(each.column for each in WALKED)]
+        columns = [
+            "set",
+            "falls",
+            "falls_pushed",
+            "misses",
+            "untuned_falls_percent",
+            *(each.csv_name for each in WALKED),
+        ]
         files = {"leg_sets.csv": csv_text(columns, numbers), "leg_sets.png": partial(_draw, front=front)}
         picture = "![Misses of a set against falls of springs that nobody tuned](leg_sets.png)"
         return Answer(text=f"{picture}\n\n{text}", files=files)

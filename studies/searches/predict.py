@@ -27,7 +27,7 @@ from springfoot.files.locks import owned
 from springfoot.files.markdown import table
 from springfoot.files.writing import make_folder
 
-from ..base.protocol import Protocol, measured
+from ..base.pushed_walks import PushedWalks, measured
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
 from .constants_file import read_constants, write_constants
 from .generic_constants import GENERIC
@@ -200,7 +200,7 @@ class Predict(WalkingStudy):
             raise KeyboardInterrupt
 
     def _evaluated(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
-        how = Protocol(
+        how = PushedWalks(
             episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads
         )
         given = {"guide": "plan", "plan_file": str(found)}

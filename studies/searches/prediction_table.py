@@ -12,7 +12,7 @@ from springfoot.files.markdown import MISSING, table
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.people import PERCENT, HumanGait, correlation, force_features, rmse, stride_work
 
-from ..base.quantities import COMPARED_JOINTS
+from ..base.columns import COMPARED_JOINTS
 
 JOINT_LIMITS = {"thigh": (3.5, 0.95), "knee": (5.0, 0.95), "ankle": (5.5, 0.93)}
 """Largest RMSE [deg] and least r with people's mean."""

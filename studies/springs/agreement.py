@@ -30,7 +30,7 @@ from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 from springfoot.gait.people import PERCENT
 
-from ..base.quantities import OPEN_LOOP, falls_text, rmse_text, walks_csv
+from ..base.columns import OPEN_LOOP, falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 LOADED = 0.1

@@ -31,7 +31,7 @@ from springfoot.files.markdown import table, text_of
 from springfoot.gait.body import TOE_STIFFNESS, Body
 from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 
-from ..base.quantities import falls_text, rmse_text, walks_csv
+from ..base.columns import falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 PHASE_SEGMENTS = 200

@@ -28,8 +28,8 @@ from springfoot.files.writing import csv_text
 from springfoot.gait.people import mean_sd
 from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 
-from ..base.protocol import Protocol, measured
-from ..base.quantities import COMPARED_JOINTS, Quantity
+from ..base.columns import COMPARED_JOINTS, Column
+from ..base.pushed_walks import PushedWalks, measured
 from ..base.study import Answer, OnProgress
 from ..base.training_study import TrainingStudy
 
@@ -79,19 +79,19 @@ INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
     "no shift of the swing hip by speed": lambda c: replace(c, swing_speed_gain=0.0),
 }
 """Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
-QUANTITIES = (
-    Quantity("falls", ".1f", ("undisturbed", "falls")),
-    Quantity("pushed", ".1f", ("pushed", "falls")),
-    Quantity("return", ".0f", ("undisturbed", "return", "mean")),
-    Quantity("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
-    *(Quantity(f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
-    *(Quantity(f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
-    Quantity("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
-    Quantity("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
-    Quantity("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
-    Quantity("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
-    Quantity("CoM x off m", ".4f", ("undisturbed", "com", "x_rmse_m")),
-    Quantity("CoP off m", ".4f", ("undisturbed", "zmp", "cop_rmse_single_support_m")),
+COLUMNS = (
+    Column("falls", ".1f", ("undisturbed", "falls")),
+    Column("pushed", ".1f", ("pushed", "falls")),
+    Column("return", ".0f", ("undisturbed", "return", "mean")),
+    Column("m/s", ".2f", ("undisturbed", "speed_m_s", "mean")),
+    *(Column(f"{joint} °", ".1f", ("undisturbed", "joints", joint, "rmse_deg")) for joint in COMPARED_JOINTS),
+    *(Column(f"peak {k} BW", ".2f", ("undisturbed", "grf", f"vertical_peak{k}_bw")) for k in (1, 2)),
+    Column("r up", ".2f", ("undisturbed", "grf", "vertical_r")),
+    Column("r fore-aft", ".2f", ("undisturbed", "grf", "forward_r")),
+    Column("ankle N·m/kg", ".2f", ("undisturbed", "moments", "ankle", "peak_Nm_kg")),
+    Column("at %", ".0f", ("undisturbed", "moments", "ankle", "peak_percent")),
+    Column("CoM x off m", ".4f", ("undisturbed", "com", "x_rmse_m")),
+    Column("CoP off m", ".4f", ("undisturbed", "zmp", "cop_rmse_single_support_m")),
 )
 """Columns of every table."""
 
@@ -145,7 +145,7 @@ def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> 
     ]
 
 
-def trained(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
+def trained(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
     """Row -> the metrics of each of its finished seeds, in order; rows without any are left out."""
     rows = {}
     for name in ABLATIONS:
@@ -156,7 +156,7 @@ def trained(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
     return rows
 
 
-def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
+def inputs(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
     """Return each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
     own = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
     rows: dict[str, list[dict[str, Any]]] = {}
@@ -168,7 +168,7 @@ def inputs(out: Path, how: Protocol) -> dict[str, list[dict[str, Any]]]:
     return rows | {"θ_eq: people's ankle angle alone": [measured(out / "input-angle.json", how, vars(own), make)]}
 
 
-def fixed(out: Path, how: Protocol, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
+def fixed(out: Path, how: PushedWalks, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
     """Measure the thesis's straight lines, and before them a `constant` (ankle, toe) [N m/rad] if given."""
     names = {"thesis lines": "thesis"}
     if constant is not None:
@@ -184,11 +184,11 @@ Rows = dict[str, list[dict[str, Any]]]
 
 
 def rows_table(rows: Rows, head: str, people: bool = False) -> str:
-    """Markdown: rows down, `QUANTITIES` across, mean ± SD (n - 1) over the seeds of a row that has several."""
+    """Markdown: rows down, `COLUMNS` across, mean ± SD (n - 1) over the seeds of a row that has several."""
     lines = []
     for name, seeds in rows.items():
         cells = [name, str(len(seeds))]
-        for each in QUANTITIES:
+        for each in COLUMNS:
             values = [value for value in map(each.of, seeds) if value is not None]
             whole = each.path[-1] == "falls" and len(values) == 1
             cells.append(plus_minus(mean_sd(values), ".0f" if whole else each.pattern))
@@ -197,27 +197,27 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
         theirs = people_metrics(reference_gait(BipedSettings()))
         known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
         known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
-        lines.append(["people", MISSING, *(_known(known, each) for each in QUANTITIES)])
-    return table([head, "seeds", *(each.label for each in QUANTITIES)], lines)
+        lines.append(["people", MISSING, *(_known(known, each) for each in COLUMNS)])
+    return table([head, "seeds", *(each.label for each in COLUMNS)], lines)
 
 
-def _known(metrics: dict[str, Any], quantity: Quantity) -> str:
+def _known(metrics: dict[str, Any], column: Column) -> str:
     """Return a number of people's, where there is one."""
     value: Any = metrics
-    for key in quantity.path[1:]:
+    for key in column.path[1:]:
         value = value.get(key) if isinstance(value, dict) else None
-    return text_of(value, quantity.pattern)
+    return text_of(value, column.pattern)
 
 
 def _numbers(tables: dict[str, Rows]) -> str:
     """CSV: a line for each seed of each row."""
     lines = [
-        [section, row, index, *(each.of(metrics) for each in QUANTITIES)]
+        [section, row, index, *(each.of(metrics) for each in COLUMNS)]
         for section, rows in tables.items()
         for row, seeds in rows.items()
         for index, metrics in enumerate(seeds)
     ]
-    return csv_text(["table", "row", "seed", *(each.column for each in QUANTITIES)], lines)
+    return csv_text(["table", "row", "seed", *(each.csv_name for each in COLUMNS)], lines)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,7 +256,7 @@ class Ablations(TrainingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Train what is missing, and measure."""
-        how = Protocol(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
+        how = PushedWalks(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
         failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
         rows = trained(self.runs, how)
         springs = fixed(self.runs, how, self.constant)

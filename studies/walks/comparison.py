@@ -23,9 +23,9 @@ from springfoot.evaluation.recording import prepare, record
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.gait.people import mean_sd
 
+from ..base.columns import OPEN_LOOP, WALK_COLUMNS, falls_text, rmse_text, walks_csv
 from ..base.flags import SettingsFlags, given
 from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval
-from ..base.quantities import OF_A_WALK, OPEN_LOOP, falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 PUSHES = (150.0, 200.0)
@@ -199,7 +199,7 @@ def verdict(rows: Sequence[Row]) -> str:
 def spread_table(rows: Sequence[Row]) -> str:
     """Return markdown: numbers down, policies across, and their mean ± SD over the policies (n - 1)."""
     lines = []
-    for each in OF_A_WALK:
+    for each in WALK_COLUMNS:
         values = [each.of(row.metrics) for row in rows]
         spread = mean_sd([] if None in values else values)
         mean = plus_minus(spread, ".1f" if each.pattern == "d" else each.pattern, alone=False)

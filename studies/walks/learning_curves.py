@@ -22,7 +22,7 @@ from springfoot.files.json_file import read_object
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 
-from ..base.quantities import walks_csv
+from ..base.columns import walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 KEYS = ("timesteps", "seconds", "return_mean", "falls")

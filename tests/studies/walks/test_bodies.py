@@ -13,7 +13,7 @@ from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
-from springfoot.studies.base.quantities import COMPARED_JOINTS
+from springfoot.studies.base.columns import COMPARED_JOINTS
 from springfoot.studies.walks import bodies as bodies
 
 SOME: dict[str, Any] = {"height_range": (1.6, 1.75), "mass_range": (40.0, 120.0), "speed_range": (1.15, 1.25)}

@@ -14,7 +14,7 @@ from springfoot.envs.settings.settings import settings_from
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
-from springfoot.studies.base import intervals, quantities
+from springfoot.studies.base import columns, intervals
 from springfoot.studies.base.flags import SettingsFlags
 from springfoot.studies.walks import comparison
 
@@ -99,7 +99,7 @@ def row_of(name, returns, fell=(), speed=1.2):
         "episodes": len(returns),
         "speed_m_s": {"mean": 1.2},
         "environment": {"speed": speed},
-        "joints": {joint: {"rmse_deg": 2.0} for joint in quantities.COMPARED_JOINTS},
+        "joints": {joint: {"rmse_deg": 2.0} for joint in columns.COMPARED_JOINTS},
     }
     fallen = np.isin(np.arange(len(returns)), fell)
     return comparison.Row(name=name, metrics=metrics, returns=np.array(returns, float), fell=fallen)

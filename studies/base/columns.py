@@ -1,4 +1,4 @@
-"""Numbers of metrics.json that stand in several studies' tables, each with its label and format."""
+"""Columns of several studies' tables: numbers of metrics.json, each with its label and format."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ def open_loop_note(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """A number and where it stands in nested metrics."""
+class Column:
+    """A column of a table: its label, the format of its numbers, and where they stand in nested metrics."""
 
     label: str
     pattern: str
@@ -37,20 +37,20 @@ class Quantity:
         return reduce(getitem, self.path, metrics)
 
     @property
-    def column(self) -> str:
-        """Its name in a CSV file: the place, joined."""
+    def csv_name(self) -> str:
+        """Return its name in a CSV file: the place, joined."""
         return "_".join(self.path)
 
 
-OF_A_WALK = (
-    Quantity("falls", "d", ("falls",)),
-    Quantity("return", ".1f", ("return", "mean")),
-    Quantity("speed m/s", ".3f", ("speed_m_s", "mean")),
-    *(Quantity(f"RMSE {joint} °", ".2f", ("joints", joint, "rmse_deg")) for joint in (*COMPARED_JOINTS, "toe")),
-    *(Quantity(f"vertical peak {peak} BW", ".2f", ("grf", f"vertical_peak{peak}_bw")) for peak in (1, 2)),
-    Quantity("vertical force r", ".3f", ("grf", "vertical_r")),
+WALK_COLUMNS = (
+    Column("falls", "d", ("falls",)),
+    Column("return", ".1f", ("return", "mean")),
+    Column("speed m/s", ".3f", ("speed_m_s", "mean")),
+    *(Column(f"RMSE {joint} °", ".2f", ("joints", joint, "rmse_deg")) for joint in (*COMPARED_JOINTS, "toe")),
+    *(Column(f"vertical peak {peak} BW", ".2f", ("grf", f"vertical_peak{peak}_bw")) for peak in (1, 2)),
+    Column("vertical force r", ".3f", ("grf", "vertical_r")),
     *(
-        Quantity(f"{joint} K {phase.replace('_', '-')} N·m/rad", ".0f", ("stiffness_Nm_rad", joint, phase))
+        Column(f"{joint} K {phase.replace('_', '-')} N·m/rad", ".0f", ("stiffness_Nm_rad", joint, phase))
         for joint in ("ankle", "toe")
         for phase in ("loading", "mid_stance", "push_off", "swing")
     ),
@@ -59,9 +59,9 @@ OF_A_WALK = (
 
 
 def walks_csv(rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
-    """CSV: a line for each walk, of what it is of and its metrics: `OF_A_WALK` and the number of episodes."""
-    head = [*rows[0][0], "episodes", *(each.column for each in OF_A_WALK)]
-    lines = ([*of.values(), metrics["episodes"], *(each.of(metrics) for each in OF_A_WALK)] for of, metrics in rows)
+    """CSV: a line for each walk, of what it is of and its metrics: `WALK_COLUMNS` and the number of episodes."""
+    head = [*rows[0][0], "episodes", *(each.csv_name for each in WALK_COLUMNS)]
+    lines = ([*of.values(), metrics["episodes"], *(each.of(metrics) for each in WALK_COLUMNS)] for of, metrics in rows)
     return csv_text(head, lines)
 
 

@@ -1,4 +1,4 @@
-"""How the rows of ablations are measured: undisturbed and pushed, each result kept in a file until asked otherwise."""
+"""Walks of a policy undisturbed and pushed, from the same seeds; a result is kept in a file until asked otherwise."""
 
 import json
 from collections.abc import Callable
@@ -14,8 +14,8 @@ from .study import OnProgress
 
 
 @dataclass(frozen=True, kw_only=True)
-class Protocol:
-    """How every row is measured."""
+class PushedWalks:
+    """Episodes that each row of a table walks, undisturbed and pushed."""
 
     episodes: int = 20
     """Episodes of each row, and of each seed, undisturbed, and as many pushed."""
@@ -42,7 +42,7 @@ class Protocol:
 
     @property
     def sentence(self) -> str:
-        """What the columns are of."""
+        """Return the sentence that explains the columns below a table."""
         return (
             f"Falls of {self.episodes} episodes × {self.seconds:g} s, undisturbed and pushed by "
             f"±{self.push_newton:g} N, the same seeds in every row; all else undisturbed: return of the default "
@@ -53,7 +53,7 @@ class Protocol:
         )
 
 
-def measured(path: Path, how: Protocol, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+def measured(path: Path, how: PushedWalks, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """Return the metrics that `make` finds, kept in the file `path` for this `how` and `key`."""
     asked = json.loads(json.dumps({"how": {**vars(how), "threads": None, "progress": None}, "of": key}))
     return Kept(path).get(asked, make)
