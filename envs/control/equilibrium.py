@@ -22,8 +22,8 @@ is constant, between them linear; chosen near people's."""
 REFERENCE_STIFFNESS = _PEOPLES.ankle_quasi_stiffness or ()
 """K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase, of the package's own
 file (`springfoot.gait.people.human`)."""
-FOOT_FLAT, TOE_OFF = _PEOPLES.toe_flat, _PEOPLES.toe_off
-"""Stride phases over which people's planned toe goes flat, and over which it returns to its swing posture."""
+TOE_OFF = _PEOPLES.toe_off
+"""Stride phases over which people's planned toe returns to its swing posture."""
 
 
 def plateau_curve(values: tuple[float, ...], plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:

@@ -33,9 +33,6 @@ Interpolation = Literal["line and sine", "not-a-knot", "least-squares cubic"]
 Division = Literal["elementwise", "matrix"]
 Joint = Literal["ankle", "toe"]
 
-INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
-"""All interpolations, the default first."""
-
 GRAVITY = 9.8
 """The thesis's acceleration of gravity g [m/s^2]; `springfoot.gait.GRAVITY` is 9.81."""
 
