@@ -79,7 +79,7 @@ INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
     "no shift of the swing hip by speed": lambda c: replace(c, swing_speed_gain=0.0),
 }
 """Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
-COLUMNS = (
+ABLATION_COLUMNS = (
     Column("falls", ".1f", ("undisturbed", "falls")),
     Column("pushed", ".1f", ("pushed", "falls")),
     Column("return", ".0f", ("undisturbed", "return", "mean")),
@@ -184,11 +184,11 @@ Rows = dict[str, list[dict[str, Any]]]
 
 
 def rows_table(rows: Rows, head: str, people: bool = False) -> str:
-    """Markdown: rows down, `COLUMNS` across, mean ± SD (n - 1) over the seeds of a row that has several."""
+    """Markdown: rows down, `ABLATION_COLUMNS` across, mean ± SD (n - 1) over the seeds of a row that has several."""
     lines = []
     for name, seeds in rows.items():
         cells = [name, str(len(seeds))]
-        for each in COLUMNS:
+        for each in ABLATION_COLUMNS:
             values = [value for value in map(each.of, seeds) if value is not None]
             whole = each.path[-1] == "falls" and len(values) == 1
             cells.append(plus_minus(mean_sd(values), ".0f" if whole else each.pattern))
@@ -197,8 +197,8 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
         theirs = people_metrics(reference_gait(BipedSettings()))
         known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
         known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
-        lines.append(["people", MISSING, *(_known(known, each) for each in COLUMNS)])
-    return table([head, "seeds", *(each.label for each in COLUMNS)], lines)
+        lines.append(["people", MISSING, *(_known(known, each) for each in ABLATION_COLUMNS)])
+    return table([head, "seeds", *(each.label for each in ABLATION_COLUMNS)], lines)
 
 
 def _known(metrics: dict[str, Any], column: Column) -> str:
@@ -212,12 +212,12 @@ def _known(metrics: dict[str, Any], column: Column) -> str:
 def _numbers(tables: dict[str, Rows]) -> str:
     """CSV: a line for each seed of each row."""
     lines = [
-        [section, row, index, *(each.of(metrics) for each in COLUMNS)]
+        [section, row, index, *(each.of(metrics) for each in ABLATION_COLUMNS)]
         for section, rows in tables.items()
         for row, seeds in rows.items()
         for index, metrics in enumerate(seeds)
     ]
-    return csv_text(["table", "row", "seed", *(each.csv_name for each in COLUMNS)], lines)
+    return csv_text(["table", "row", "seed", *(each.csv_name for each in ABLATION_COLUMNS)], lines)
 
 
 @dataclass(frozen=True, kw_only=True)
