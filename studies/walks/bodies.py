@@ -39,7 +39,7 @@ VERTICAL_R = "grf_vertical_r"
 WORST_FALLS = 10
 """Falls that are told one by one."""
 
-COLUMNS = (
+BODY_COLUMNS = (
     ("speed error %", "speed_error_percent", ".1f", abs),
     *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
     ("vertical force r", VERTICAL_R, ".3f", lambda r: -r),
@@ -106,7 +106,7 @@ def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, A
     The same pairs walked by the policy's open-loop `copy` stand beside, falls, speed and angles.
     """
     lines: list[list[str]] = [["falls", _falls(rows), "", "", "", *([_falls(copy), "", ""] if copy else [])]]
-    for label, column, pattern, badness in COLUMNS:
+    for label, column, pattern, badness in BODY_COLUMNS:
         if standing := _standing(rows, column, badness):
             line = [label, *_spread(standing, column, pattern), _who(standing[-1])]
             if copy:
