@@ -37,14 +37,19 @@ def _rows(dataclass: Any, names: list[str] | None = None) -> Iterator[tuple[str,
             yield f"`{item.name}`", default, meaning[item.name].replace("|", "\\|")
 
 
+def _names(head: list[str], rows: list[tuple[str, ...]]) -> str:
+    """Return a table whose first column keeps its names whole, as docs/site.css says."""
+    return f'<div class="names" markdown>\n\n{table(head, rows)}\n\n</div>'
+
+
 def settings() -> str:
     """Return the page of every setting of environment and training."""
     head = ["setting", "default", "meaning"]
     parts = ["# Settings", "Every setting of the environment is a keyword of `gym.make` and a flag of every command."]
     for theme, words in THEMES.items():
         names = [name for name, its in THEME_OF.items() if its == theme]
-        parts += [f"## {theme.capitalize()}", words, table(head, list(_rows(BipedSettings, names)))]
-    parts += ["## Training", "Flags of `train.py`.", table(head, list(_rows(TrainingConfig)))]
+        parts += [f"## {theme.capitalize()}", words, _names(head, list(_rows(BipedSettings, names)))]
+    parts += ["## Training", "Flags of `train.py`.", _names(head, list(_rows(TrainingConfig)))]
     return "\n\n".join(parts) + "\n"
 
 
@@ -60,9 +65,9 @@ def commands() -> str:
     parts = [
         "# Commands",
         "Each takes `--help`, which lists its flags in groups. A bad flag is one line on standard error, exit code 2.",
-        table(["command", "what it does"], own),
+        _names(["command", "purpose"], own),
         "## Studies",
-        table(["command", "question"], studies),
+        _names(["command", "question"], studies),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -70,7 +75,7 @@ def commands() -> str:
 def observations() -> str:
     """Return the page of observation, action, `info` and reward."""
     entries = [
-        (str(index), f"`{entry.name}`", entry.unit, f"{entry.low:g} to {entry.high:g}", entry.meaning)
+        (f"`{entry.name}`", str(index), entry.unit, f"{entry.low:g} to {entry.high:g}", entry.meaning)
         for index, entry in enumerate(OBSERVATION)
     ]
     weights = [(f"`{name}`", f"{weight:g}") for name, weight in DEFAULT_WEIGHTS.items()]
@@ -81,7 +86,7 @@ def observations() -> str:
         "gravity and l the leg length.",
         "Actions are four numbers in [−1, 1]: " + ", ".join(f"`{name}`" for name in ACTIONS) + ".",
         "## Observation",
-        table(["", "name", "unit", "bounds", "meaning"], entries),
+        _names(["name", "index", "unit", "bounds", "meaning"], entries),
         "## Reward",
         "Terms and weights of the default reward. `springfoot.envs.task.reward` defines each.",
         table(["term", "weight"], weights),

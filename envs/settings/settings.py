@@ -108,7 +108,7 @@ class BipedSettings:
     """Mass of a load on the back over body mass [-]."""
     left_foot: FootSetting = field(default=INTACT_FOOT, metadata=_FEET)
     """The left foot, a kind of `springfoot.envs.settings.feet` (intact, rigid, rigid_toe, no_toe, passive, adaptive,
-    weak, drop) a dictionary of a `kind` and its numbers, `{"kind": "passive", "ankle_stiffness": 600}`, or, on the
+    weak, drop), a dictionary of a `kind` and its numbers, `{"kind": "passive", "ankle_stiffness": 600}`, or, on the
     command line, a file (`springfoot.gait.springs.foot_file`)."""
     right_foot: FootSetting = field(default=INTACT_FOOT, metadata=_FEET)
     """The right foot, likewise."""
