@@ -109,6 +109,7 @@ check: install build/typing/made
 	$(PYTEST)
 
 docs: install build/typing/made $(VENV)/docs
+	$(BIN)/python docs/generate.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/installed
