@@ -39,9 +39,8 @@ GAIT_CYCLE_COLUMNS = (
 (actuator and joint damping), hip and knee extension, ankle and toe (mtp) plantarflexion positive; power: generation."""
 
 
-def foot_contacts(series: dict[str, NDArray], body: Body) -> list[Contacts]:
-    """Heel strikes and toe-offs of the left and of the right foot."""
-    vertical = series["force"][..., 1].sum(axis=2)
+def foot_contacts(vertical: NDArray, body: Body) -> list[Contacts]:
+    """Return heel strikes and toe-offs of the left and of the right foot, from their vertical force (T, side) [N]."""
     threshold = CONTACT_THRESHOLD_BW * body.mass * GRAVITY
     # Forces and moments are means over a tick, so they belong to its middle; states to its end.
     return [find_contacts(vertical[:, side], TICK, threshold, first=TICK / 2) for side in range(len(SIDES))]

@@ -112,7 +112,7 @@ def add_episode(
             tally.speed.append(distance / seconds)
 
     vertical = series["force"][..., 1].sum(axis=2)
-    contacts = foot_contacts(series, body)
+    contacts = foot_contacts(vertical, body)
     material = contact_material(body, series["contact"], series["base"], series["angle"])
     for side, foot in enumerate(contacts):
         strides = strides_within(foot, steady)

@@ -71,7 +71,8 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
     lengths = []
     for episode, ticks in enumerate(upright.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in upright.series.items()}
-        begin, _, end = strides_within(foot_contacts(series, body)[0], (WARM_UP, np.inf)).T
+        left, _ = foot_contacts(series["force"][..., 1].sum(axis=2), body)
+        begin, _, end = strides_within(left, (WARM_UP, np.inf)).T
         drawn = _figure_series(upright, series, body)
         at = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, MOMENTS)
         found = sample(drawn, at, TICK, TICK)

@@ -47,7 +47,7 @@ def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]
             continue
         series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
         fell = int(recording.fall_reason[episode] != "")
-        for side, foot in enumerate(foot_contacts(series, body)):
+        for side, foot in enumerate(foot_contacts(series["force"][..., 1].sum(axis=2), body)):
             strides = strides_within(foot, (begin + WARM_UP, end))
             curves = stride_curves(series, side, body, strides).astype(np.float32)
             for stride, ((start, _, stop), own) in enumerate(zip(strides.tolist(), curves, strict=True)):

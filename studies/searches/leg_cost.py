@@ -22,7 +22,7 @@ from springfoot.evaluation.numbers import StrideTally
 from springfoot.evaluation.recording import planned_course
 from springfoot.gait.people import PERCENT, HumanGait, force_features, stride_work
 
-from .leg_walks import FOREIGN, foreign_springs, measured, walk
+from .leg_walks import FOREIGN, Walks, foreign_springs, mean_speed, measured, walk
 from .walk_effort import effort_price
 
 Pays = Literal["likeness", "effort"]
@@ -112,12 +112,11 @@ def cost(
     seeds = [seed + index % walks for index in range(walks * len(candidates))]
     walked = walk(settings, candidates, seeds, threads, ease, springs)
     missing = walked.missing
-    speed = walked.speed
     scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
     for index in range(walks * len(candidates)):
         candidate = index // walks
         if not scheduled[index]:
-            total[candidate] += foreign * FOREIGN_SHARE * _paid_with_foreign(missing[index], speed[index], settings)
+            total[candidate] += foreign * FOREIGN_SHARE * _paid_with_foreign(walked, index, missing[index])
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
@@ -126,8 +125,7 @@ def cost(
     if settings.equilibrium == "planned" and not settings.follows_plan:
         lines = replace(settings, **own_settings("thesis", settings))
         walked = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
-        pairs = zip(walked.missing, walked.speed, strict=True)
-        total += [foreign * _paid_with_foreign(missing, speed, settings) for missing, speed in pairs]
+        total += [foreign * _paid_with_foreign(walked, index, lost) for index, lost in enumerate(walked.missing)]
     if settings.speed <= SLOW_SPEED:  # the slowest set alone carries a body off that starts standing
         seeds = [seed + index % SET_OFF for index in range(SET_OFF * len(candidates))]
         standing = replace(settings, start="standing")
@@ -155,10 +153,11 @@ def _paid(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -
     return effort_price(series, tally, biped, missed, impact)
 
 
-def _paid_with_foreign(missing: float, speed: float, settings: BipedSettings) -> float:
-    """Return the price of a walk with springs that nobody tuned: of a fall, or of its mean speed [m/s]."""
-    fall = missing * FALL_COST / len(FOREIGN)
-    return fall or abs(speed - settings.speed) / TOLERANCE["foreign_speed"]
+def _paid_with_foreign(walked: Walks, index: int, missing: float) -> float:
+    """Return the cost of walk `index` with foreign springs: of its fall (`missing`), or of its error of speed."""
+    if missing > 0:
+        return missing * FALL_COST / len(FOREIGN)
+    return abs(walked.speed(index) - walked.biped.settings.speed) / TOLERANCE["foreign_speed"]
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
@@ -216,11 +215,6 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["travel"] = np.mean(tally.travel)
     off["unsteady"] = np.sqrt(np.mean(both.sd("grf_vertical_bw") ** 2))
     return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
-
-
-def mean_speed(tally: StrideTally) -> float:
-    """Return the mean forward speed of the CoM over whole steps [m/s]."""
-    return float(tally.com.mean("vx")[:-1].mean())
 
 
 def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:

@@ -1,6 +1,6 @@
-"""Walks of the search for leg constants: candidates side by side in one batch, recorded as an evaluation records.
+"""Walk candidate leg constants side by side in one batch, recorded and measured as an evaluation records and measures.
 
-They walk with their own schedule and with springs that nobody tuned for them.
+Each candidate walks with its schedule, and with springs that were not tuned for it ("foreign").
 """
 
 from collections.abc import Sequence
@@ -24,26 +24,28 @@ from springfoot.envs.control import (
 from springfoot.envs.physics import Feet
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.numbers import StrideTally, add_episode
-from springfoot.evaluation.recording import TICK, Episodes, record_walk
+from springfoot.evaluation.recording import Episodes, record_walk
 from springfoot.gait.body import TOE_STIFFNESS, Body
 
 SECONDS = 6.5
 """Length of each walk [s]."""
 SETTLED = 2.5
-"""Strides that begin later [s] are measured."""
+"""Time from which a walk is measured [s]."""
 QUASI = np.stack([plateau_curve(REFERENCE_STIFFNESS), np.full(len(GRID), TOE_STIFFNESS)], -1)
-"""People's ankle quasi-stiffness and `TOE_STIFFNESS`, (SAMPLES, 2) on `GRID` [N m/rad], as all here."""
+"""Foreign springs: people's ankle quasi-stiffness and `TOE_STIFFNESS`, (SAMPLES, 2) on `GRID` [N m/rad]."""
 UNCHANGING = np.tile(CONSTANT_STIFFNESS, (len(GRID), 1))
-"""One that is held."""
+"""Foreign springs: the baseline's constant stiffness, (SAMPLES, 2) [N m/rad]."""
 MID_RANGE = np.tile(np.sqrt(np.prod(stiffness_ranges(BipedSettings(), Body()), axis=0)), (len(GRID), 1))
-"""That of action 0, where a training begins."""
+"""Foreign springs: the stiffness of action 0, where a training begins, (SAMPLES, 2) [N m/rad]."""
 FOREIGN, PUSHED_FOREIGN = (UNCHANGING, QUASI, MID_RANGE), (UNCHANGING, QUASI)
-"""Springs that nobody tuned for it, with which each candidate walks undisturbed, and pushed."""
+"""Foreign springs with which each candidate walks undisturbed, and under pushes."""
 
 
 def foreign_springs(settings: BipedSettings) -> tuple[Sequence[NDArray], Sequence[NDArray]]:
-    """Springs that nobody tuned, undisturbed and pushed; none where the body follows its plan: they are people's, or
-    chosen on people's walk."""
+    """Return the foreign springs of undisturbed and of pushed walks.
+
+    There are none where the body follows its plan: the springs are people's, or were chosen on people's walk.
+    """
     return ((), ()) if settings.follows_plan else (FOREIGN, PUSHED_FOREIGN)
 
 
@@ -58,10 +60,19 @@ def walk(
     right: Sequence[LegConstants] | None = None,
     feet: Sequence[Feet] | None = None,
 ) -> "Walks":
-    """Walk candidates equally often, one walk for each of `seeds`, at an equilibrium that is the share `ease` planned.
+    """Record the walks of C candidate leg constants, side by side: N / C walks of each candidate, one for each seed.
 
-    The last walks of each have the stiffnesses `foreign`, the others the schedule. `right` are the constants of each
-    candidate's right leg, if it has its own, and `feet` each candidate's, in place of those of the settings.
+    Args:
+        settings: of the environment.
+        candidates: C leg constants, of both legs unless `right` is given.
+        seeds: N, those of the first candidate first.
+        threads: of the physics.
+        ease: fraction [0, 1] by which the rest angles move from the settings' to the planned ones.
+        foreign: stiffness curves (SAMPLES, 2) on `GRID` for the last walks of each candidate, a walk each; the walks
+            before them have the schedule.
+        seconds: length of each walk [s].
+        right: C leg constants of the right leg.
+        feet: C feet, in place of the settings' feet.
     """
     num = len(seeds)
     walks = num // len(candidates)
@@ -101,9 +112,9 @@ class Walks:
 
     @property
     def missing(self) -> NDArray:
-        """(N,) the share of each walk that a fall took: 0 without one, 1 at once, 1/3 at the end.
+        """(N,) how early each walk fell: 0 without a fall, 1 for a fall at once, falling to 1/3 at the end.
 
-        Standing still counts as a fall.
+        A walk that covers less than half of the commanded distance counts as a fall.
         """
         com = self.episodes.series["com"][..., 0].astype(float)
         way = com[np.arange(len(com)), self.episodes.ticks - 1]
@@ -111,31 +122,35 @@ class Walks:
         stood = self.episodes.fall_reason == ""
         return np.where(stood & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0))
 
-    @property
-    def speed(self) -> NDArray:
-        """(N,) mean forward speed of the CoM from `SETTLED` on [m/s]."""
-        first = round(SETTLED / TICK)
-        found = np.zeros(len(self.episodes.ticks))
-        for index, ticks in enumerate(self.episodes.ticks.tolist()):
-            com = self.episodes.series["com"][index, :ticks, 0].astype(float)
-            last = ticks - 1
-            found[index] = (com[last] - com[min(first, last)]) / max((last - first) * TICK, TICK)
-        return found
-
     def episode(self, index: int) -> dict[str, NDArray]:
-        """Return the series of walk `index`, as `evaluation.recording.recording.Episodes.episode`."""
+        """Return name -> (T, ...) series of walk `index`, without the ticks after its end."""
         return self.episodes.episode(index)
+
+    def speed(self, index: int) -> float:
+        """Return the evaluation's mean forward speed of walk `index` from `SETTLED` on [m/s]."""
+        return tally_from(self.episode(index), self.biped.body, SETTLED).speed[0]
+
+
+def tally_from(series: dict[str, NDArray], body: Body, settled: float) -> StrideTally:
+    """Return the evaluation's tally of one walk from `settled` [s] on."""
+    tally = StrideTally()
+    add_episode(tally, series, body, (settled, np.inf))
+    return tally
 
 
 def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED) -> StrideTally | None:
-    """Return the evaluation's tally of one walk's strides from `settled` [s] on; None if a leg takes fewer than two."""
-    tally = StrideTally()
-    add_episode(tally, series, biped.body, (settled, np.inf))
+    """Return the evaluation's tally of one walk from `settled` [s] on; None if a leg takes fewer than two strides."""
+    tally = tally_from(series, biped.body, settled)
     return None if min(curves.count for curves in tally.feet) < 2 else tally
 
 
+def mean_speed(tally: StrideTally) -> float:
+    """Return the mean forward speed of the CoM over whole steps [m/s]."""
+    return float(tally.com.mean("vx")[:-1].mean())
+
+
 def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
-    """Return (C, SAMPLES, 2) foot equilibrium [rad], by the share `ease` the planned one."""
+    """Return (C, SAMPLES, 2) rest angles of ankle and toe [rad], moved by the fraction `ease` to the planned ones."""
     walk = reference_walk_at(settings, settings.speed, candidates)
     curves = [
         [foot_curves(kind, c, walk)[0] for c in candidates]

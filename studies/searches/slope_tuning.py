@@ -18,16 +18,19 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.arrays import NDArray
-from springfoot.envs.batch import Biped, Tick, walked_steps
+from springfoot.envs.batch import Biped
 from springfoot.envs.control import SlopeConstants, action_of, slope_constants_from
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.evaluation.numbers import SHORTEST_SPEED
+from springfoot.evaluation.recording import TICK, Episodes, record_walk
 from springfoot.files.writing import csv_text
-from springfoot.gait.body import GRAVITY
+from springfoot.gait.body import GRAVITY, Body
 
 from ..base.study import Answer, OnProgress, Study
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .kept_search import generations
+from .leg_walks import tally_from
 
 SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
 """Walked on by every candidate."""
@@ -57,44 +60,43 @@ def vector_of(constants: SlopeConstants) -> NDArray:
 def walk(
     constants: SlopeConstants | None, slopes_deg: tuple[float, ...], walks: int, seconds: float, seed: int, threads: int
 ) -> dict[str, NDArray]:
-    """Walk `walks` times at each slope with the fixed schedule: (slopes, walks) of each number.
+    """Walk `walks` times at each slope with the fixed schedule, and measure each walk.
 
-    `missing` of the walk after a fall, 0 without one; `speed` too fast [m/s] and `heel` force peak [body weights], once
-    settled; mean `reward` of a step. `constants` None: the committed ones.
+    Returns name -> (slopes, walks): `missing`, how early a walk fell, 0 without a fall, 1 for one at once; `speed`
+    above the commanded one [m/s] and peak force of the `heel` [body weights], both from `SETTLED` on; mean `reward` of
+    a step. `constants` None takes the committed constants.
     """
     settings = BipedSettings(episode_seconds=seconds + 1)
     num = len(slopes_deg) * walks
     biped = Biped(settings, num, threads, slope=constants)
     biped.subjects.slope[:] = np.repeat(np.radians(slopes_deg), walks)
     biped.reset(np.arange(num), [seed + index % walks for index in range(num)])
-    lived = np.zeros(num)
-    reward = np.zeros(num)
-    heel = np.zeros(num)
-    way = np.zeros(num)
-    stood = np.ones(num, bool)
-    ticks: list[Tick] = []
-    biped.on_tick = ticks.append
 
     def act(_observation: NDArray) -> NDArray:
-        ticks.clear()
         return action_of(biped.scheduled_stiffness(), settings, biped.body).reshape(num, -1)
 
-    for step, (active, result) in enumerate(walked_steps(biped, act, round(seconds / biped.dt))):
-        lived += active * biped.dt
-        reward += result.reward
-        if step * biped.dt >= SETTLED:
-            way += active * biped.measurement.com_velocity[:, 0] * biped.dt
-            for tick in ticks:
-                load = tick.measurement.force[..., 1].sum(-1) / (biped.body.total_mass * GRAVITY)
-                heel = np.maximum(heel, active * np.where(tick.phase < HEEL_STRIKE, load, 0.0).max(1))
-        stood &= ~(active & result.terminated)
+    steps = round(seconds / biped.dt)
+    episodes = Episodes.empty(num, steps * biped.windows_per_step)
+    record_walk(biped, act, episodes, steps=steps)
+    lived = episodes.ticks * TICK
     numbers = {
-        "missing": np.where(stood, 0.0, 1.0 - 2.0 / 3.0 * lived / seconds),
-        "speed": way / np.maximum(lived - SETTLED, biped.dt) - settings.speed,
-        "heel": heel,
-        "reward": reward * biped.dt / np.maximum(lived, biped.dt),
+        "missing": np.where(episodes.fall_reason == "", 0.0, 1.0 - 2.0 / 3.0 * lived / seconds),
+        "speed": np.zeros(num),
+        "heel": np.zeros(num),
+        "reward": episodes.returns * biped.dt / lived,
     }
+    for index in np.flatnonzero(numbers["missing"] == 0.0).tolist():
+        series = episodes.episode(index)
+        numbers["speed"][index] = tally_from(series, biped.body, SETTLED).speed[0] - settings.speed
+        numbers["heel"][index] = _heel_peak(series, biped.body)
     return {name: values.reshape(len(slopes_deg), walks) for name, values in numbers.items()}
+
+
+def _heel_peak(series: dict[str, NDArray], body: Body) -> float:
+    """Return the largest vertical force of a foot [body weights] early in its leg's stride, from `SETTLED` on."""
+    settled = slice(round(SETTLED / TICK), None)
+    force = series["force"][settled, ..., 1].sum(-1) / (body.total_mass * GRAVITY)
+    return float(force[series["phase"][settled] < HEEL_STRIKE].max())
 
 
 def cost(walked: dict[str, NDArray], level_reward: float) -> float:
@@ -137,7 +139,7 @@ class SlopeTuning(Study):
         for count, least in (("generations", 0), ("population", 4), ("walks", 1), ("seed", 0), ("threads", 1)):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
-        require_number("seconds", self.seconds, SETTLED, above=True)
+        require_number("seconds", self.seconds, SETTLED + SHORTEST_SPEED)
 
     @property
     def total(self) -> float:

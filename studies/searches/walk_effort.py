@@ -15,7 +15,7 @@ from springfoot.gait.body import GRAVITY
 from springfoot.gait.people import on_percent
 from springfoot.gait.plan import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_stride
 
-from .leg_walks import SETTLED
+from .leg_walks import SETTLED, mean_speed
 
 ANGLE_CURVES = ("thigh_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg", "mtp_dorsiflexion_deg")
 """The evaluation's curves of a leg's angles, thigh to the vertical."""
@@ -59,14 +59,14 @@ def effort_and_impact(
     """
     body = biped.body
     weight = body.mass * GRAVITY
-    speed = float(tally.com.mean("vx")[:-1].mean())
+    speed = mean_speed(tally)
     ahead = series["com"][:, 0] - series["com_reference"][:, 0]
     sides = np.array(tally.stride_sides)
     efforts: list[Effort] = []
     impacts: list[float] = []
     places: list[float] = []
     landings: list[float] = []
-    for side, foot in enumerate(foot_contacts(series, body)):
+    for side, foot in enumerate(foot_contacts(series["force"][..., 1].sum(axis=2), body)):
         strides = strides_within(foot, (settled, np.inf))
         begin, _, end = strides.T
         curves = tally.feet[side]

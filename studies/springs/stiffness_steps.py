@@ -19,14 +19,13 @@ from springfoot.envs.control import FEET, PLATEAUS, TOE_OFF, stiffness_ranges
 from springfoot.envs.physics import JOINTS, LEFT, RIGHT, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers import foot_contacts
 from springfoot.evaluation.recording import TICK, WARM_UP
-from springfoot.gait.body import GRAVITY, Body
+from springfoot.gait.body import Body
 from springfoot.gait.people import (
-    CONTACT_THRESHOLD_BW,
     LOADING_END_PERCENT,
     PUSH_OFF_BEGIN_PERCENT,
     Contacts,
-    find_contacts,
     find_steps,
     on_percent,
     sample,
@@ -223,13 +222,12 @@ class _Record:
     def paired(self, strides: int, active: NDArray, cut: NDArray) -> PairedWalks:
         """Return each changed walk less the unchanged one of its seed."""
         com, velocity, ankle, load, phase, stride = (np.stack(each) for each in zip(*self._ticks, strict=True))
-        load /= self._biped.body.total_mass * GRAVITY
         movement = np.full((len(active), strides, len(MOVEMENT)), np.nan)
         clocks = np.zeros((self._num, strides))
         for index in range(len(active)):
             own = index % self._num
             first = TICK * np.argmax(stride[:, own] == 0)
-            contacts = [find_contacts(load[:, index, side], TICK, CONTACT_THRESHOLD_BW, TICK) for side in range(2)]
+            contacts = foot_contacts(load[:, index], self._biped.body)
             landed = contacts[LEFT].heel_strikes
             landed = landed[landed > first - PHASE_LAG][: strides + 1]
             if not active[index] or len(landed) <= strides:

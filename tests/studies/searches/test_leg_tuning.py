@@ -20,6 +20,7 @@ from springfoot.studies.searches import leg_cost
 from springfoot.studies.searches import leg_tuning as tuning
 from springfoot.studies.searches.leg_search import LEAD_STEP, LED, Search
 from springfoot.studies.searches.leg_walks import SECONDS
+from springfoot.studies.springs.stiffness_steps import paired_walks
 
 COMMITTED = leg_constants("planned", "people")
 
@@ -83,25 +84,27 @@ def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_le
     assert paid[1] < paid[2] < paid[0]
 
 
-def test_a_search_pays_by_the_numbers_of_an_evaluation(monkeypatch):
-    """What the measurer finds late, evaluation and search both find late."""
+def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
+    """A measurer that finds heel strikes late and toe-offs early moves an evaluation, a search and a study alike."""
     settings = BipedSettings(episode_seconds=SECONDS + 1)
-    own = replace(settings, episode_seconds=SECONDS)
+    policy, walked = prepare("schedule", {"episode_seconds": SECONDS})
 
-    def both():
+    def three():
         paid = leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0)
-        policy, walked = prepare("schedule", {"episode_seconds": own.episode_seconds})
-        return paid[0], measure(record(policy, walked, name="", episodes=1)).metrics["toe_off_percent"]
+        toe_off = measure(record(policy, walked, name="", episodes=1)).metrics["toe_off_percent"]
+        step_length = paired_walks(policy, walked, 0.0, range(2), strides=2).unchanged[..., 1]
+        return paid[0], toe_off, step_length
 
-    paid, toe_off = both()
+    paid, toe_off, step_length = three()
     found = numbers_series.find_contacts
 
     def late(force, tick, threshold, first=0.0):
         return found(force, tick, 8 * threshold, first)
 
     monkeypatch.setattr(numbers_series, "find_contacts", late)
-    paid_late, toe_off_late = both()
+    paid_late, toe_off_late, step_length_late = three()
     assert toe_off_late < toe_off - 1.0 and abs(paid_late - paid) > 0.1
+    assert (step_length_late != step_length).all()
 
 
 def run(*words):
