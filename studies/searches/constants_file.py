@@ -1,4 +1,4 @@
-"""The files of constants that searches begin with and write to: `envs/control/legs.json`, and that of adapted feet."""
+"""Read and write the files of constants that searches start from and write: leg constants and adapted feet."""
 
 import json
 from importlib import resources
@@ -9,9 +9,9 @@ from springfoot.errors import SpringfootError
 from springfoot.files.writing import write_atomically
 
 CONSTANTS = Path(str(resources.files("springfoot.envs.control") / "legs.json"))
-"""The package's own: in a clone, what is committed."""
+"""The package's leg constants; in a clone, the committed file."""
 ADAPTED_FEET = CONSTANTS.with_name("adapted.json")
-"""Likewise, of people who have adapted to a foot."""
+"""The package's constants of people who have adapted to a foot."""
 
 
 def read_constants(path: Path) -> dict[str, Any]:
@@ -20,7 +20,7 @@ def read_constants(path: Path) -> dict[str, Any]:
 
 
 def read_feet(path: Path) -> dict[str, Any]:
-    """Return a file of adapted feet; an empty one where there is none."""
+    """Return a file of adapted feet; an empty table if there is no file."""
     return _read(path, "feet", "adapted feet") if path.exists() else {"found_by": {}, "feet": {}}
 
 

@@ -1,14 +1,16 @@
-"""Leg constants that nobody tuned: where a search begins that is to know nothing."""
+"""Make leg constants that nobody tuned, for searches that must start without knowledge."""
 
 from springfoot.envs.control import KNOTS, LegConstants
 
 GENERIC = "generic"
-"""Name by which a search starts from them."""
+"""Name of these constants as a search's start."""
 
 
 def generic_constants() -> LegConstants:
-    """Return no correction of any curve, all moments fed forward, the same stiff springs at every phase, an upright
-    trunk.
+    """Return leg constants without tuning.
+
+    No curve is corrected, all moments are fed forward, springs are equally stiff at every phase, and the trunk is
+    upright.
     """
     level = (0.0,) * len(KNOTS)
     stiff = (200.0, 200.0)

@@ -1,6 +1,7 @@
-"""The generations of a CMA-ES search, kept as they come: a search that was stopped goes on with the same bits.
+"""Run the generations of a CMA-ES search and keep their costs, so that a stopped search goes on with the same bits.
 
-What CMA-ES asks follows from its seed and from what it was told. So the costs alone are kept, and told again.
+CMA-ES draws its candidates from its seed and from the costs of earlier candidates. The file therefore holds the costs
+alone.
 """
 
 import json
@@ -20,11 +21,11 @@ from ..base.study import Study
 NOT_ASKED = frozenset(
     {"threads", "quick", "out", "page", "command", "log", "generations", "styles", "constants", "plan_file", "keep"}
 )
-"""Flags of a search that change nothing of what its generations pay."""
+"""Flags that do not change the cost of any candidate."""
 
 
 def asked_of(study: Study) -> dict[str, Any]:
-    """Return the settings of a study that searches, as plain JSON values."""
+    """Return the settings of a search that change its costs, as plain JSON values."""
     asked = {name: value for name, value in vars(study).items() if name not in NOT_ASKED}
     return {name: str(value) if isinstance(value, Path) else value for name, value in asked.items()}
 
@@ -36,11 +37,14 @@ def generations(
     kept: Path | None = None,
     asked: Any = None,
 ) -> Iterator[tuple[int, list[NDArray], NDArray]]:
-    """Run `count` generations; each gives its number from 0, its candidates and what they paid, once told.
+    """Run `count` generations and yield the number of each, from 0, its candidates and their costs.
 
-    `price` is given a generation and its candidates. What they paid is kept in the file `kept`; one that is there is
-    gone on with. `asked`, plain JSON values, says what is searched for: raises `SpringfootError` for the file of
-    another search.
+    Args:
+        strategy: the search, not yet begun.
+        count: generations to run, kept ones included.
+        price: generation and candidates -> costs (candidates,).
+        kept: file of the costs. If it exists, its generations are not computed again.
+        asked: plain JSON values that describe the search. Raises `SpringfootError` if `kept` belongs to another search.
     """
     asked = json.loads(json.dumps(asked))
     known = []

@@ -1,9 +1,10 @@
-"""What leg constants pay in the search of `leg_tuning`: how far their simulated walks are from people's and the plan's.
+"""Compute the cost of leg constants in the search of `leg_tuning`: the distance of their walks from people's and the
+plan.
 
-`misses` is the one ruler: a vector of what a walk with the fixed schedule misses, each in units of its tolerance.
-`cost`, which generations are ranked by, is its length, and a price for falls: every candidate walks from random starts
-with and without pushes, and with springs that nobody tuned for it: constant stiffness, people's, the thesis's lines.
-`all_misses`, which the refinement squares, is the vector itself.
+`misses` compares one walk with the fixed schedule: a vector of distances, each in units of its tolerance. `cost` ranks
+the candidates of a generation: the length of that vector, and a price for falls in walks from random starts, with and
+without pushes, and with foreign springs (constant stiffness, people's, the thesis's lines). `all_misses` is the vector
+that the refinement minimises by least squares.
 """
 
 from collections.abc import Sequence
@@ -26,17 +27,18 @@ from .leg_walks import FOREIGN, Walks, foreign_springs, mean_speed, measured, wa
 from .walk_effort import effort_price
 
 Pays = Literal["likeness", "effort"]
-"""What an undisturbed walk pays for."""
+"""Cost of an undisturbed walk: its distance from people or the plan, or its effort."""
 
 SCHEDULED, PUSHED, SET_OFF = 2, 3, 4
-"""Walks of each candidate with the schedule: undisturbed, pushed, starting to walk."""
+"""Walks of each candidate with its schedule: undisturbed, pushed, from standing."""
 REFINED = ((0.25, 7), (0.75, 8), (0.25, 9))
-"""Walks of `all_misses`: stride phase at the start, seed."""
+"""Walks of `all_misses`: (stride phase at the start, seed)."""
 RADIAN = np.pi / 180
 UNEVENNESS = 0.002
-"""Of the ground [m]; on level ground a walk locks to its decisions every 20 ms, and misses jump with the constants."""
+"""Unevenness of the ground [m]. On level ground a walk locks to its decisions every 20 ms, and misses jump with the
+constants."""
 REFINED_SECONDS, REFINED_SETTLED = 10.0, 4.0
-"""Their length, and when the strides that are measured begin [s]."""
+"""Length of the walks of `REFINED`, and the time from which they are measured [s]."""
 CURVES = {
     "thigh": ("thigh_flexion_deg", RADIAN),
     "knee": ("knee_flexion_deg", RADIAN),
@@ -48,7 +50,8 @@ CURVES = {
     "knee_moment": ("knee_moment_Nm_per_kg", 1.0),
     "ankle_moment": ("ankle_moment_Nm_per_kg", 1.0),
 }
-"""People's curves that a walk is held against -> the evaluation's curve of the same, and its unit in people's."""
+"""People's curve -> the evaluation's curve to compare with it, and the unit of people's curve in that of the
+evaluation's."""
 TOLERANCE = {
     "thigh": np.deg2rad(1.0),
     "knee": np.deg2rad(1.9),
@@ -79,15 +82,15 @@ TOLERANCE = {
     "ankle_r": 0.01,  # of the ankle's mean curve with people's, below 0.985
     "foreign_speed": 0.15,  # m/s, of the walks with springs that nobody tuned
 }
-"""What counts as one, root mean square over the stride for a curve."""
+"""Unit in which each distance counts; for a curve, of its root mean square over the stride."""
 LATE_SWING = 0.8
 """Stride phase from which the hip holds the leg back before it lands."""
 FOREIGN_SHARE = 0.3
-"""Weight of what is paid with springs that nobody tuned, but for the thesis's lines, whose weight is one; chosen: with
-all of it legs stand nearly any spring, and the knee of the walk with the schedule goes 5 degrees off people's."""
+"""Weight of walks with foreign springs; the thesis's lines have weight 1. Chosen: at full weight legs stand nearly any
+spring, and the knee of the walk with the schedule is 5 degrees off people's."""
 FALL_COST = 30.0
-"""Cost of falling at once, threefold with the schedule (a poor walk must be worth more than a fall); one that comes
-further costs proportionally less, down to a third."""
+"""Cost of a fall at once; a walk with the schedule costs three times as much, so that a poor walk is worth more than a
+fall. The cost of a later fall decreases with the distance walked, to a third."""
 
 
 def cost(
@@ -101,10 +104,19 @@ def cost(
     pays: Pays = "likeness",
     impact: float = 1.0,
 ) -> NDArray:
-    """Return (C,) what each candidate pays; `push` [N], `ease` as in `leg_walks.walk`; `foreign` is the price of walks
-    with springs that nobody tuned; an undisturbed walk `pays` for what it misses, or for its effort, and for its
-    `impact` at
-    this price (`walk_effort`)."""
+    """Return the cost of each candidate, (C,).
+
+    Args:
+        settings: of the environment.
+        candidates: C leg constants.
+        seed: of the first walk.
+        threads: of the physics.
+        push: size of the pushes in the pushed walks [N]; 0 leaves these walks out.
+        ease: as in `leg_walks.walk`.
+        foreign: price of walks with foreign springs.
+        pays: cost of an undisturbed walk.
+        impact: price of impact over that of effort, where walks pay for effort (`walk_effort`).
+    """
     springs, pushed_springs = foreign_springs(settings)
     walks = SCHEDULED + len(springs)
     settings = replace(settings, unevenness_m=UNEVENNESS)
@@ -143,7 +155,7 @@ def cost(
 
 
 def _paid(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -> float | None:
-    """Return the cost of one walk that did not fall; None if it takes too few strides."""
+    """Return the cost of a walk without a fall; None if a leg takes fewer than two strides."""
     tally = measured(series, biped)
     if tally is None:
         return None
@@ -161,7 +173,7 @@ def _paid_with_foreign(walked: Walks, index: int, missing: float) -> float:
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
-    """Return the misses of each candidate on the walks of `REFINED`; None if it falls in one of them."""
+    """Return the misses of each candidate over the walks of `REFINED`; None for a candidate that falls."""
     found: list[list[NDArray] | None] = [[] for _ in candidates]
     for start, seed in REFINED:
         own = replace(settings, start=start, unevenness_m=UNEVENNESS)
@@ -178,9 +190,9 @@ def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], thre
 
 
 def misses(tally: StrideTally, biped: Biped) -> NDArray:
-    """Return the distance of a walk from its target and from its plan, number by number, in tolerances.
+    """Return the distances of a walk from its target and its plan, in units of `TOLERANCE`.
 
-    The numbers are those of an evaluation (`springfoot.evaluation.numbers`).
+    The walk's numbers are those of an evaluation (`springfoot.evaluation.numbers`).
     """
     target = biped.target
     both = tally.both
@@ -218,14 +230,17 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
 
 
 def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
-    """Return the part of a difference beyond a band about 0."""
+    """Return the part of a difference outside the band [-band, band], signed."""
     return np.sign(difference) * np.maximum(np.abs(difference) - band, 0.0)
 
 
 @lru_cache(maxsize=16)
 def _target(gait: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
-    """Return the numbers of the target: mean curves (101,) by the names of `CURVES`, the positive and
-    negative work of hip, knee and ankle (3, 2) [J/kg], from the mean power, and 1.9 SD of the hip moment."""
+    """Return the target's mean curves, work and spread.
+
+    The curves (101,) have the names of `CURVES`. The work (3, 2) [J/kg] is positive and negative, of hip, knee and
+    ankle, from the mean power. The spread is 1.9 SD of the hip moment (101,) [N m/kg].
+    """
     curves = {name: gait.mean(name, PERCENT / 100) for name in CURVES}
     power = [gait.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
     work = [np.concatenate(stride_work(each, np.array([gait.stride_time]))) for each in power]

@@ -1,4 +1,4 @@
-"""Leg constants as a vector of unit steps: what the searches of `leg_tuning` and `person_search` move."""
+"""Turn leg constants into a vector of unit steps, which the searches of `leg_tuning` and `person_search` move."""
 
 from dataclasses import asdict
 
@@ -10,7 +10,7 @@ from springfoot.gait.people import HumanGait, human_gait
 from springfoot.gait.springs import LOWEST_STIFFNESS
 
 KNOT_STEP, GAIN_STEP = 2.0, 0.15
-"""One unit of the search: degrees of a knot, relative change of a gain."""
+"""Unit steps of the search: of a knot [deg], of a gain [fraction of it]."""
 ADDITIVE_STEP = {
     "toe_flat_deg": 3.0,
     "trunk_pitch_deg": 1.0,
@@ -19,21 +19,22 @@ ADDITIVE_STEP = {
     "speed_torque": 15.0,
     "period_speed_gain": 0.03,
 }
-"""One unit of the search for constants that may change sign or vanish, in their own units."""
+"""Unit steps of constants that may change sign or vanish, in the units of the constants."""
 LEAD_STEP = 0.005
-"""One unit of the search for what a whole target of hip, knee or ankle comes earlier [stride]. Along knots one by one a
-search does not find it: half a percent at hip and knee takes a degree off the knee of the planned walk at 1.2 m/s."""
+"""Unit step of the lead of a whole target curve of hip, knee or ankle [stride]. A search that moves knots one by one
+does not find a lead: half a percent at hip and knee takes a degree off the knee of the planned walk at 1.2 m/s."""
 LED = {"hip_knots_deg": "thigh", "knee_knots_deg": "knee", "ankle_knots_deg": "ankle"}
-"""People's curves that come earlier, by their knots."""
+"""Constants' knots -> the target curve that the lead shifts."""
 LEAST = {"ankle_schedule": LOWEST_STIFFNESS[0], "toe_schedule": LOWEST_STIFFNESS[1]}
-"""Least value of a constant [N m/rad]."""
+"""Lower bounds of constants [N m/rad]."""
 
 
 class Search:
-    """Constants as a vector of unit steps from where the search began; the last three are leads of whole targets.
+    """Leg constants as a vector of unit steps from the start of a search; the last three entries lead whole target
+    curves.
 
-    `names` (size,) tells which constant a place moves; with `placing` one of them is the `swing_place_gain`, which a
-    body that follows people has not.
+    `names` (size,) has the constant of each entry. With `placing` the vector has an entry for `swing_place_gain`, which
+    only bodies that follow their plan use.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What independent searches for leg constants found, how each result walks, and what their prices trade.
+"""Compare the results of independent searches for leg constants: how each set walks, and likeness against robustness.
 
 springfoot study leg-sets
 """
@@ -35,11 +35,11 @@ SETTINGS: tuple[Mapping[str, Any], ...] = (
     {"cadence": "thesis"},
     {"feedforward": "plan"},
 )
-"""Settings whose constants were searched for; the first is that of the front."""
+"""Settings that have leg constants of their own; the first are also those of the searches at other prices ("front")."""
 SCHEDULE = "untrained", {"action_mode": "residual"}
-"""A set's own fixed schedule, as a policy and settings."""
+"""Policy and settings with which a set walks its own fixed schedule."""
 UNTUNED = ("constant", "quasi_stiffness", "untrained", "thesis")
-"""Policies that set stiffness which no set was tuned with."""
+"""Policies whose stiffness no set was tuned with."""
 PUSHED = {"push_newton": 150.0}
 WALKED = (
     Column("m/s", ".3f", ("speed_m_s", "mean")),
@@ -52,12 +52,12 @@ WALKED = (
     Column("cost of transport", ".3f", ("cost_of_transport",)),
     Column("CoP off m", ".3f", ("zmp", "cop_rmse_m")),
 )
-"""Numbers of a walk."""
+"""Numbers that the table shows of each walk."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LegSets(WalkingStudy):
-    """Walk with every committed set of leg constants, and draw likeness against what stands springs nobody tuned."""
+    """Walk with every committed set of leg constants, and draw its likeness against its falls with untuned springs."""
 
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants."""
@@ -72,7 +72,7 @@ class LegSets(WalkingStudy):
         return walks * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk with each."""
+        """Walk with each set, and make the table and the figure."""
         lines = []
         numbers = []
         front = {}
@@ -123,7 +123,8 @@ class LegSets(WalkingStudy):
 
 
 def _sets(known: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], LegConstants]]:
-    """Label, settings and constants of every set: of each setting the first and the second search, then the front."""
+    """Yield label, settings and constants of every set: both searches of each of `SETTINGS`, then the searches at other
+    prices."""
     for given in SETTINGS:
         settings = BipedSettings(**given)
         name = constants_name(settings.equilibrium, settings.cadence, settings.speed, settings.feedforward)

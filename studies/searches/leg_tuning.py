@@ -1,11 +1,11 @@
-"""Finds the leg constants of `envs/control/legs.json`: CMA-ES on simulated walks, all candidates in one batch.
+"""Find the leg constants of `envs/control/legs.json`: CMA-ES on simulated walks, all candidates in one batch.
 
     springfoot study leg-tuning --equilibrium planned --cadence people
     springfoot study leg-tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
 
-Least squares on the same ruler may come first: they find the walk, the generations make it stand pushes. What a
-candidate pays stands in `leg_cost`. The result is a fit to people's curves, not a prediction; unless it follows the
-plan (`--guide plan`), or walks for least effort then (`--pays effort`).
+Steps of least squares on the same misses may come first: they bring the walk near its target, and the generations make
+it stand pushes. `leg_cost` computes the cost of a candidate. The result is a fit to people's curves, not a prediction,
+unless the body follows the plan (`--guide plan`) or pays for effort (`--pays effort`).
 """
 
 import json
@@ -34,15 +34,16 @@ from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
 from .leg_search import Search
 
 DIFFERENCE = 0.08
-"""Step of the refinement's differences [units of the search]; chosen: less drowns in what a walk changes by itself."""
+"""Step of the refinement's finite differences [units of the search]; chosen: the scatter of a walk hides a smaller
+step."""
 STEEPEST = 5.0
-"""Largest derivative it believes [tolerances per unit]; beyond, the walk tipped over."""
+"""Largest derivative that the refinement uses [tolerances per unit]; a steeper one comes from a fall."""
 DAMPINGS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
-"""Dampings that a step of the refinement tries, over the last that served [-]; chosen."""
+"""Dampings that a step of the refinement tries, as factors on the last one that served [-]; chosen."""
 LONGEST_STEP = 1.5
-"""Largest change of a constant in one of its steps [units of the search]; chosen."""
+"""Largest change of a constant in a step of the refinement [units of the search]; chosen."""
 KEPT = 0.17
-"""What a constant pays in the refinement for each unit that it leaves its start [tolerances]."""
+"""Cost in the refinement of moving a constant one unit from its start [tolerances]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,44 +51,44 @@ class LegTuning(Study):
     """Find leg constants by CMA-ES and write them into a file of constants, every ten generations and at the end."""
 
     equilibrium: Literal["planned", "neutral"] = "planned"
-    """Which equilibrium the constants are for; angle and phase walk on those of planned."""
+    """Equilibrium of the constants; `angle` and `phase` use those of `planned`."""
     cadence: Cadence = "people"
-    """Which cadence they are for."""
+    """Cadence of the constants."""
     speed: float = TUNED_SPEED
-    """Which speed they are for [m/s]."""
+    """Speed of the constants [m/s]."""
     guide: Guide = "people"
-    """What they follow: people, or the plan alone, which is also what they then pay for."""
+    """Target of the walk, and of its cost: people, or the plan alone."""
     feedforward: Feedforward = "people"
-    """Whose moments are fed forward with them."""
+    """Source of the moments that are fed forward."""
     start: str = ""
     """Name of the constants to start from; empty: those to be replaced."""
     generations: int = 150
     """Generations of the search."""
     population: int = 20
-    """Candidates in each."""
+    """Candidates of each generation."""
     refinements: int = 0
     """Steps of least squares before the generations."""
     sigma: float = 0.5
     """First spread, in units of the search."""
     ease: int = 0
-    """Generations over which the foot's equilibrium goes from the planned one to its own: 0, at once."""
+    """Generations over which the rest angles change from the planned ones to those of `equilibrium`; 0: at once."""
     push_newton: float = 150.0
-    """Size of the pushes of the pushed walks [N]."""
+    """Size of the pushes in pushed walks [N]."""
     pushed_from: int = 0
-    """Generation from which on there are pushed walks."""
+    """First generation with pushed walks."""
     foreign: float = 1.0
-    """Price of the walks with springs that nobody tuned; at 0 they count for nothing."""
+    """Price of walks with springs that were not tuned for the candidate; 0 leaves them out."""
     pays: Pays = "likeness"
-    """What an undisturbed walk pays for: its distance from people, or the plan, or its own effort and impact."""
+    """Cost of an undisturbed walk: its distance from people or the plan, or its effort and impact."""
     impact: float = 1.0
-    """Price of impact over that of effort, where walks pay for them."""
+    """Price of impact over that of effort, with `--pays effort`."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
     """Threads of the physics."""
     keep: Literal["constants", "second", "front"] = "constants"
-    """Where what is found is kept: as the constants that walk; as those of a second search, or of one at another price,
-    beside them."""
+    """Where to write the result: as the constants that walk, or beside them as a second search or a search at another
+    price."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
     plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
@@ -95,7 +96,7 @@ class LegTuning(Study):
     people_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of people's data, in place of the package's."""
     log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
-    """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
+    """File of the costs of each generation: a search that was stopped goes on from it with the same bits."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 2, "refinements": 0}
     UNIT: ClassVar[str] = " steps"
@@ -119,10 +120,10 @@ class LegTuning(Study):
         return self.generations + self.refinements
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Search.
+        """Search, and write the constants.
 
-        Raises `SpringfootError`, with nothing written, for a file of another kind, and for constants to start from that
-        are not in it.
+        Raises `SpringfootError`, with nothing written, for a file of another kind, and for a `start` that the file does
+        not have.
         """
         settings = BipedSettings(
             equilibrium=self.equilibrium,
@@ -172,7 +173,7 @@ class LegTuning(Study):
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
     def _style(self, settings: BipedSettings) -> dict[str, Any] | None:
-        """Return the style of the plan that is followed; None where people are."""
+        """Return the style of the plan that the body follows; None if it follows people."""
         return least_work(self.speed, self.plan_file).to_json() if settings.follows_plan else None
 
     def _refined(
@@ -182,11 +183,11 @@ class LegTuning(Study):
         keep: Callable[[LegConstants], None],
         progress: OnProgress,
     ) -> tuple[LegConstants, list[float]]:
-        """Return the constants with the least squares of `leg_cost.all_misses` near `start`, and the length after each
+        """Minimise the squares of `leg_cost.all_misses` from `start`; return the constants, and their length after each
         step.
 
-        Damped Gauss-Newton (Levenberg-Marquardt). Derivatives are differences, all constants side by side, and so are
-        the steps that are tried, one for each damping and part: a walk is too rough to follow one alone.
+        Damped Gauss-Newton (Levenberg-Marquardt). One batch walks the finite differences of all constants, and one the
+        steps at all dampings, whole and in part: a walk scatters too much to follow a single step.
         """
         target = reference_walk_at(settings, settings.speed, [start]).target
         search = Search(start, settings.speed, target, placing=settings.follows_plan)
@@ -229,7 +230,7 @@ class LegTuning(Study):
         return search.constants(place), lengths
 
     def _keep(self, name: str, found: LegConstants) -> None:
-        """Write what was found so far, and the command that does, into the file of constants; with --quick nothing."""
+        """Write the best constants so far and this command into the file of constants; with --quick nothing."""
         if self.quick:
             return
         known = read_constants(self.constants)  # anew: another search may have written its own

@@ -1,10 +1,10 @@
-"""Finds the styles of `gait/plan/least_work.json`: CMA-ES on plans, without a simulation or a curve of people's.
+"""Find the styles of `gait/plan/least_work.json`: CMA-ES on plans, without a simulation and without people's curves.
 
     springfoot study plan-tuning --speed 1.2
 
-A plan has people's step length and time at a speed, as a planner may know them. All else is chosen by least effort of
-its own inverse dynamics (`springfoot.gait.plan.effort`), with the swing foot clear of the floor and joints within their
-range. The search begins at round numbers.
+A plan has people's step length and time at its speed. The search chooses everything else by the least effort of the
+plan's inverse dynamics (`springfoot.gait.plan.effort`), with the swing foot clear of the floor and joints within their
+range. It starts at round numbers.
 """
 
 import json
@@ -73,17 +73,17 @@ CHOICES: dict[str, tuple[float, float, float, float]] = {
     "via_pitch_3": (0.0, 0.15, -2.0, 1.0),
     "toe_swing": (0.0, 0.1, -0.3, 1.0),  # rad
 }
-"""What is chosen: where the search begins, one unit of it, the least and the largest value."""
+"""Choice of the search -> its start, one unit step, and its least and largest value."""
 GROUPS = {"via_forward": 3, "via_up": 3, "via_pitch": 3, "heel_rise": 2, "zmp_way": 2, "rise_again": 2}
-"""Of a style, the numbers that are chosen one by one."""
+"""Numbers of a style that have several entries -> how many."""
 LEAST_ADVANCE = 0.005
-"""Least part of its travel that the ZMP does in the second third of single support [-]; chosen."""
+"""Least fraction of its travel that the ZMP advances in the second third of single support [-]; chosen."""
 LEAST_CLEARANCE = 0.015
 """Least height of ball and heel in mid-swing [m at 1.70 m]; chosen, to clear uneven ground."""
 PER_METRE_LOW, PER_UNIT = 200.0, 10.0
-"""What a swing foot too low costs, and a choice outside its bounds squared; chosen."""
+"""Cost of a swing foot that is too low [1/m], and of a choice outside its bounds, squared; chosen."""
 IMPOSSIBLE = 30.0
-"""What a plan that cannot be costs, besides how far its choices are from the start; chosen."""
+"""Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
 
 def style_at(vector: NDArray) -> WalkStyle:
@@ -101,7 +101,7 @@ def style_at(vector: NDArray) -> WalkStyle:
 
 
 def vector_of(style: WalkStyle) -> NDArray:
-    """Return the vector of the search at a style of its own; the inverse of `style_at`."""
+    """Return the vector of the search for a style; the inverse of `style_at`."""
     values: dict[str, Any] = style.to_json()
     values |= values.pop("foot")
     values["zmp_from"], values["zmp_to"] = values.pop("zmp_travel")
@@ -116,7 +116,7 @@ def vector_of(style: WalkStyle) -> NDArray:
 def price(
     body: Body, speed: float, vector: NDArray, weights: tuple[float, ...] = PRICES, muscle: Muscle = AS_IS
 ) -> tuple[float, WalkPlan | None, Effort | None]:
-    """Return the cost of the plan at a vector, the plan and its effort; none for a plan that cannot be.
+    """Return the cost of the plan at a vector, the plan and its effort; None for both if the plan is impossible.
 
     `weights` are those of work, activation, its rate, and acceleration.
     """
@@ -142,14 +142,14 @@ def price(
 
 @dataclass(frozen=True, kw_only=True)
 class PlanTuning(Study):
-    """Find the way to walk of least effort by CMA-ES on plans, and write it into a file of styles."""
+    """Find the plan of least effort by CMA-ES, and write it into a file of styles."""
 
     speed: float = 1.2
     """Speed [m/s] at 1.70 m."""
     generations: int = 200
     """Generations of the search."""
     population: int = 20
-    """Candidates in each."""
+    """Candidates of each generation."""
     sigma: float = 0.5
     """First spread, in units of the search."""
     seed: int = 0
@@ -165,7 +165,7 @@ class PlanTuning(Study):
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
     """File of styles to write to."""
     log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
-    """File that keeps what each generation paid: a search that was stopped goes on from there, by the same bits."""
+    """File of the costs of each generation: a search that was stopped goes on from it with the same bits."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4}
     UNIT: ClassVar[str] = " generations"
@@ -186,7 +186,7 @@ class PlanTuning(Study):
         return self.generations
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Search."""
+        """Search, and write the style."""
         body = Body()
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         begin = np.zeros(len(CHOICES)) if self.start is None else vector_of(least_work(self.speed, self.start))
@@ -218,7 +218,7 @@ class PlanTuning(Study):
         return price(body, self.speed, vector, self.weights, muscle)
 
     def _keep(self, style: WalkStyle) -> None:
-        """Write what was found, and the command that did, into the file of styles; with --quick nothing."""
+        """Write the best style so far and this command into the file of styles; with --quick nothing."""
         if self.quick:
             return
         table = json.loads(self.styles.read_text(encoding="utf-8")) if self.styles.is_file() else {}

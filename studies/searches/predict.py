@@ -1,11 +1,11 @@
-"""A walk from body, plan and physics by one command: plan, legs that follow it, legs of least effort at three speeds,
-policy, and how it walks.
+"""Predict a walk from body, plan and physics by one command: plan, legs, policy, evaluation.
 
     springfoot study predict
 
-Nothing that was found before takes part: the plan's search begins at round numbers, that of leg constants at `generic`
-ones, the policy untrained. Of people it knows what docs/results/prediction.md lists. What each stage finds is kept in
-the folder `runs`; after a stop the same command goes on, with the bits of one that nothing interrupted.
+Legs first follow the plan, then walk with least effort at three speeds. No earlier result takes part: the search for
+the plan starts at round numbers, that for leg constants at `generic` ones, and the policy is untrained.
+docs/results/prediction.md lists the knowledge of people in it. Each stage keeps its result in the folder `runs`; after
+a stop the same command goes on, with the bits of an uninterrupted one.
 """
 
 import hashlib
@@ -36,27 +36,26 @@ from .plan_tuning import PlanTuning
 from .prediction_table import people_numbers, plan_numbers, prediction_table, walk_numbers
 
 FOUND = "found.json"
-"""In the folder, the plan's style and the leg constants: a `plan_file` of the settings."""
+"""File with the plan's style and the leg constants, a `plan_file` of the settings."""
 STAGE_PUSH = 100.0
-"""Size of the pushes of the third and fourth stage, of the training and of the second half of the evaluation [N];
-chosen."""
+"""Size of the pushes in stages three and four, in the training and in half of the evaluation [N]; chosen."""
 FIRST_SPREAD, EFFORT_SPREAD = 0.5, 0.6
-"""First spread of the second and third stage [units of the search]; chosen: the third leaves the walk that was planned,
-and from a narrower spread it stays in a dearer one."""
+"""First spread of stages two and three [units of the search]; chosen: stage three leaves the planned walk, and ends in
+a walk of more effort if it starts narrower."""
 OTHER_SPEEDS, OTHER_SPREAD, OTHER_UNPUSHED = (0.9, 1.5), 0.3, 60
-"""Of the fourth stage: its speeds [m/s], first spread, and generations without pushes; chosen: constants of 1.2 m/s
-alone fall at 1.4."""
+"""Speeds [m/s], first spread and generations without pushes of stage four; chosen: with the constants of 1.2 m/s alone
+the body falls at 1.4 m/s."""
 STAGES = tuple(f"{name}_generations" for name in ("plan", "walk", "effort", "push", "other"))
-"""Generations of the searches, in their order; the last for each of `OTHER_SPEEDS`."""
+"""Settings with the generations of the searches, in order; the last counts for each of `OTHER_SPEEDS`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Predict(WalkingStudy):
-    """Predict a walk from nothing: a plan of least effort, legs that follow it, and then walk by least effort
-    themselves, a policy; then evaluate."""
+    """Predict a walk from nothing: a plan of least effort, legs that follow it and then minimise effort, a policy,
+    numbers."""
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
-    """Folder in which each stage keeps what it finds; begun again, the command goes on there."""
+    """Folder in which each stage keeps its result; the same command goes on there after a stop."""
     plan_generations: int = 300
     """Generations of the first stage, the plan of least effort."""
     walk_generations: int = 100
@@ -64,10 +63,10 @@ class Predict(WalkingStudy):
     effort_generations: int = 300
     """Generations of the third stage, leg constants of walks of least effort and impact."""
     push_generations: int = 300
-    """Generations by which the third stage goes on with pushes."""
+    """Generations with pushes that continue the third stage."""
     other_generations: int = 100
-    """Generations of the fourth stage, leg constants of a slower and of a faster walk of least effort, from those of
-    1.2 m/s; of each."""
+    """Generations of the fourth stage, leg constants of least effort at a slower and a faster speed, each from those of
+    1.2 m/s."""
     population: int = 20
     """Candidates in each generation."""
     timesteps: int = PRESETS["predict"].timesteps
@@ -102,11 +101,11 @@ class Predict(WalkingStudy):
 
     @property
     def folder(self) -> Path:
-        """Where the stages keep what they find; with --quick, a folder of its own."""
+        """Return the folder of the stages; with --quick another one."""
         return self.runs.with_name(f"{self.runs.name}-quick") if self.quick else self.runs
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Go through the stages, or through what is left of them."""
+        """Run the stages that are not finished."""
         make_folder(self.folder)
         with owned(self.folder):
             return self._staged(progress)
@@ -181,7 +180,7 @@ class Predict(WalkingStudy):
         return Answer(text=f"{text}\n\n{spent}")
 
     def _train(self, settings: BipedSettings, out: Path) -> None:
-        """Train what is left of the training in `out`."""
+        """Run the rest of the training in `out`."""
         from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
 
         preset = PRESETS["predict"]

@@ -1,4 +1,4 @@
-"""What a predicted walk is held to, and the table of it: people, the plan alone, and walks that follow it."""
+"""List the criteria of a predicted walk, and make their table: people, the plan alone, walks that follow the plan."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -46,11 +46,11 @@ PREDICTION = (
     Criterion(name="double support off by [s]", path=("off", "double_support_s"), high=0.03, pattern=".3f"),
     Criterion(name="cost of transport", path=("cost_of_transport",), high=0.14, pattern=".3f"),
 )
-"""What a prediction is held to: near people by the likeness of published ones, at people's forces and effort."""
+"""Criteria of a predicted walk: angles as near to people as published predictions are, people's forces and effort."""
 
 
 def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the numbers of `PREDICTION` of a walk that was measured."""
+    """Return the numbers of `PREDICTION` from the metrics of a walk."""
     found = numbers(dict(metrics))
     settings = BipedSettings(speed=metrics["environment"]["speed"], height=metrics["environment"]["height"])
     support = found["double_support_s"]
@@ -60,18 +60,19 @@ def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
-    """Return the numbers of `PREDICTION` of the plan that `settings` follow, from its own inverse dynamics."""
+    """Return the numbers of `PREDICTION` for the plan of `settings`, from its inverse dynamics."""
     return numbers_of(reference_walk_at(settings, settings.speed).target, reference_gait(settings))
 
 
 def people_numbers(settings: BipedSettings) -> dict[str, Any]:
-    """Return the numbers of `PREDICTION` of people's mean curves."""
+    """Return the numbers of `PREDICTION` for people's mean curves."""
     human = reference_gait(settings)
     return numbers_of(human, human)
 
 
 def prediction_table(columns: Mapping[str, Mapping[str, Any]], held: Sequence[str]) -> str:
-    """Markdown: each of `PREDICTION` and its number in each column; in bold what a column of `held` misses."""
+    """Return the Markdown table of `PREDICTION`, a column for each walk; the columns in `held` show missed numbers in
+    bold."""
     lines = []
     for criterion in PREDICTION:
         cells = []
@@ -104,13 +105,13 @@ def _double_support(gait: HumanGait) -> float:
 
 
 def _positive_work(gait: HumanGait) -> float:
-    """Return of hip, knee and ankle of both legs in a stride over body weight [m]."""
+    """Return the positive work of hip, knee and ankle of both legs in a stride, over body weight [m]."""
     power = np.stack([gait.mean(f"{joint}_power", PERCENT / 100) for joint in ("hip", "knee", "ankle")])
     return 2 * float(stride_work(power, np.full(3, gait.stride_time))[0].sum()) / GRAVITY
 
 
 def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
-    """Return the numbers of `PREDICTION` of mean curves against people's; falls and speed are not known of them."""
+    """Return the numbers of `PREDICTION` for a gait's mean curves against people's; without falls and speed."""
     phase = PERCENT / 100
 
     def pair(name: str) -> tuple[Any, Any]:

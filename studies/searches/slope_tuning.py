@@ -1,10 +1,10 @@
-"""Finds what a slope adds to the legs' targets (`slope` in `envs/control/legs.json`): CMA-ES on walks up and down.
+"""Find the change of the legs' targets on a slope (`slope` in `envs/control/legs.json`): CMA-ES on walks up and down.
 
     springfoot study slope-tuning --generations 20
 
-Every candidate walks with the fixed schedule at each of `SLOPES_DEG`. It pays for falls, for speeds other than the
-commanded one, for reward lost against the same walk on level ground, and for heels that strike hard. What was found is
-then held against what it began with, on longer walks from other starts, and written only if it pays less there.
+Every candidate walks with the fixed schedule at each of `SLOPES_DEG`. Its cost counts falls, errors of speed, reward
+lost against the same walk on level ground, and hard heel strikes. The result is then compared with the start on longer
+walks from other seeds, and written only if it costs less there.
 """
 
 import json
@@ -33,17 +33,18 @@ from .kept_search import generations
 from .leg_walks import tally_from
 
 SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
-"""Walked on by every candidate."""
+"""Slopes that every candidate walks."""
 SETTLED = 2.0
-"""Speed and force are measured from here on [s]."""
+"""Time from which speed and force are measured [s]."""
 HEEL_STRIKE, HARD = 0.2, 1.5
-"""Phase of a leg before which force is its heel's, and body weights from which it is paid for."""
+"""Stride phase that ends the heel strike, and force of the heel from which it costs [body weights]."""
 FALL_COST = 60.0
-"""Cost of falling at once; one that comes later costs proportionally less, down to a third: more than a poor walk."""
+"""Cost of a fall at once, more than any poor walk; the cost of a later fall decreases with its time, to a third."""
 TOLERANCE = {"speed": 0.06, "reward": 0.1, "heel": 0.3}
-"""Error e [m/s, share of the level walk's reward, body weights] at which sqrt(1 + (e / tolerance)^2) - 1 costs 0.41."""
+"""Error e [m/s, fraction of the level walk's reward, body weights] at which the cost sqrt(1 + (e / tolerance)^2) - 1 is
+0.41."""
 JUDGED_WALKS, JUDGED_SECONDS = 16, 10.0
-"""Walks at each slope that judge what was found, and their length [s]."""
+"""Walks at each slope that decide on the result, and their length [s]."""
 
 
 def constants_of(vector: NDArray) -> SlopeConstants:
@@ -100,7 +101,7 @@ def _heel_peak(series: dict[str, NDArray], body: Body) -> float:
 
 
 def cost(walked: dict[str, NDArray], level_reward: float) -> float:
-    """Return what a candidate pays, averaged over its walks; `walked` comes from `walk`."""
+    """Return the cost of a candidate, averaged over its walks; `walked` comes from `walk`."""
     errors = {
         "speed": walked["speed"],
         "reward": 1.0 - walked["reward"] / level_reward,
@@ -112,24 +113,24 @@ def cost(walked: dict[str, NDArray], level_reward: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class SlopeTuning(Study):
-    """Find the constants for slopes by CMA-ES and write them into a file of constants, if they pay less there."""
+    """Find the constants for slopes by CMA-ES, and write them into a file of constants if they cost less there."""
 
     generations: int = 20
     """Generations of the search."""
     population: int = 12
-    """Candidates in each."""
+    """Candidates of each generation."""
     sigma: float = 0.2
-    """First spread, in the constants' own units."""
+    """First spread, in the units of the constants."""
     walks: int = 3
-    """Walks of a candidate at each slope."""
+    """Walks of each candidate at each slope."""
     seconds: float = 6.0
-    """Length of each [s]."""
+    """Length of each walk [s]."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
     """Threads of the physics."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
-    """File of constants to begin with and to write."""
+    """File of constants to start from and to write."""
 
     QUICK: ClassVar[dict[str, Any]] = {"generations": 1, "population": 4, "walks": 1, "seconds": 3.0}
     UNIT: ClassVar[str] = " generations"
@@ -147,7 +148,7 @@ class SlopeTuning(Study):
         return self.generations
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Search, judge what was found, and write it if it is better; with --quick never.
+        """Search, compare the result with the start, and write it if it is better; with --quick never.
 
         Raises `SpringfootError`, with nothing written, for another kind of file.
         """
@@ -182,7 +183,7 @@ class SlopeTuning(Study):
         return Answer(text=f"{told}\n{verdict}", files=files)
 
     def _keep(self, found: SlopeConstants) -> None:
-        """Write what was found, and the command that did, into the file of constants; with --quick nothing."""
+        """Write the constants and this command into the file of constants; with --quick nothing."""
         if self.quick:
             return
         table = read_constants(self.constants)  # anew: another search may have written its own
@@ -190,8 +191,7 @@ class SlopeTuning(Study):
         write_constants(self.constants, table)
 
     def _judge(self, constants: SlopeConstants) -> tuple[float, str]:
-        """Return the price of these constants on walks whose starts the search did not use, and a report of those
-        walks."""
+        """Return the cost of these constants on walks from seeds that the search did not use, and a report."""
         walks, seconds = (1, 3.0) if self.quick else (JUDGED_WALKS, JUDGED_SECONDS)
         seed = self.seed + 1_000_000
         level = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()

@@ -1,8 +1,8 @@
-"""What a simulated walk pays in a search that knows no other walk: effort, impact, and what it leaves of its task.
+"""Compute the cost of a simulated walk without another walk to follow: effort, impact, and errors of its task.
 
-The plan says where the CoM goes over the feet, at which speed and in how long a step; how the legs do it is then free,
-and effort (`springfoot.gait.plan.effort`) is that of the walk itself. Cost of transport, muscles' activity and impact
-are among the criteria that Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
+The plan gives the task: the CoM's course over the feet, speed and step time. The legs are then free to do it with least
+effort (`springfoot.gait.plan.effort`, of the walk itself). Cost of transport, muscle activity and impact are among the
+criteria that Veerkamp et al., J. Biomech. 123 (2021) 110530 weigh in planar predictions of gait.
 """
 
 import numpy as np
@@ -18,25 +18,25 @@ from springfoot.gait.plan import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_
 from .leg_walks import SETTLED, mean_speed
 
 ANGLE_CURVES = ("thigh_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg", "mtp_dorsiflexion_deg")
-"""The evaluation's curves of a leg's angles, thigh to the vertical."""
+"""The evaluation's curves of a leg's angles; the thigh's is to the vertical."""
 PER_EFFORT = 10.0
-"""Price of one unit of effort and impact; chosen, so that no walk pays as much as a fall."""
+"""Cost of one unit of effort and impact; chosen, so that every walk costs less than a fall."""
 TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "skipped": 0.01, "travel": 0.01, "unsteady": 0.05}
-"""What counts as one: of the speed [m/s], of the plan's stride time [-], of the CoM's place over the foot, root mean
-square over the stride [m], of the planned way that a leg skips as its foot lands [m], of the sole's way on the floor in
-a stance [m], of the SD of the vertical force over the strides of both legs [body weights]; chosen."""
+"""Units in which errors of the task count; chosen. Speed [m/s]; stride time over the plan's, less 1; place of the CoM
+over the foot, root mean square over the stride [m]; planned travel that a leg skips as its foot lands [m]; travel of
+the sole on the floor in a stance [m]; SD of the vertical force over the strides of both legs [body weights]."""
 PER_HELD, PER_MISS = 0.6, 0.01
-"""Price of one of these, and of one tolerance that the walk is off its plan; chosen: the plan then says which way to
-walk, and hardly how."""
+"""Cost of one unit of `TASK_TOLERANCE`, and of one tolerance of distance from the plan; chosen: the task counts, and
+the planned angles hardly."""
 
 
 def effort_price(
     series: dict[str, NDArray], tally: StrideTally, biped: Biped, missed: NDArray, impact: float = 1.0
 ) -> float:
-    """Return the price of one walk, of its series and their tally.
+    """Return the cost of one walk from its series and its tally.
 
-    `missed` is its distance from the plan [tolerances] (`leg_cost.misses`), `impact` the price of impact over that of
-    effort.
+    `missed` is the walk's distance from the plan [tolerances] (`leg_cost.misses`), `impact` the price of impact over
+    that of effort.
     """
     effort, landing, held = effort_and_impact(series, tally, biped)
     paid = effort.total + PER_DEGREE * effort.beyond_range + impact * landing
@@ -45,7 +45,8 @@ def effort_price(
 
 
 def impact_of(force: NDArray, tick: float) -> float:
-    """Mean square of `ACTIVATION_TIME` times the rate of a foot's force (T, 2) [body weights], both feet together."""
+    """Return the mean square of `ACTIVATION_TIME` times the rate of a foot's force (T, 2) [body weights], doubled for
+    both feet."""
     change = np.gradient(force, tick, axis=0)
     return float(2 * ACTIVATION_TIME**2 * (change**2).sum(-1).mean())
 
@@ -53,9 +54,11 @@ def impact_of(force: NDArray, tick: float) -> float:
 def effort_and_impact(
     series: dict[str, NDArray], tally: StrideTally, biped: Biped, settled: float = SETTLED
 ) -> tuple[Effort, float, dict[str, float]]:
-    """Return effort of the mean stride and impact (`impact_of`), means of both legs, and what `TASK_TOLERANCE` holds.
+    """Return the effort of the mean stride, the impact (`impact_of`), both means of the legs, and the errors of the
+    task.
 
-    `tally` is the evaluation's of the walk's `series` from `settled` [s] on.
+    The errors have the names of `TASK_TOLERANCE`. `tally` is the evaluation's, of the walk's `series` from `settled`
+    [s] on.
     """
     body = biped.body
     weight = body.mass * GRAVITY
