@@ -22,7 +22,7 @@ from springfoot.evaluation.recording.recording import Recording, load_recording,
 from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
 from springfoot.files.json_file import read_object
 from springfoot.files.tensor_file import DIGEST, read_tensors, write_tensors
-from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.people.contacts import PERCENT
 from springfoot.gait.people.human import COLUMNS, human_gait
 from springfoot.gait.people.own_data import OwnGait, read_gait
 from springfoot.gait.springs.foot_file import read_foot

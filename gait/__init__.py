@@ -4,13 +4,13 @@ from springfoot.errors import SpringfootError
 
 from .body.body import GRAVITY, Body
 from .body.leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
-from .people.cycle import PERCENT
+from .people.contacts import PERCENT
 from .people.human import HumanGait, human_gait
 from .people.own_data import OwnGait, read_gait
 from .plan.kinetics import foot_force, ground_reaction, planned_moments, projection_table
 from .plan.plan import WalkPlan, plan_walk
 from .springs.identification import PhaseSpring, identify
-from .springs.perturbation import PushedSpring, identify_pushed
+from .springs.identification_by_pushes import PushedSpring, identify_pushed
 from .springs.stiffness import StiffnessSchedule, schedule_from_curves, thesis_schedule
 
 __all__ = [

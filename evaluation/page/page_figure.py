@@ -13,7 +13,7 @@ from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import body_of
 from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts
+from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts
 
 from ..recording.recording import TICK, Recording
 from ..report.animation import clip_of

@@ -11,7 +11,7 @@ from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings.settings import body_of
 from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, find_contacts
+from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, find_contacts
 
 from ..numbers.per_leg import differ, kinds_of
 from ..recording.recording import TICK, WARM_UP, Recording

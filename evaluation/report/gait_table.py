@@ -15,7 +15,7 @@ from springfoot.errors import printable
 from springfoot.files.markdown import plus_minus, text_of
 from springfoot.gait import HumanGait
 from springfoot.gait.people import scores as score
-from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.people.contacts import PERCENT
 
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:

@@ -19,7 +19,7 @@ from springfoot.envs.settings.settings import body_of, reference_gait
 from springfoot.errors import SpringfootError
 from springfoot.files.digest import BLANK, SEAL, sealed
 from springfoot.files.writing import csv_text
-from springfoot.gait.people.cycle import PERCENT
+from springfoot.gait.people.contacts import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS
 
 from ..recording.open_loop import MEAN_KNOTS, decided, deciding_legs, mean_over_phase

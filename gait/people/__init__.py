@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .cycle import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
+    from .contacts import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
     from .human import HumanGait, human_gait
     from .own_data import read_gait
     from .scores import (
@@ -42,22 +42,22 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     __getattr__ = lazy_names(
         __name__,
         {
-            "CONTACT_THRESHOLD_BW": "cycle",
+            "CONTACT_THRESHOLD_BW": "contacts",
             "LOADING_END_PERCENT": "scores",
-            "PERCENT": "cycle",
+            "PERCENT": "contacts",
             "PUSH_OFF_BEGIN_PERCENT": "scores",
-            "Contacts": "cycle",
+            "Contacts": "contacts",
             "HumanGait": "human",
             "correlation": "scores",
-            "find_contacts": "cycle",
-            "find_steps": "cycle",
+            "find_contacts": "contacts",
+            "find_steps": "contacts",
             "force_features": "scores",
             "human_gait": "human",
             "mean_sd": "scores",
-            "on_percent": "cycle",
+            "on_percent": "contacts",
             "read_gait": "own_data",
             "rmse": "scores",
-            "sample": "cycle",
+            "sample": "contacts",
             "stride_work": "scores",
         },
     )

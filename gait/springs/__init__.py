@@ -7,7 +7,7 @@ from springfoot.lazy import lazy_names
 if TYPE_CHECKING:
     from .foot_file import read_foot
     from .identification import PhaseSpring, identify
-    from .perturbation import REACTS, SPRING, PushedSpring, identify_pushed
+    from .identification_by_pushes import REACTS, SPRING, PushedSpring, identify_pushed
     from .spring_fit import Estimate
     from .stiffness import LOWEST_STIFFNESS, SPRINGS, Segment, StiffnessSchedule
 
@@ -31,16 +31,16 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
         __name__,
         {
             "LOWEST_STIFFNESS": "stiffness",
-            "REACTS": "perturbation",
-            "SPRING": "perturbation",
+            "REACTS": "identification_by_pushes",
+            "SPRING": "identification_by_pushes",
             "SPRINGS": "stiffness",
             "Estimate": "spring_fit",
             "PhaseSpring": "identification",
-            "PushedSpring": "perturbation",
+            "PushedSpring": "identification_by_pushes",
             "Segment": "stiffness",
             "StiffnessSchedule": "stiffness",
             "identify": "identification",
-            "identify_pushed": "perturbation",
+            "identify_pushed": "identification_by_pushes",
             "read_foot": "foot_file",
         },
     )

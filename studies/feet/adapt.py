@@ -1,12 +1,12 @@
-"""How does a person walk who has adapted to a foot? Searches hips, knees and timing of both sides, for a given foot.
+"""Search how a person adapts to a foot: hips, knees and timing of both sides.
 
     springfoot study adapt --foot rigid
     springfoot study adapt --foot passive --design 1
     springfoot study adapt --foot '{"kind": "weak", "strength": 0.3}' --name "weak 30 %" --searches 1
 
-The foot is the right one. With --design 1 the numbers of its kind (stiffness, rest angles) are searched for together
-with the person; the stiffness of an adaptive foot begins as that of the passive one. CMA-ES on simulated walks, as in
-`leg_tuning`; what a candidate pays stands in `person_cost`.
+The foot is the right one. With --design 1 the search also moves the numbers of its kind (stiffness, rest angles); the
+stiffness of an adaptive foot starts as that of the passive one. CMA-ES on simulated walks, as in `leg_tuning`;
+`person_cost` computes the cost of a candidate.
 """
 
 import json
@@ -44,7 +44,7 @@ def kept_name(name: str, search: int) -> str:
 
 
 def beginning(foot: str | dict[str, Any], speed: float) -> Person:
-    """Return the person who has not adapted; an adaptive foot has the stiffness of a usual passive one."""
+    """Return the person before adaptation; an adaptive foot has the stiffness of a usual passive one."""
     tuned = leg_constants("planned", "people", speed)
     other = tuned
     setting = foot_setting("foot", foot)
@@ -61,7 +61,7 @@ class Adapt(Study):
     foot: FootFlag = "rigid"
     """The right foot: a kind, JSON or a file, as `--right-foot`."""
     name: str = ""
-    """What to call it; empty: its kind, and the speed where it is not 1.2 m/s."""
+    """Name of the foot in the file; empty: its kind, and the speed where it is not 1.2 m/s."""
     design: float = 0.0
     """Search the foot's numbers as well, in steps this many times those of the legs (a stiffness by 15 %, the ankle's
     rest angle by 1 degree, the toe's by 3); at 0 they stay."""
@@ -193,7 +193,7 @@ class Adapt(Study):
         return space.person(strategy.mean), lines
 
     def _keep(self, label: str, found: Person, last: bool) -> None:
-        """Write what was found so far and, at the `last`, the command that finds it; with --quick nothing."""
+        """Write the best person so far and, at the `last` generation, this command; with --quick nothing."""
         if self.quick:
             return
         known = read_feet(self.feet)  # anew: another search may have written its own

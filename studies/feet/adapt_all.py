@@ -1,8 +1,8 @@
-"""Every search for people who adapt to feet, anew, by the commands that stand beside what they found.
+"""Repeat every search for people who adapt to feet, by the commands kept beside their results.
 
     springfoot study adapt-all
 
-A search that was finished is not run again: the command may be stopped and begun anew.
+A finished search does not run again: the command may be stopped and started anew.
 """
 
 import shlex
@@ -30,7 +30,7 @@ class AdaptAll(Study):
     feet: Annotated[Path, tyro.conf.arg(metavar="FILE")] = ADAPTED_FEET
     """File whose commands are run, in its order."""
     to: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("runs/feet/adapted.json")
-    """File to write what is found into; what it has is not searched for again."""
+    """File to write the results into; searches whose results it has are left out."""
     first: int | None = None
     """Only so many of them, from the first; all unless given."""
 

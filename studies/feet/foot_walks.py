@@ -1,4 +1,4 @@
-"""Walks on feet that differ, and what a designer of feet asks of them."""
+"""Walk on different feet, and measure the numbers that a designer of feet asks for."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, r
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
 PUSH_NEWTON = 150.0
-"""Of the pushed walks [N]."""
+"""Size of the pushes in pushed walks [N]."""
 UNSEARCHED = 500
 """First evaluation seed. `adapt` uses seeds ending in 000, 001 and 002, so evaluation never reuses one."""
 SCHEDULE = "untrained", {"action_mode": "residual"}
@@ -34,7 +34,7 @@ class Asked(Told):
     """A number that a designer asks for."""
 
     better: int
-    """1 where more is better, -1 where less is."""
+    """1 if more is better, -1 if less is."""
 
 
 ASKED = (
@@ -45,7 +45,7 @@ ASKED = (
     Asked(key="cost_of_transport", label="cost of transport", pattern=".3f", better=-1),
     Asked(key="falls_pushed", label="falls, pushed", pattern=".2f", better=-1),
 )
-"""What the study of prostheses compares, all of the right foot but the sound side's force."""
+"""Numbers that the study of prostheses compares; all are of the right foot but the sound side's force."""
 
 
 TOLD = (
@@ -56,9 +56,9 @@ TOLD = (
     Told(key="toe_range_deg", label="toe °", pattern=".1f"),
     Told(key="beyond_stop", label="at a stop", pattern=".1%"),
 )
-"""What tables show of a walk."""
+"""Numbers that tables show of a walk."""
 NAMES = [each.key for each in TOLD]
-"""Of those, part of what is kept under: where another number is told, walks are measured anew."""
+"""Keys of these numbers. Kept results are filed under them too, so that a new number measures the walks again."""
 ABOUT_STOPS = (
     "At a stop: share of time in which a joint of either leg is beyond its stop, which then carries load, in episodes "
     "without a fall."
@@ -66,7 +66,7 @@ ABOUT_STOPS = (
 
 
 def numbers_of(gait: Gait) -> dict[str, float | None]:
-    """Return the numbers of an undisturbed walk, by their names in the CSV files; None where nothing walks."""
+    """Return the numbers of an undisturbed walk, by their names in the CSV files; None if no stride was measured."""
     metrics = gait.metrics
     tally = gait.tally
     sound, other = leg_numbers(tally).values()
@@ -98,10 +98,10 @@ def _sum(values: Any) -> float | None:
 def walked(
     policy: str, given: Mapping[str, Any], push_newton: float = PUSH_NEWTON, **how: Any
 ) -> dict[str, float | None]:
-    """`numbers_of` a policy's walk, `beyond_stop`, and `falls_pushed` [0..1] of the same episodes pushed; `how` as for
-    `record`.
+    """Return `numbers_of` a policy's walk, its `beyond_stop`, and `falls_pushed` [0, 1] of the same episodes under
+    pushes.
 
-    Episodes in which it falls count until they fall.
+    Episodes that end in a fall count until the fall. `how` is passed to `record`.
     """
     found: dict[str, float | None] = {}
     for push in (0.0, push_newton):
@@ -115,15 +115,17 @@ def walked(
 
 
 def beyond_stop(recording: Recording) -> float | None:
-    """Share of time after `WARM_UP` in which a joint of either leg is beyond its stop, of the episodes without a fall;
-    None of no time."""
+    """Return the fraction of time after `WARM_UP` in which a joint of either leg is beyond its stop; None for no time.
+
+    Episodes that end in a fall are left out.
+    """
     low, high = np.deg2rad(JOINT_RANGE_DEG).T
     angle = recording.series["angle"][recording.fall_reason == "", round(WARM_UP / TICK) :]
     return float(((angle < low) | (angle > high)).any((-2, -1)).mean()) if angle.size else None
 
 
 def for_body(foot: Mapping[str, Any], height: float, mass: float) -> dict[str, Any]:
-    """Return the foot for another body: its own springs as much stiffer as the body's mass x height is larger."""
+    """Return the foot for another body: its springs scale with the body's mass x height."""
     ratio = height * mass / (REFERENCE_HEIGHT * REFERENCE_MASS)
     stiff = {
         key: round(float(np.clip(value * ratio, SPRING_NUMBERS[key].low, SPRING_NUMBERS[key].high)), 3)

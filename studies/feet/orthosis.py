@@ -1,11 +1,12 @@
-"""Springs beside the right ankle: which helps a weak calf, and which a drop foot.
+"""Find the spring beside the right ankle that helps a weak calf, and the one that holds a drop foot.
 
     springfoot study orthosis
 
-Nobody adapts here: legs and both feet's stiffness are those of sound feet (`pretrained`), so that all that changes is
-the muscle and the spring. The stiffness of an orthosis is in N m/deg, as Waterval et al. (2019) measured them. A weak
-calf slows the walk, each spring by another bit, and what a metre takes depends on speed: everybody is asked for several
-speeds, and energy is compared where they walk equally fast. Last, two people who did adapt, and have no orthosis.
+Nobody adapts here: legs and the stiffness of both feet are those of sound feet (`pretrained`), so that only the muscle
+and the spring change. The stiffness of an orthosis is in N m/deg, as Waterval et al. (2019) measured it. A weak calf
+slows the walk, and each spring slows it by another amount, while the energy for a metre depends on speed. So each walk
+is commanded several speeds, and energies are compared at equal walked speeds. Last come two people who have adapted to
+such a foot, without an orthosis.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,23 +41,23 @@ PER_DEG = 180.0 / np.pi
 WEAK_SPRINGS = (0.0, 0.9, 1.8, 2.7, 3.6, 4.9, 6.2, 7.4, 8.7)
 """Stiffness of an orthosis for a weak calf [N m/deg]; Waterval et al. (2019) tried 0.9 to 8.7."""
 STRENGTHS = (0.2, 0.25, 0.3)
-"""Strength of the calf over the most that the model's sound one can give; a sound walk at 1.2 m/s asks for 0.4."""
+"""Strength of the calf as a fraction of the model's sound one; a sound walk at 1.2 m/s uses 0.4."""
 MASSES = (50.0, 63.0, 80.0)
-"""[kg] at 1.70 m."""
+"""Masses of the bodies [kg], all 1.70 m tall."""
 ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6, 1.8)
-"""For which a walk with a weak calf is asked [m/s]."""
+"""Commanded speeds of walks with a weak calf [m/s]."""
 WALKED_SPEEDS = (0.8, 1.1, 1.4)
-"""At which, walked, springs are compared [m/s]; between two speeds that are walked energy is linear."""
+"""Walked speeds at which springs are compared [m/s]; energy is interpolated linearly between two walks."""
 DROP_SPEEDS = (0.8, 1.2, 1.6)
-"""For which a walk with a drop foot is asked [m/s]."""
+"""Commanded speeds of walks with a drop foot [m/s]."""
 WHO_ADAPTED = ("weak, 20 %", "drop")
 """Names of the committed people who have adapted to such a foot."""
 SWING_SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
 """Stiffness of an orthosis for a drop foot [N m/rad]."""
 SWING_RESTS = (-5.0, 0.0, 5.0, 10.0)
-"""Its rest angle, dorsiflexion positive [deg]."""
+"""Rest angle of an orthosis for a drop foot, dorsiflexion positive [deg]."""
 EFFICIENCY = {"positive": 0.25, "negative": 1.2}
-"""Mechanical work of muscles over the energy it takes (Margaria 1968, Int. Z. angew. Physiol. 25:339)."""
+"""Mechanical work of muscles over their energy (Margaria 1968, Int. Z. angew. Physiol. 25:339)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +67,11 @@ class Orthosis(WalkingStudy):
     episodes: int = 5
     """Episodes of each spring and speed with a weak calf."""
     episodes_drop: int = 10
-    """The same with a drop foot, and as many pushed."""
+    """Episodes of each spring and speed with a drop foot, undisturbed, and as many pushed."""
     seconds: float = 12.0
-    """Length of each."""
+    """Length of each episode."""
     policy: str = "pretrained"
-    """Who sets the stiffness of both feet."""
+    """Policy that sets the stiffness of both feet."""
     push_newton: float = 150.0
     """Pushes of the walks with a drop foot [N]."""
     keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
@@ -142,7 +143,7 @@ class Orthosis(WalkingStudy):
         return rows
 
     def _adapted(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
-        """Walk on the feet of `WHO_ADAPTED`, without and with a person who has adapted."""
+        """Walk on the feet of `WHO_ADAPTED`, with the legs of sound feet and with the adapted person's."""
         rows = []
         for name in self._people():
             bare = without_person(committed_feet()[name])
@@ -175,7 +176,7 @@ class Orthosis(WalkingStudy):
     def _walk(
         self, kept: Kept, given: Mapping[str, Any], feet: Sequence[dict[str, Any]], progress: OnProgress
     ) -> list[dict[str, Any]]:
-        """Return the numbers of each of the right `feet`, the same episodes for each."""
+        """Return the numbers of a walk on each of the right `feet`, all on the same episodes."""
 
         def make() -> dict[str, Any]:
             acting, settings = prepare(self.policy, {**given, "episode_seconds": self.seconds})
@@ -189,9 +190,10 @@ class Orthosis(WalkingStudy):
 
 
 def muscle_energy(recording: Recording) -> float | None:
-    """Energy that muscles take [J/kg/m] after `WARM_UP`: work of every joint without the orthosis's, by `EFFICIENCY`.
+    """Compute the energy of the muscles after `WARM_UP` [J/kg/m]: work of every joint less the orthosis's, by
+    `EFFICIENCY`.
 
-    The right ankle's is of the mean torque and the change of angle of each 10 ms; None without progress.
+    The right ankle's work is the mean torque times the change of angle in each 10 ms. Returns None without progress.
     """
     settings = recording.settings
     first = round(WARM_UP / TICK)
@@ -230,10 +232,10 @@ COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#555555")
 
 
 def at_walked_speeds(rows: Sequence[Row], speeds: Sequence[float]) -> list[dict[str, Any]]:
-    """Rows of the same form for `speeds` that are walked [m/s], not asked for.
+    """Return rows like `rows`, for walked `speeds` [m/s] in place of commanded ones.
 
-    The energy of each spring is linear between two speeds asked for, next to each other, at which nobody falls; with a
-    spring that reaches a speed nowhere everybody falls there.
+    The energy of a spring is linear between two neighbouring commanded speeds without a fall. A spring that reaches a
+    speed nowhere counts as falling there.
     """
     found = []
     keys = ("mass_kg", "strength", "spring_Nm_deg")
@@ -259,8 +261,11 @@ def _energy_at(speed: float, slow: Row, fast: Row) -> float | None:
 
 
 def best_springs(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return of the springs with which nobody falls, for each body, speed and strength: that with which muscles take
-    least energy for a metre, by how much the worst of them takes more, and that which slows the walk least."""
+    """Return the best spring without a fall for each body, speed and strength.
+
+    A row has the spring of least energy for a metre, the energy that the worst one takes more, and the spring that
+    slows the walk least.
+    """
     found = []
     for cell in _cells(rows):
         walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row["energy_J_kg_m"] is not None]
@@ -286,8 +291,11 @@ def _of(rows: Sequence[Row], cell: tuple[float, ...]) -> list[Row]:
 
 
 def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row], what_ran: str) -> str:
-    """Return the section of the weak calf: all `rows`, and `best_springs` where people walk, and where they are asked
-    to walk, equally fast."""
+    """Return the report's section on the weak calf.
+
+    `rows` are the walks, `best` the best springs at equal walked speeds, `as_asked` those at equal commanded speeds,
+    and `what_ran` tells the numbers of walks.
+    """
     speeds = sorted({row["speed_m_s"] for row in best})
     lines = []
     for strength in sorted({row["strength"] for row in best}):
@@ -328,8 +336,10 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
 
 
 def directions(best: Sequence[Row], column: str) -> str:
-    """Return whether a stiffness of `best_springs` rises with weakness, mass and speed, in words: over all cells, and
-    in pairs of cells that differ in nothing else."""
+    """Return, in words, whether the best stiffness rises with weakness, mass and speed.
+
+    Counted over all cells (body, speed and strength), and in pairs of cells that differ in that quantity alone.
+    """
     known = [row for row in best if row[column] is not None]
     told = []
     for name, label, sign in (("strength", "weakness", -1), ("mass_kg", "mass", 1), ("speed_m_s", "speed", 1)):
@@ -352,7 +362,7 @@ def directions(best: Sequence[Row], column: str) -> str:
 
 
 def at_the_ends(best: Sequence[Row], springs: Sequence[float]) -> str:
-    """In how many cells, at each speed, the best of the `springs` is the stiffest or the weakest of them, in words."""
+    """Return, in words, in how many cells of each speed the best spring is the weakest or the stiffest of `springs`."""
     told = []
     for speed in sorted({row["speed_m_s"] for row in best}):
         own = [row["best_Nm_deg"] for row in best if row["speed_m_s"] == speed]
@@ -361,7 +371,7 @@ def at_the_ends(best: Sequence[Row], springs: Sequence[float]) -> str:
 
 
 def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
-    """Return the weakest spring with which, and with all stiffer ones of its rest angle, none falls."""
+    """Return the weakest spring with which nobody falls, nor with any stiffer spring of the same rest angle."""
     cures = []
     for rest in sorted({row["rest_deg"] for row in rows}):
         own = sorted((row for row in rows if row["rest_deg"] == rest), key=lambda row: -row["spring_Nm_rad"])
@@ -375,7 +385,7 @@ def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
 
 
 def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: float) -> str:
-    """Return the section of the drop foot; each cell is of `episodes`."""
+    """Return the report's section on the drop foot; each cell has this many `episodes`."""
     parts = []
     for speed in dict.fromkeys(row["speed_m_s"] for row in rows):
         here = [row for row in rows if row["speed_m_s"] == speed]
@@ -408,7 +418,7 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
 
 
 def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
-    """Return the section of people who adapted; nothing where there are none."""
+    """Return the report's section on people who adapted; empty if there are none."""
     head = ["right foot", "person", *(each.label for each in TOLD)]
     lines = [
         [row["foot"], row["person"], *(_unless_all_fall(row, each.key, each.pattern) for each in TOLD)] for row in rows
@@ -430,7 +440,7 @@ def _cell(row: Row) -> str:
 
 
 def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
-    """Write the picture: energy over stiffness, a panel a speed walked at the middle mass, a line a strength."""
+    """Draw energy over stiffness: a panel for each walked speed at the middle mass, a line for each strength."""
     masses = sorted({row["mass_kg"] for row in rows})
     mass = masses[len(masses) // 2]
     speeds = sorted({row["speed_m_s"] for row in rows})
@@ -455,7 +465,8 @@ def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
 
 
 def draw_drop(path: Path, rows: Sequence[Row]) -> None:
-    """Write the maps: toe clearance over stiffness and rest angle, a panel a speed, crosses where someone falls."""
+    """Draw maps of toe clearance over stiffness and rest angle, a panel for each speed, crosses where an episode
+    falls."""
     speeds = list(dict.fromkeys(row["speed_m_s"] for row in rows))
     stiffness, rests = (sorted({row[name] for row in rows}) for name in ("spring_Nm_rad", "rest_deg"))
     with matplotlib.rc_context(STYLE):

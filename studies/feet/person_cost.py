@@ -1,6 +1,6 @@
-"""What a person pays in the search of `adapt`: falls, then speed, symmetry, force peaks, effort, and how odd it looks.
+"""Compute the cost of a person in the search of `adapt`: falls, speed, symmetry, force peaks, effort, odd posture.
 
-Every candidate walks with its own fixed schedule at its sound foot, from random starts, undisturbed and pushed.
+Every candidate walks with its fixed schedule at the sound foot, from random starts, undisturbed and pushed.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ TOLERANCE = {
     "pitch": np.deg2rad(3.0),  # of the trunk, root mean square
     "bend": np.deg2rad(2.0),  # range of the right toe beyond what is allowed
 }
-"""What counts as one; chosen."""
+"""Unit in which each distance counts; chosen."""
 
 
 def cost(
@@ -49,8 +49,11 @@ def cost(
     bend: float | None = None,
     bend_weight: float = 1.0,
 ) -> NDArray:
-    """Return (C,) what each person pays; `push` [N]; the range of the right toe beyond `bend` [rad], if given, costs
-    too, `bend_weight` times."""
+    """Return the cost of each person, (C,).
+
+    `push` is the size of the pushes [N]. With `bend` [rad] a right toe that moves through a larger range costs too,
+    `bend_weight` times.
+    """
     settings = replace(settings, unevenness_m=UNEVENNESS, action_mode="residual")
     legs = [p.sound for p in people]
     right = [p.other for p in people]

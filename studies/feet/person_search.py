@@ -1,4 +1,4 @@
-"""The person who adapts to a foot, and the foot's own numbers, as a vector that a search moves."""
+"""Turn a person who adapts to a foot, and the foot's own numbers, into a vector that a search moves."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -16,19 +16,19 @@ from ..searches.leg_search import GAIN_STEP, Search
 OF_MUSCLES = ("ankle_knots_deg", "toe_flat_deg", "ankle_schedule", "toe_schedule")
 """Constants that a leg whose ankle and toe are devices does not read."""
 NEVER = ("neutral_deg",)
-"""Those that no leg reads with planned springs."""
+"""Constants that no leg reads with planned springs."""
 ANGLE_STEP = {"ankle_deg": 1.0, "toe_deg": 3.0}
 """One unit of the search for a foot's rest angle [deg]; for a stiffness it is `GAIN_STEP`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Person:
-    """A candidate: leg constants of both sides, and the foot to which they belong."""
+    """Candidate of a search: leg constants of both sides, and their foot."""
 
     sound: LegConstants
     other: LegConstants
     foot: str | dict[str, Any]
-    """A setting, without `adapted`."""
+    """The foot as a setting, without `adapted`."""
 
     @property
     def feet(self) -> Feet:

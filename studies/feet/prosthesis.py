@@ -1,13 +1,13 @@
-"""The worth of a right foot to the person who wears it: rigid, a passive spring, adaptive, intact.
+"""Compare right feet by the walk of the person who wears them: rigid, a passive spring, adaptive, intact.
 
     springfoot study prosthesis
     springfoot study prosthesis --train
 
 The feet and the people who have adapted to them are the committed ones of `springfoot study adapt`, two independent
-searches of each kind at the same budget: of the passive foot stiffness and rest angles too, of the adaptive one its
-schedule and rest angles. With --train a policy learns on each, from several seeds, as factors on the schedule that
-the search found; it sets the stiffness of the sound foot, and of the right one where that is adaptive. Walks for which
-nothing was trained are told in groups of episodes, for their spread.
+searches of each kind at the same budget. The search also moved stiffness and rest angles of the passive foot, and
+schedule and rest angles of the adaptive one. With --train a policy learns on each foot, from several seeds, as factors
+on the schedule that the search found; it sets the stiffness of the sound foot, and of the right foot if that is
+adaptive. Walks without a trained policy are shown in groups of episodes, for their spread.
 """
 
 import hashlib
@@ -43,44 +43,44 @@ from .adapt import kept_name
 from .foot_walks import ABOUT_STOPS, ASKED, NAMES, PUSH_NEWTON, SCHEDULE, TOLD, UNSEARCHED, Asked, for_body, walked
 
 WORN = ("rigid", "passive", "adaptive")
-"""Feet that were adapted to."""
+"""Feet with people who have adapted to them."""
 TRAINED = ("passive", "adaptive")
-"""Those on which policies learn."""
+"""Feet on which policies learn."""
 SEARCHES = (1, 2)
 BODIES = ((REFERENCE_HEIGHT, REFERENCE_MASS), (1.55, 50.0), (1.85, 90.0))
 """Height [m] and mass [kg]."""
 PLACES = (*((body, TUNED_SPEED) for body in BODIES), (BODIES[0], 0.8), (BODIES[0], 1.6))
-"""Bodies, and speeds [m/s]; the first was searched for and trained on."""
+"""Bodies and speeds [m/s] to walk at; searches and trainings were at the first."""
 STEPS = 150_000
-"""Environment steps of each training, from the schedule of the search on."""
+"""Environment steps of each training, which starts from the schedule of the search."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prosthesis(TrainingStudy):
-    """Walk on each foot, with legs that have not adapted, legs that have, and policies trained on them."""
+    """Walk on each foot: with legs that have not adapted, with legs that have, and with policies trained on them."""
 
     episodes: int = 20
     """Episodes of each walk, undisturbed, and as many pushed."""
     groups: int = 5
-    """Groups in which those of a walk without training are told, in place of seeds of trainings."""
+    """Groups of episodes that show the spread of walks without training."""
     seconds: float = 12.0
-    """Length of each."""
+    """Length of each episode."""
     seed: int = UNSEARCHED
-    """Seed of the first episode; no search has walked these."""
+    """Seed of the first episode; no search has walked from these seeds."""
     seeds: int = 5
     """Seeds of the trainings."""
     episodes_elsewhere: int = 4
-    """Episodes of each walk of other bodies and speeds."""
+    """Episodes of each walk with another body or speed."""
     seeds_elsewhere: int = 1
     """Seeds of the trainings that walk there."""
     timesteps: int | None = STEPS
     """Steps of 20 ms of each training."""
     train: bool = False
-    """Train what is missing and keep it in `policies`."""
+    """Train missing policies and keep them in `policies`."""
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/feet/trainings")
     """Folder of the trainings."""
     policies: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("docs/feet")
-    """Folder of their policies, KIND-SEARCH-SEED.safetensors."""
+    """Folder of the trained policies, KIND-SEARCH-SEED.safetensors."""
     keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """File in which each row's numbers are kept, to go on after a stop."""
 
@@ -97,11 +97,11 @@ class Prosthesis(TrainingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls, of what is not kept."""
+        """Simulated seconds without falls, of the rows that are not kept."""
         return 2.0 * self.seconds * sum(self._how(row)["episodes"] for row, _, _ in self._rows())
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Train what is asked for and missing, and walk."""
+        """Train missing policies if asked to, and walk."""
         failed = self._train() if self.train else False
         kept = Kept(self.keep)
         rows = []
@@ -124,7 +124,7 @@ class Prosthesis(TrainingStudy):
         return Answer(text="\n\n".join(text.values()), files=files, failed=failed)
 
     def _how(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Return how the episodes of a row are recorded."""
+        """Return the arguments of `record` for the episodes of a row."""
         if not (_here(row) or row["asked_m_s"] == _held_speed()):
             return {**self.how, "episodes": self.episodes_elsewhere}
         if row["person"] == WITH_POLICY:
@@ -133,10 +133,8 @@ class Prosthesis(TrainingStudy):
         return {**self.how, "episodes": each, "seed": self.seed + each * row["seed"]}
 
     def _rows(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Return the labels of a row, its policy, and its settings.
-
-        `seed` is that of a training, or a group of episodes.
-        """
+        """Yield the labels of each row, its policy and its settings; the label `seed` is a training's, or a group of
+        episodes."""
         feet = committed_feet()
         quick = self.quick
         for (height, mass), speed in PLACES[: 1 if quick else None]:
@@ -167,7 +165,7 @@ class Prosthesis(TrainingStudy):
         yield from self._held()
 
     def _held(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Return the rigid foot whose toe is held, and the passive feet, at the speed at which it was found."""
+        """Yield the rigid foot with a held toe, and the passive feet, at the speed of the held toe's search."""
         if (speed := _held_speed()) is None:
             return
         (height, mass), feet = BODIES[0], committed_feet()
@@ -201,7 +199,7 @@ class Prosthesis(TrainingStudy):
 
 
 def _here(where: Mapping[str, Any]) -> bool:
-    """Return whether a row is of the body and the speed that was searched for and trained on."""
+    """Tell whether a row has the body and the speed of the searches and trainings."""
     return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
 
 
@@ -215,7 +213,7 @@ def _row(foot: str, person: str, where: Mapping[str, float], search: int | str, 
 
 
 def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
-    """Preset `walk` on the adapted foot of that name, its stiffness factors on the schedule of the search."""
+    """Return the preset `walk` on the adapted foot `name`, with stiffness as factors on the schedule of its search."""
     if name not in committed_feet():
         raise SpringfootError(f"no adapted foot {name!r}; there are {', '.join(committed_feet())}")
     preset = PRESETS["walk"]
@@ -229,7 +227,7 @@ def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
 
 
 def _digest(policy: str, given: Mapping[str, Any]) -> str:
-    """Return of the policy's file, and of the legs and the foot that go by a name."""
+    """Return a digest of the policy's file, and of the legs and the foot that its settings name."""
     path = Path(policy)
     foot = given.get("right_foot")
     name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
@@ -238,23 +236,23 @@ def _digest(policy: str, given: Mapping[str, Any]) -> str:
 
 
 NOT_ADAPTED, ADAPTED_ALONE, WITH_POLICY = "not adapted", "adapted", "adapted, trained"
-"""Whose walk a row is: of legs as with sound feet, sound side by `pretrained`; of the legs found, by their own
-schedule; the same by a trained policy."""
+"""Kinds of rows: legs of sound feet, the sound side's stiffness by `pretrained`; adapted legs with their own schedule;
+the same legs with a trained policy."""
 TOE_HELD = "rigid, toe held"
-"""The committed rigid foot of a person who was made to hold its toe; they walk at a speed of their own."""
+"""Committed rigid foot whose person was searched for with a held toe, at a speed of its own."""
 WHERE = ("height_m", "mass_kg", "asked_m_s")
 COLORS = {"intact": "#555555", "rigid": "#7a5195", "passive": "#c26a1b", "adaptive": "#0b6e8f"}
 Row = Mapping[str, Any]
 
 
 def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the changes of adaptive stiffness against the passive spring found, by place, person, number and search.
+    """Return the changes that adaptive stiffness brings over the passive spring, by place, person, number and search.
 
-    Pairs are of the same seed of the trainings, or of the same episodes where nobody learned.
+    Pairs have the same seed of the trainings or, without training, the same episodes.
 
-    `share` is that change over the gap between the passive and the intact foot; where the intact one is not better,
-    or by no more than the interval of the gap over the pairs, there is no gap to close and no share. Of `both` searches
-    the intervals are over the means of each, as what a search finds differs more than what a seed does.
+    `share` is the change over the gap between the passive and the intact foot. There is no share where the intact foot
+    is not better, or better by no more than the gap's interval over the pairs. The intervals of `both` searches are
+    over the means of each search, as searches differ more than seeds.
     """
     found = []
     for where in dict.fromkeys(_place(row) for row in rows):
@@ -269,7 +267,7 @@ def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list[dict[str, Any]]:
-    """Return of each search by itself, and of both."""
+    """Return the changes of each search by itself, and of both."""
     known = [row[asked.key] for row in rows if row["foot"] == "intact" and row[asked.key] is not None]
     intact = float(np.mean(known)) if known else None
     pairs = {each: pairs_of(rows, (("passive", each), ("adaptive", each)), asked.key) for each in searches}
@@ -284,14 +282,17 @@ def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list
 
 
 def pairs_of(rows: Sequence[Row], worn: Sequence[tuple[str, Any]], key: str) -> np.ndarray:
-    """Return (n, 2) a number of two feet, each with its search, in pairs of the same `seed` in which both have it."""
+    """Return (n, 2) a number of two feet, each with its search, in pairs of the same `seed`."""
     of = [{row["seed"]: row[key] for row in rows if (row["foot"], row["search"]) == each} for each in worn]
     pairs = [(of[0][seed], of[1][seed]) for seed in of[0] if seed in of[1]]
     return np.array([pair for pair in pairs if None not in pair], float).reshape(-1, 2)
 
 
 def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = False) -> dict[str, float | None]:
-    """As `share_rows` tells; of `few` pairs, the means of searches, each must have a gap, as no interval can tell."""
+    """Return mean, interval and share of a change, as `share_rows` describes.
+
+    With `few` pairs, the means of searches, each pair must have a gap, as an interval cannot tell.
+    """
     names = ("passive", "adaptive", "intact", "change", "change_low", "change_high", "share", "share_low", "share_high")
     found: dict[str, float | None] = dict.fromkeys(names)
     if not len(pairs):
@@ -311,7 +312,10 @@ def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = Fa
 
 
 def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, str], policies: Path) -> dict[str, str]:
-    """Sections of the page; `ran`: what was walked at the first place, at the others, how long was learned."""
+    """Return the sections of the report, by heading.
+
+    `ran` describes the walks at the first place, the walks elsewhere, and the length of the trainings.
+    """
     first = _place(rows[0])
     here = [row for row in rows if _place(row) == first]
     note = (
@@ -366,7 +370,7 @@ def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
 
 
 def _passive_against(rows: Sequence[Row], foot: str) -> str:
-    """In which numbers the passive feet found are better, person adapted to both; a foot with searches by search."""
+    """Return, in words, the numbers in which the passive feet beat `foot`, people adapted to both, search by search."""
     own = [row for row in rows if row["person"] == ADAPTED_ALONE]
     told = []
     theirs = {row["search"] for row in own if row["foot"] == foot}
@@ -440,7 +444,7 @@ def _where(where: Sequence[float]) -> str:
 
 
 def draw(path: Path, rows: Sequence[Row]) -> None:
-    """Write the picture: each number of each foot at the first place, a point a walk."""
+    """Draw each number of each foot at the first place, a point for each walk."""
     first = tuple(rows[0][name] for name in WHERE)
     here = [row for row in rows if _place(row) == first]
     places = [

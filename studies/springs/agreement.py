@@ -1,10 +1,10 @@
-"""Do seeds agree? The springs of several policies over the stride, and which criteria of a human-like walk each misses.
+"""Compare the springs of several policies over the stride, and the criteria of a human-like walk that each misses.
 
     springfoot study agreement runs/five/seed-0 runs/five/seed-1 runs/five/seed-2
 
-Stiffness alone is not identified (`springfoot.studies.springs.any_stiffness`), so K stands beside the equilibrium and
-the torque. K of a joint is judged where that joint carries load, by its coefficient of variation (SD / mean) over the
-policies.
+An undisturbed gait does not identify stiffness (`springfoot.studies.springs.any_stiffness`), so K stands beside the
+rest angle and the torque. Agreement on K is judged where the joint carries load, by the coefficient of variation (SD /
+mean) over the policies.
 """
 
 from collections.abc import Sequence
@@ -34,9 +34,9 @@ from ..base.columns import OPEN_LOOP, falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 LOADED = 0.1
-"""A joint carries load where its moment is beyond this share of its largest."""
+"""A joint carries load where its moment is beyond this fraction of its largest."""
 MOST = 0.15
-"""Coefficient of variation of K over seeds up to which they agree, wherever the joint carries load."""
+"""Largest coefficient of variation of K under load at which policies agree."""
 SPRING_COLUMNS = {
     "ankle": ("ankle_stiffness_Nm_per_rad", "ankle_equilibrium_deg", "ankle_moment_Nm_per_kg"),
     "toe": ("toe_stiffness_Nm_per_rad", "mtp_equilibrium_deg", "mtp_moment_Nm_per_kg"),
@@ -70,18 +70,21 @@ class Agreement:
 
     @property
     def worst(self) -> tuple[float, int]:
-        """Largest coefficient of variation under load, and its percent of the stride."""
+        """Return the largest coefficient of variation under load, and its percent of the stride."""
         percent = int(np.where(self.loaded, self.variation, -1.0).argmax())
         return float(self.variation[percent]), percent
 
     @property
     def agree(self) -> bool:
-        """Whether the policies do, at every percent under load."""
+        """Tell whether the policies agree at every percent under load."""
         return self.worst[0] <= MOST
 
 
 def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
-    """Ankle and toe of two gaits or more; raises `SpringfootError` for fewer, and for one without strides."""
+    """Return the agreement of two gaits or more on ankle and toe.
+
+    Raises `SpringfootError` for fewer gaits, and for a gait without strides.
+    """
     _require_two(len(gaits))
     if idle := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
         raise SpringfootError(f"{idle[0]} walks no strides to compare")
@@ -98,7 +101,7 @@ def _require_two(policies: int) -> None:
 
 
 def agreement_table(found: Sequence[Agreement]) -> str:
-    """Markdown: how far the springs of each joint vary over the policies where it carries load."""
+    """Return the Markdown table of the variation of each joint's springs where it carries load."""
     head = ["joint", "carries load at", "CV of K: mean", "95th percentile", "worst", f"≤ {100 * MOST:.0f} %"]
     head += ["SD of θ_eq: mean, worst", "SD of torque / peak: mean, worst"]
     lines = []
@@ -123,7 +126,7 @@ def agreement_table(found: Sequence[Agreement]) -> str:
 
 
 def _stretches(mask: NDArray) -> str:
-    """Return where a mask over percent is true, in words: "2–60, 95–100"."""
+    """Return the percents at which a mask is true, as "2–60, 95–100"."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
 
@@ -131,10 +134,10 @@ def _stretches(mask: NDArray) -> str:
 def criteria_table(
     names: Sequence[str], metrics: Sequence[dict[str, Any]], copies: Sequence[dict[str, Any] | None] = ()
 ) -> str:
-    """Markdown: every criterion and its number in each evaluation; in bold what is missed even when loosened.
+    """Return the Markdown table of every criterion and its number in each evaluation.
 
-    A number in brackets meets the loosened criterion alone. The row `missed` counts. Falls and angles of the policies'
-    open-loop `copies` follow, unless none has one.
+    Bold numbers miss the loosened criterion, bracketed ones meet it alone; the row `missed` counts the misses. Falls
+    and angles of the policies' open-loop `copies` follow, unless all are None.
     """
     measured = [numbers(each) for each in metrics]
     lines = []
@@ -162,7 +165,8 @@ def _state(criterion: Criterion, values: dict[str, Any]) -> str:
 
 
 def curves_csv(found: Sequence[Agreement]) -> str:
-    """CSV over percent of the stride: mean and SD over the policies of K, theta_eq and torque, CV of K, load."""
+    """Return the CSV over percent of the stride: mean and SD of K, theta_eq and torque over the policies, CV of K,
+    load."""
     columns: dict[str, NDArray] = {"percent": PERCENT}
     for each in found:
         for name, curves in zip(
@@ -174,7 +178,7 @@ def curves_csv(found: Sequence[Agreement]) -> str:
 
 
 def save_figure(path: Path, found: Sequence[Agreement]) -> None:
-    """Write the picture: K, equilibrium and torque of each policy over the stride, grey where no load is carried."""
+    """Draw K, rest angle and torque of each policy over the stride, grey where the joint carries no load."""
     titles = ("stiffness K", "equilibrium θ_eq", "torque")
     units = ("N·m/rad", "dorsiflexion, toe up (deg)", "plantarflexion (N·m/kg)")
     with matplotlib.rc_context(STYLE):
@@ -207,10 +211,10 @@ def save_figure(path: Path, found: Sequence[Agreement]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class SeedAgreement(WalkingStudy):
-    """Hold several policies, such as one training from several seeds, against each other and against people."""
+    """Compare several policies, such as one training from several seeds, with each other and with people."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ()
-    """Two policies of evaluate.py or more: run folders, files, names."""
+    """Two or more policies of evaluate.py: run folders, files, names."""
 
     def check(self) -> None:
         """Refuse fewer than two policies as well."""
@@ -223,7 +227,7 @@ class SeedAgreement(WalkingStudy):
         return sum(len(and_copy(name)) for name in self.policies) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every policy."""
+        """Walk with every policy, and compare them."""
         walked = [[self._walk(each, progress) for each in and_copy(name)] for name in self.policies]
         gaits = [first for first, *_ in walked]
         copies = [rest[0].metrics if rest else None for _, *rest in walked]

@@ -1,12 +1,12 @@
-"""Is the stiffness of a gait identified? The same gait walked with any other stiffness, its equilibrium rebuilt.
+"""Walk the same gait with other stiffnesses, each with the rest angle that gives the gait's torque.
 
     springfoot study any-stiffness schedule
     springfoot study any-stiffness pretrained --episodes 100
 
 A recorded gait has a mean angle, velocity and torque of ankle and toe at each phase of the leg controller. For any
-K(phase) > 0, theta_eq = theta + beta dtheta/dt + tau/K gives back that torque. Each such pair of K and theta_eq is a
-schedule for equilibrium `phase`, and walks here as the baseline `schedule`: undisturbed, pushed, on uneven ground. It
-is decided at 100 Hz, as theta_eq moves: held longer, K and theta_eq would be those of an earlier phase.
+K(phase) > 0, theta_eq = theta + beta dtheta/dt + tau/K gives back that torque. Each pair of K and theta_eq is a
+schedule for the equilibrium `phase`, and walks as the baseline `schedule`: undisturbed, pushed, on uneven ground.
+Decisions come at 100 Hz, as often as theta_eq moves: held for longer, K and theta_eq would belong to an earlier phase.
 """
 
 import json
@@ -35,25 +35,26 @@ from ..base.columns import falls_text, rmse_text, walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 PHASE_SEGMENTS = 200
-"""Of a rebuilt schedule: half a percent of a stride each, less than the control window in which theta_eq is held."""
+"""Segments of a rebuilt schedule: half a percent of a stride each, less than the control window that holds theta_eq."""
 STARTS = np.arange(PHASE_SEGMENTS) / PHASE_SEGMENTS
-"""Their first phases, (PHASE_SEGMENTS,)."""
+"""First phase of each segment, (PHASE_SEGMENTS,)."""
 STIFFNESSES = ("recorded", "flat:150", "flat:250", "flat:400", "times:0.6", "times:1.6", "reversed", "people")
-"""The K walked with by default: the gait's own; the same at every phase [N m/rad of the ankle]; a multiple of its own;
-its own backwards in time; people's quasi-stiffness."""
+"""Default stiffnesses: the gait's own; one value at every phase [N m/rad of the ankle]; a multiple of the gait's own;
+its own reversed in time; people's quasi-stiffness."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeanSprings:
-    """Ankle and toe of both legs over the phase of the leg controller, means of a recording: (PHASE_SEGMENTS, 2)."""
+    """Mean springs of a recording at ankle and toe of both legs, over the phase of the leg controller: (PHASE_SEGMENTS,
+    2)."""
 
     body: Body
     angle: NDArray
-    """At the ends of the control windows that began in each segment [rad]."""
+    """Angle at the ends of the control windows that began in each segment [rad]."""
     velocity: NDArray
-    """[rad/s]."""
+    """Angular velocity at the same instants [rad/s]."""
     torque: NDArray
-    """Of the springs [N m]."""
+    """Torque of the springs [N m]."""
     stiffness: NDArray
     """K [N m/rad]."""
 
@@ -82,7 +83,7 @@ def mean_springs(recording: Recording) -> MeanSprings:
 
 
 def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
-    """K (PHASE_SEGMENTS, 2) > 0 [N m/rad] and the equilibrium at which it gives the gait's torque on its course."""
+    """Return the schedule of K (PHASE_SEGMENTS, 2) > 0 [N m/rad], with the rest angles that give the gait's torque."""
     beta = np.array(damping_times(springs.body))[FEET]
     rest = springs.angle + beta * springs.velocity + springs.torque / stiffness
     columns = zip(SPRINGS, stiffness.T, rest.T, strict=True)
@@ -90,7 +91,7 @@ def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
 
 
 def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
-    """Return (PHASE_SEGMENTS, 2) K of ankle and toe [N m/rad]: one of `STIFFNESSES`, or those with other numbers."""
+    """Return K of ankle and toe (PHASE_SEGMENTS, 2) [N m/rad] for a name as in `STIFFNESSES`, with any number."""
     kind, _, text = name.partition(":")
     try:
         number = float(text) if text else nan
@@ -114,17 +115,18 @@ def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Row:
-    """One stiffness, walked under every condition."""
+    """Measurements of one stiffness, under every condition."""
 
     name: str
     metrics: dict[str, dict[str, Any]]
-    """Condition -> as metrics.json."""
+    """Condition -> metrics, as in metrics.json."""
     work: dict[str, float | None]
-    """Net work put into one ankle's spring in an undisturbed stride [J/kg], by changing K and by moving theta_eq."""
+    """Net work into one ankle's spring in an undisturbed stride [J/kg]: by changes of K, and by movement of
+    theta_eq."""
 
 
 def walk_row(name: str, walks: dict[str, Recording]) -> Row:
-    """Measure the recordings of one stiffness, by condition; the first is the undisturbed one."""
+    """Measure the recordings of one stiffness, by condition; the first condition is the undisturbed one."""
     metrics = {condition: measure(recording).metrics for condition, recording in walks.items()}
     springs = next(iter(metrics.values()))["springs_J_kg"]["ankle"]
     work = {source: springs[f"{source}_changes"] for source in ("stiffness", "equilibrium")}
@@ -140,13 +142,14 @@ def any_stiffness(
     progress: OnProgress = lambda seconds: None,
     **how: Any,
 ) -> tuple[list[Row], dict[str, StiffnessSchedule]]:
-    """Return the policy `name` and its gait rebuilt with each of `stiffnesses`; also the schedules, by their names.
+    """Walk with the policy `name` and with its gait rebuilt at each of `stiffnesses`; return rows, and schedules by
+    name.
 
     Args:
         name: any policy of `policies.prepare`.
         given: environment settings that differ from the evaluation's standard conditions and the policy's own.
-        stiffnesses: as in `STIFFNESSES`; values beyond the action's range are the nearer end's.
-        disturbances: more conditions, by name: settings that differ from the undisturbed one's.
+        stiffnesses: as in `STIFFNESSES`; values outside the action's range become its end.
+        disturbances: further conditions, by name: settings that differ from the undisturbed condition's.
         progress, how: as for `recording.record`.
     """
     policy, settings = prepare(name, given, how.get("seed", 0))
@@ -173,7 +176,8 @@ def any_stiffness(
 
 
 def stiffness_table(rows: Sequence[Row]) -> str:
-    """Markdown: a row for each stiffness; undisturbed, and what falls and how near people it walks when disturbed."""
+    """Return the Markdown table with a row for each stiffness: the undisturbed walk, and falls and likeness when
+    disturbed."""
     undisturbed, *disturbed = rows[0].metrics
     head = [
         "K",
@@ -205,7 +209,7 @@ def stiffness_table(rows: Sequence[Row]) -> str:
 
 
 def _numbers(rows: Sequence[Row]) -> str:
-    """CSV: a line for each stiffness and condition."""
+    """Return the CSV with a line for each stiffness and condition."""
     return walks_csv(
         [
             (
@@ -221,18 +225,18 @@ def _numbers(rows: Sequence[Row]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class AnyStiffness(WalkingStudy):
-    """Walk a gait again with any stiffness, its equilibrium rebuilt, undisturbed and disturbed.
+    """Walk a gait with other stiffnesses, its rest angles rebuilt, undisturbed and disturbed.
 
-    Its folder also holds each K with its equilibrium, for evaluate.py schedule --equilibrium phase --decisions 100hz
-    --schedule FILE.
+    The folder of the results also has each K with its rest angles, for evaluate.py schedule --equilibrium phase
+    --decisions 100hz --schedule FILE.
     """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "schedule"
-    """Whose gait: any policy of evaluate.py."""
+    """Policy of the gait: any of evaluate.py."""
     stiffness: tuple[str, ...] = STIFFNESSES
-    """The K walked with: recorded, flat:N (ankle N N·m/rad, toe a fifth of it), times:X, reversed, people."""
+    """Stiffnesses: recorded, flat:N (ankle N N·m/rad, toe a fifth of it), times:X, reversed, people."""
     seconds: float = 12.0
-    """Length of each."""
+    """Length of each episode."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
     unevenness_m: float = 0.01
@@ -245,7 +249,7 @@ class AnyStiffness(WalkingStudy):
         return (1 + len(self.stiffness)) * conditions * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every row."""
+        """Walk with every stiffness."""
         disturbances = {
             f"±{self.push_newton:g} N": {"push_newton": self.push_newton},
             f"±{100 * self.unevenness_m:g} cm": {"unevenness_m": self.unevenness_m},

@@ -1,10 +1,10 @@
-"""Does stiffness move the body? The thesis's chain, link by link: K of ankle and toe, torque, CoM acceleration, walk.
+"""Follow the thesis's chain link by link: stiffness of ankle and toe, torque, acceleration of the CoM, walk.
 
-springfoot study influence
+    springfoot study influence
 
-K is changed in one joint and phase of the stride, its rest angle kept. At the states of the unchanged walk that changes
-torque and the CoM's acceleration exactly; walks with the change, each held against the unchanged one from the same
-start on the same ground, say what becomes of it.
+K changes in one joint and one phase of the stride, and its rest angle stays. At the states of the unchanged walk this
+changes torque and the CoM's acceleration exactly. Walks with the change then show its effect on movement, each compared
+with the unchanged walk from the same start on the same ground.
 """
 
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ from .stiffness_steps import CELLS, DURATIONS, PHASES, SPRINGS, paired_walks
 
 FIGURE = "influence.png"
 BODIES = {"1.55 m, 50 kg": (1.55, 50.0), "1.90 m, 95 kg": (1.90, 95.0)}
-"""Height [m] and mass [kg] of other bodies; their speed is Froude-equal to the policy's own."""
+"""Height [m] and mass [kg] of other bodies, which walk at the policy's Froude speed."""
 INFLUENCE_CONDITIONS = (
     "as it is",
     "opposite change",
@@ -61,14 +61,14 @@ INFLUENCE_CONDITIONS = (
     *BODIES,
     "pretrained",
 )
-"""Under which stiffness is changed."""
+"""Conditions under which stiffness changes."""
 
 
 def walk_under(condition: str, policy: str, change: float, unevenness: float, seed: int = 0) -> tuple[Any, Any, float]:
-    """Policy, settings and change of K of one of `INFLUENCE_CONDITIONS`, from those of the first one.
+    """Return policy, settings and change of K for one of `INFLUENCE_CONDITIONS`, given those of the first condition.
 
-    What has no feedback decides at 100 Hz, as the body is controlled; at 50 Hz a level walk falls in step with the
-    decisions, in one of two strides.
+    Policies without feedback decide at 100 Hz, as often as the body is controlled: at 50 Hz a walk on level ground
+    falls into one of two rhythms with the decisions.
     """
     if condition not in INFLUENCE_CONDITIONS:
         raise SpringfootError(f"conditions must be of {', '.join(map(repr, INFLUENCE_CONDITIONS))}, got {condition!r}")
@@ -92,19 +92,19 @@ class Influence(Study):
     """Change stiffness in each joint and phase, and follow torque, CoM acceleration and movement."""
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "schedule"
-    """Whose stiffness: any policy of evaluate.py."""
+    """Policy whose stiffness changes: any of evaluate.py."""
     change_percent: float = 10.0
     """Change of K [%]."""
     conditions: tuple[str, ...] = INFLUENCE_CONDITIONS
-    """Under which, all unless given; the first is told in full."""
+    """Conditions to walk under, all unless given; the report tells the first in full."""
     seeds: int = 16
     """Walks of each change, from other starts on other ground."""
     seed: int = 0
-    """Of the first walk."""
+    """Seed of the first walk."""
     strides: int = 20
-    """Strides of each walk; the second half are the "many"."""
+    """Strides of each walk; "many" is the second half."""
     unevenness_m: float = 0.002
-    """Unevenness of the ground [m], the same footfall by footfall in walks held against each other."""
+    """Unevenness of the ground [m], footfall by footfall the same in the walks of a comparison."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
 
@@ -130,7 +130,7 @@ class Influence(Study):
         return len(self.conditions) * walks * (WARM_UP + (self.strides + 1) * stride)
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk under every condition."""
+        """Walk under every condition, and follow the chain."""
         seeds = range(self.seed, self.seed + self.seeds)
         responses = {}
         for condition in self.conditions:
@@ -150,7 +150,8 @@ class Influence(Study):
 
 
 def headline(study: Influence, responses: Mapping[str, Response]) -> str:
-    """Return name the change that moves the walk most, and how far the acceleration foretells it."""
+    """Return the change of stiffness that moves the walk most, and how well acceleration foretells the walk, in
+    words."""
     first = next(iter(responses.values()))
     mean = first.mean[MANY_STRIDES_SPEED]
     most = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
@@ -179,13 +180,14 @@ def _number(own: Response, key: Key, cell: int, pattern: str, unit: float = 1.0,
 
 
 def _signed(value: float, pattern: str) -> str:
-    """Return the number in a table; 0 has no sign."""
+    """Return a number of a table with its sign; 0 has none."""
     text = format(value, pattern)
     return MISSING if not isfinite(value) else text.lstrip("+-") if float(text) == 0 else text
 
 
 def tables(study: Influence, responses: Mapping[str, Response]) -> str:
-    """Markdown: the first condition link by link; the eventual speed under each; how well links foretell; what ran."""
+    """Return the Markdown tables: the first condition link by link, the lasting speed under each, links, and the
+    walks."""
     return "\n\n".join(
         [_chain(responses), _everywhere(responses), _foretelling(responses), _what_ran(study, responses)]
     )
@@ -269,15 +271,15 @@ DRAWN_STRIDES = {
     "second": ("2", "#4d97b0", 0.0),
     "many": ("many", MODEL, -0.26),
 }
-"""What is drawn of the speed: when, colour and place beside the cell's middle."""
+"""Strides whose change of speed is drawn -> colour, and offset from the middle of the row."""
 ROWS = -np.array([cell + 1.2 * joint for cell, (joint, _) in enumerate(CELLS)])
-"""Place of each cell on the vertical axis, the joints apart."""
+"""Position of each joint and phase on the vertical axis, with a gap between the joints."""
 LABELLED = 3e-3
-"""Cells whose speed changes by this [m/s] have their name in the last panel."""
+"""Change of speed from which the last panel names joint and phase [m/s]."""
 
 
 def save_influence_figure(path: Path, responses: Mapping[str, Response]) -> None:
-    """Draw the first of `responses` link by link, and of all of them what the first link says of the last."""
+    """Draw the first response link by link, and for all responses the last link over the first."""
     first = next(iter(responses.values()))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(13.5, 4.9), layout="constrained")

@@ -1,7 +1,7 @@
-"""The laboratory's experiment where the truth is known: springs are found from how a policy walks under pushes.
+"""Repeat the laboratory's experiment where the truth is known: find springs from a policy's walk under pushes.
 
-What a laboratory would record of ankle and toe, with noise on the torque, goes to
-`springfoot.gait.springs.perturbation`; the K that was applied stands beside what it finds.
+`springfoot.gait.springs.identification_by_pushes` gets the records of ankle and toe that a laboratory would have, with
+noise on the torque. The applied K stands beside the estimate.
 """
 
 from collections.abc import Sequence
@@ -21,39 +21,42 @@ from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare
 from springfoot.gait.springs import SPRINGS, PhaseSpring, PushedSpring, identify, identify_pushed
 
 BOUNDS = (*PLATEAUS, 1.0)
-"""Phases: the plateaus of the fixed schedule, on which its K is constant, and the ramps between them."""
+"""Bounds of the phases: the plateaus of the fixed schedule, where K is constant, and the ramps between them."""
 DECISIONS = "100hz"
-"""When a baseline or a copy, whose K follows the phase alone, decides: as often as theta_eq moves. K that is held for
-longer belongs to an earlier phase, by more or less in each step; where it ramps it is then no function of phase."""
+"""Decisions of baselines and open-loop copies, whose K follows the phase alone: as often as theta_eq moves. K that is
+held for longer belongs to an earlier phase, by another amount in each step, and on a ramp it is no function of
+phase."""
 LOADED = 0.1
-"""A joint carries load in a phase if its mean torque there is beyond this share of the largest of its mean course."""
+"""A joint carries load in a phase if its mean torque there is beyond this fraction of the largest torque of its mean
+course."""
 LAST_SECOND = 1.0
-"""End of an episode that fell, which is left out [s]."""
+"""Time left out at the end of an episode that fell [s]."""
 COURSE = 100
-"""Parts of the stride in which the mean course of the torque is taken."""
+"""Parts of the stride for the mean course of the torque."""
 NOISE_LASTS = 0.05
 """Correlation time of the noise on the torque [s]."""
 REFLEX_DELAY = 0.02
-"""The joint's own angle this much earlier is one of the further states [s]."""
+"""Delay of the joint's own angle as a further state [s]."""
 
 
 def prepare_pushed(
     name: str, given: dict[str, Any], seed: int = 0, threads: int = 2
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """As `policies.prepare`, but what has no feedback decides at `DECISIONS` unless `given` says otherwise."""
+    """Prepare a policy as `policies.prepare` does; without feedback it decides at `DECISIONS` unless `given` says
+    otherwise."""
     return prepare(name, given if has_feedback(name) else {"decisions": DECISIONS} | given, seed, threads)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """What a laboratory would have of n instants of walking, both legs together."""
+    """Records that a laboratory would have of n instants of walking, both legs together."""
 
     trial: NDArray
-    """(n,) its episode."""
+    """(n,) episode of the instant."""
     phase: NDArray
-    """(n,) of the leg's controller [0, 1)."""
+    """(n,) phase of the leg's controller [0, 1)."""
     torque: NDArray
-    """(n, 2) of ankle and toe with its noise [N m], at the end of a control window, as angle and velocity are."""
+    """(n, 2) torque of ankle and toe with its noise [N m], at the end of a control window, as angle and velocity."""
     angle: NDArray
     """(n, 2) [rad]."""
     velocity: NDArray
@@ -62,16 +65,16 @@ class Samples:
     """(n, q) CoM velocity, hip height, trunk pitch and its rate; angle and velocity of hip and knee; ankle and toe
     `REFLEX_DELAY` earlier."""
     stiffness: NDArray
-    """(n, 2) K applied [N m/rad]: the truth, which no laboratory has."""
+    """(n, 2) applied K [N m/rad]: the truth, which a laboratory does not have."""
     course: NDArray
     """(COURSE, 2) mean torque over the phase, without noise [N m]."""
 
 
 def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> Samples:
-    """Instants after the warm-up, up to the last second of an episode that fell.
+    """Return the instants after the warm-up, without the last second of an episode that fell.
 
-    The torque's noise has a standard deviation of `noise_percent` of the largest torque of the joint's mean course, and
-    lasts `NOISE_LASTS`.
+    The noise of the torque has a standard deviation of `noise_percent` of the largest torque of the joint's mean
+    course, and a correlation time of `NOISE_LASTS`.
     """
     series = {name: values.astype(float) for name, values in recording.series.items()}
     phase = series["phase"]
@@ -109,31 +112,32 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One joint in one phase."""
+    """The spring of one joint in one phase: applied, and found."""
 
     joint: str
-    """Of `SPRINGS`."""
+    """Joint, one of `SPRINGS`."""
     start: float
-    """Stride phase at which it begins."""
+    """Stride phase at its beginning."""
     end: float
-    """Stride phase at which it ends."""
+    """Stride phase at its end."""
     applied: tuple[float, float, float]
-    """Mean, lowest and highest K applied [N m/rad]."""
+    """Mean, lowest and highest applied K [N m/rad]."""
     load: float
-    """Mean size of the mean torque in the phase over its largest in the stride [0..1]."""
+    """Mean size of the mean torque in the phase over its largest in the stride [0, 1]."""
     pushed: PushedSpring
-    """What the pushes tell."""
+    """Spring found from pushes."""
     undisturbed: PhaseSpring | None = None
-    """What the undisturbed gait would tell."""
+    """Spring that the usual estimator finds from the undisturbed gait."""
 
     @property
     def loaded(self) -> bool:
-        """Whether the joint carries load."""
+        """Tell whether the joint carries load."""
         return self.load > LOADED
 
 
 def identified(pushed: Samples, undisturbed: Samples | None = None, margin: float = 0.0) -> list[Row]:
-    """Return the springs of ankle and toe in every phase of `BOUNDS`, without `margin` [stride] at both ends."""
+    """Find the springs of ankle and toe in every phase of `BOUNDS`, leaving out `margin` [stride] at both ends of a
+    phase."""
     rows = []
     at = (np.arange(COURSE) + 0.5) / COURSE
     for column, joint in enumerate(SPRINGS):

@@ -1,4 +1,4 @@
-"""Do pushes find a policy's springs, and are they springs at all? Ankle and toe, beside the K that was applied.
+"""Find springs of ankle and toe from pushes, beside the applied K, and tell whether the joints are springs at all.
 
     springfoot study identify
     springfoot study identify schedule frozen:pretrained pretrained
@@ -27,39 +27,39 @@ from ..base.study import Answer, OnProgress, WalkingStudy
 from .push_experiment import Row, identified, prepare_pushed, samples
 
 UNDISTURBED_EPISODES = 8
-"""Episodes without pushes, whose springs stand beside."""
+"""Episodes without pushes, from which the usual estimator finds springs for comparison."""
 REPEAT_EPISODES, REPEAT_SECONDS = 28, 6.0
-"""Size of each repeat of the experiment."""
+"""Episodes, and length of each, of a repeat of the experiment."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """One policy, pushed."""
+    """Experiment on one policy, and its results."""
 
     policy: str
-    """What was pushed."""
+    """Pushed policy."""
     episodes: int
-    """How many."""
+    """Number of episodes."""
     falls: int
-    """How many of them fell."""
+    """Episodes that ended in a fall."""
     damping_time: tuple[float, float]
     """True beta of ankle and toe [s]."""
     rows: tuple[Row, ...]
     """Joint by joint, phase by phase."""
     repeats: tuple[tuple[Row, ...], ...] = ()
-    """The same of every repeat, each of other episodes."""
+    """Rows of every repeat, each on other episodes."""
 
     def of(self, joint: str) -> list[Row]:
-        """Rows of a joint where it carries load."""
+        """Return the rows of a joint where it carries load."""
         return [row for row in self.rows if row.joint == joint and row.loaded]
 
     def repeated(self, row: Row) -> list[Row]:
-        """Return the findings of the repeats where `row` is."""
+        """Return the repeats' rows of the same joint and phase as `row`."""
         return [repeat[self.rows.index(row)] for repeat in self.repeats]
 
 
 def springs_table(experiment: Experiment) -> str:
-    """Markdown: a line for each joint and phase in which it carries load."""
+    """Return the Markdown table with a line for each joint and phase under load."""
     head = (
         "",
         "% of stride",
@@ -95,7 +95,7 @@ def springs_table(experiment: Experiment) -> str:
 
 
 def sentence(experiment: Experiment) -> str:
-    """Say in a sentence the table's verdict on each joint."""
+    """Return the table's verdict on each joint, in a sentence."""
     said = []
     for joint in SPRINGS:
         rows = experiment.of(joint)
@@ -110,7 +110,8 @@ def sentence(experiment: Experiment) -> str:
 
 
 def coverage_table(experiments: Sequence[Experiment]) -> str:
-    """Markdown: of the repeats, how often intervals hold the truth and which verdict is given, where there is load."""
+    """Return the Markdown table of the repeats under load: how often intervals hold the truth, and how often each
+    verdict."""
     head = ("", "", "phases", "repeats", "K in its interval", "β in its interval", "called a spring", "called reacting")
     lines = []
     for experiment in experiments:
@@ -130,7 +131,7 @@ def coverage_table(experiments: Sequence[Experiment]) -> str:
 
 
 def springs_csv(experiments: Sequence[Experiment]) -> str:
-    """CSV: a line for each policy, joint and phase, loaded or not, of the experiment (repeat 0) and of its repeats."""
+    """Return the CSV with a line for each policy, joint and phase, of the experiment (repeat 0) and of its repeats."""
     spans = [f"{name}{end}" for name in ("stiffness_Nm_rad", "damping_time_s") for end in ("", "_low", "_high")]
     head = (
         *("policy", "repeat", "joint", "start", "end", "load", "applied_Nm_rad", "applied_lowest", "applied_highest"),
@@ -160,7 +161,7 @@ def _holds(estimate: Estimate | None, truth: float) -> bool:
 
 
 def _share(found: Sequence[Sequence[bool]]) -> str:
-    """Percent of all, and of the phases with fewest and most."""
+    """Return the percentage of true entries over all phases, and over the phases with fewest and with most."""
     if not found:
         return MISSING
     each = 100 * np.mean(found, axis=1)
@@ -169,31 +170,31 @@ def _share(found: Sequence[Sequence[bool]]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Identify(WalkingStudy):
-    """Find the springs of ankle and toe from walking under random pushes, and whether they are springs at all."""
+    """Find springs of ankle and toe from walking under random pushes, and tell whether they are springs at all."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("pretrained",)
-    """Any policies of evaluate.py, as frozen:POLICY, its mean K over the phase played open loop."""
+    """Policies of evaluate.py, or frozen:POLICY, a policy's mean K over the phase played open loop."""
     episodes: int = 128
-    """Episodes of each policy, each a trial of its own."""
+    """Episodes of each policy, each a trial."""
     push_newton: float = 100.0
     """Size of the pushes, forward or backward at random [N]."""
     push_seconds: float = 0.1
-    """Length of each [s]."""
+    """Length of each push [s]."""
     push_interval: float = 2.0
     """One push at a random time in each interval of this length [s]."""
     noise_percent: float = 1.0
     """Noise on the measured torque: standard deviation in percent of the largest torque of the mean stride."""
     decisions: Literal["100hz", "50hz", "25hz"] | None = None
-    """When K is decided; unless given 100hz for what follows the phase alone, and as trained for a policy."""
+    """Decisions on K; by default 100hz for policies that follow the phase alone, and as trained for others."""
     margin: float = 0.0
     """Part of the stride left out at both ends of each phase: 0.02 where K is held from the phase before."""
     repeats: int = 0
-    """Ask instead how often the intervals of so many other experiments hold, each of 28 episodes × 6 s."""
+    """Measure instead how often the intervals hold in this many other experiments, each of 28 episodes × 6 s."""
 
     QUICK: ClassVar = {"episodes": 28, "seconds": 4.5, "repeats": 0}
 
     def check(self) -> None:
-        """Refuse pushes and noise that cannot be as well."""
+        """Refuse impossible pushes and noise."""
         super().check()
         if not self.policies:
             raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
@@ -209,7 +210,7 @@ class Identify(WalkingStudy):
         return len(self.policies) * own
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Push every policy."""
+        """Push every policy, and find its springs."""
         experiments = [self._push(name, progress) for name in self.policies]
         if self.repeats:
             text = f"{coverage_table(experiments)}\n\n{self._repeats_ran} {self._pushes}"
@@ -244,7 +245,7 @@ class Identify(WalkingStudy):
         )
 
     def _push(self, name: str, progress: OnProgress) -> Experiment:
-        """Return the experiment on one policy, and its repeats."""
+        """Return the experiment on one policy, with its repeats."""
         pushes = ("push_newton", "push_seconds", "push_interval")
         given: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
         given |= {"decisions": self.decisions} if self.decisions else {}

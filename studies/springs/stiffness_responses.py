@@ -1,5 +1,4 @@
-"""What a step of stiffness does, from paired walks: means over seeds, their intervals, and how well one link of the
-chain foretells the next over joints and phases."""
+"""Summarise paired walks: means over seeds with intervals, and how well one link of the chain foretells the next."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,12 +12,13 @@ from springfoot.arrays import NDArray
 from .stiffness_steps import CELLS, DURATIONS, FIXED, MOVEMENT, PHASES, SPRINGS, PairedWalks
 
 RESAMPLES = 2000
-"""Of every bootstrap, and of scrambling the cells."""
+"""Resamples of every bootstrap, and orders of the scrambled joints and phases."""
 LEAST_MOVEMENT = 1e-3
-"""A change of speed that is smaller [m/s], a thousandth of a walk's, is no movement."""
+"""Least change of speed that counts as a movement [m/s], a thousandth of a walk's speed."""
 
 Key = tuple[str, str, str]
-"""How long K is changed, or "fixed state"; what is measured; when: as the "phase" ends, in stride "1", "2", "many"."""
+"""Duration of the change, or "fixed state"; measured quantity; time: at the end of the "phase", in stride "1", "2",
+"many"."""
 TORQUE: Key = ("fixed state", "torque_Nm", "")
 ACCELERATION: Key = ("fixed state", "forward_m_s2", "")
 IMPULSE: Key = ("fixed state", "forward_m_s", "")
@@ -31,44 +31,46 @@ LINKS: dict[str, tuple[Key, Key]] = {
     "∫Δa dt → Δspeed of many strides": (IMPULSE, MANY_STRIDES_SPEED),
     "Δv as the phase ends → Δspeed of many strides": (VELOCITY, MANY_STRIDES_SPEED),
 }
-"""What is held against what over the cells; a is the CoM's acceleration forward."""
+"""Link of the chain -> its two quantities, correlated over joints and phases; a is the CoM's forward acceleration."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
-    """What a change of K did to one walk; C cells, S seeds."""
+    """Effect of a change of K on one walk, over C cells (a joint in a phase) and S seeds."""
 
     change: float
-    """Of K, as a share of it."""
+    """Change of K, as a fraction of it."""
     mean: Mapping[Key, NDArray]
-    """Each (C,), over the seeds whose walks of the cell do not fall."""
+    """Quantity -> (C,) mean over the seeds that do not fall in that cell."""
     interval: Mapping[Key, NDArray]
-    """Each (C, 2), 95 % by bootstrap over seeds; NaN for fewer than two."""
+    """Quantity -> (C, 2) 95 % interval by bootstrap over seeds; NaN for fewer than two seeds."""
     links: Mapping[str, tuple[float, float, float, float]]
-    """Of each of `LINKS` Pearson's r over the cells, its 95 % interval (bootstrap over seeds), and the share of
-    scrambled orders of the cells whose r is as far from 0; NaN where nothing changes."""
+    """Link -> Pearson's r over the cells, its 95 % interval (bootstrap over seeds), and the fraction of scrambled
+    orders of the cells with an r as far from 0; NaN where nothing changes."""
     falls: NDArray
-    """(C, len(DURATIONS)) changed walks that fell."""
+    """(C, len(DURATIONS)) number of changed walks that fell."""
     cut: NDArray
-    """(C,) share of the changes that the range of the actions cut short."""
+    """(C,) fraction of the changes that the range of the actions cuts short."""
     speed: float
-    """Of the unchanged walk [m/s]."""
+    """Speed of the unchanged walk [m/s]."""
 
     @property
     def moved(self) -> NDArray:
-        """(C,) whether the speed of many strides changes: its interval is off 0, and its mean by `LEAST_MOVEMENT`."""
+        """Tell in which cells, (C,), the speed of many strides changes: an interval off 0, a mean of `LEAST_MOVEMENT`
+        or more."""
         return (self.interval[MANY_STRIDES_SPEED].prod(-1) > 0) & (
             np.abs(self.mean[MANY_STRIDES_SPEED]) >= LEAST_MOVEMENT
         )
 
     @property
     def foretold(self) -> NDArray:
-        """(C,) whether that is so and the acceleration at the unchanged walk's states has the sign of it."""
+        """Tell in which cells, (C,), the walk moved with the sign of the acceleration at the unchanged walk's
+        states."""
         return self.moved & (self.mean[IMPULSE] * self.mean[MANY_STRIDES_SPEED] > 0)
 
 
 def response(walks: PairedWalks, change: float) -> Response:
-    """Means, intervals and links of paired walks with `change`."""
+    """Return means, intervals and links of paired walks with `change`."""
     values = _values(walks)
     mean = {key: np.full(len(CELLS), np.nan) for key in values}
     interval = {key: np.full((len(CELLS), 2), np.nan) for key in values}
@@ -94,7 +96,8 @@ def response(walks: PairedWalks, change: float) -> Response:
 
 
 def _values(walks: PairedWalks) -> dict[Key, NDArray]:
-    """Return each (C, S); "many" is the mean of the second half of the strides, of `com_ahead_m` its end."""
+    """Return quantity -> (C, S); "many" is the mean over the second half of the strides, and the end for
+    `com_ahead_m`."""
     found: dict[Key, NDArray] = {("fixed state", name, ""): walks.fixed[..., k] for k, name in enumerate(FIXED)}
     found[VELOCITY] = walks.velocity
     half = walks.movement.shape[3] // 2
@@ -108,7 +111,7 @@ def _values(walks: PairedWalks) -> dict[Key, NDArray]:
 
 
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
-    """As in `Response.links`, from (C, S) of either end."""
+    """Return an entry of `Response.links` from the two quantities, (C, S) each."""
     whole = np.isfinite(x + y).all(0)
     x = x[:, whole]
     y = y[:, whole]
@@ -136,7 +139,7 @@ LINKS_HEAD = ("condition", "link", "r", "low", "high", "scrambled_p")
 
 
 def csv_rows(responses: Mapping[str, Response]) -> Iterator[tuple[Any, ...]]:
-    """Rows under `CSV_HEAD`: one for each condition, cell and quantity."""
+    """Yield the rows under `CSV_HEAD`: one for each condition, cell and quantity."""
     for condition, own in responses.items():
         for cell, (joint, phase) in enumerate(CELLS):
             for key, mean in own.mean.items():
@@ -146,7 +149,7 @@ def csv_rows(responses: Mapping[str, Response]) -> Iterator[tuple[Any, ...]]:
 
 
 def link_rows(responses: Mapping[str, Response]) -> Iterator[tuple[Any, ...]]:
-    """Rows under `LINKS_HEAD`."""
+    """Yield the rows under `LINKS_HEAD`."""
     for condition, own in responses.items():
         for name, numbers in own.links.items():
             yield condition, name, *numbers

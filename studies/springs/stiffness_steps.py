@@ -1,7 +1,7 @@
-"""What a step of stiffness does, in one joint and phase of the stride: at a fixed state, and to walks.
+"""Measure the effect of a step of stiffness, in one joint and phase of the stride: at fixed states, and on walks.
 
-K becomes K (1 + change) and theta_eq is kept, so that the spring's torque tau becomes tau (1 + change). Walks are
-paired: copies from one seed are the same to the last bit until their first change, and differ by it alone.
+K becomes K (1 + change) and theta_eq stays, so that the spring's torque tau becomes tau (1 + change). Walks are paired:
+copies from one seed are the same to the last bit until their first change, and differ by that change alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,48 +35,48 @@ from springfoot.gait.springs import SPRINGS
 _EDGES = (0.0, LOADING_END_PERCENT / 100, PLATEAUS[4], PUSH_OFF_BEGIN_PERCENT / 100, 0.5, TOE_OFF[0], 1.0)
 _NAMES = ("loading", "early mid-stance", "late mid-stance", "heel-off", "push-off", "swing")
 PHASES = dict(zip(_NAMES, pairwise(_EDGES), strict=True))
-"""Begin and end of each phase of a leg's stride. They are the four of docs/reference/metrics.md, with mid-stance cut
-where the schedule's late stance begins, push-off where the other foot lands, and toe-off where the schedule has it."""
+"""Begin and end of each phase of a leg's stride: the four of docs/reference/metrics.md, cut further where the
+schedule's late stance begins, where the other foot lands, and at the schedule's toe-off."""
 CELLS = tuple(product(range(len(SPRINGS)), PHASES))
-"""Where stiffness changes: joint (0 ankle, 1 toe) and phase; C = 12."""
+"""Cells in which stiffness changes: joint (0 ankle, 1 toe) and phase; C = 12."""
 DURATIONS = ("one stride", "every stride")
-"""How long it stays changed: in the left leg's first stride alone; in both legs from then on."""
+"""Duration of the change: the left leg's first stride alone, or all strides of both legs from then on."""
 SLOWEST_STRIDE = 2.5
-"""Walks whose mean stride takes longer than this [s] are not waited for."""
+"""Longest mean stride for which a walk has time to complete its strides [s]."""
 PHASE_LAG = 0.1
-"""A leg's phase starts anew less than this [s] after its foot takes load."""
+"""Longest time between a foot's first load and the new start of its leg's phase [s]."""
 FIXED = ("torque_Nm", "forward_m_s2", "upward_m_s2", "forward_m_s", "upward_m_s")
-"""At the unchanged walk's states, mean of both legs: change of torque (plantarflexion positive) and of the CoM's
-acceleration, means over the phase; that acceleration's integral over one leg's phase."""
+"""Quantities at the unchanged walk's states, means of both legs: change of torque (plantarflexion positive) and of the
+CoM's acceleration, averaged over the phase; and the integral of that acceleration over one leg's phase."""
 MOVEMENT = ("speed_m_s", "step_length_m", "com_ahead_m", "com_height_m")
-"""Of each stride: the CoM's mean speed; mean length of the steps that begin in it; the CoM's place when the unchanged
-walk's mean stride is over; its mean height."""
+"""Quantities of each stride: mean speed of the CoM; mean length of the steps that begin in it; forward position of the
+CoM when the unchanged walk's mean stride ends; mean height of the CoM."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PairedWalks:
-    """S walks with and without each change, K strides each."""
+    """S walks with and without each of C changes, K strides each."""
 
     fixed: NDArray
-    """(C, S, len(FIXED)) at the states of the unchanged walk's first stride."""
+    """(C, S, len(FIXED)) effects at the states of the unchanged walk's first stride."""
     velocity: NDArray
-    """(C, S) the CoM's forward velocity less the unchanged walk's [m/s], when the phase of a single change is over."""
+    """(C, S) change of the CoM's forward velocity [m/s] at the end of the phase of a single change."""
     movement: NDArray
-    """(C, len(DURATIONS), S, K, len(MOVEMENT)) less the unchanged walk's; NaN for walks that fall."""
+    """(C, len(DURATIONS), S, K, len(MOVEMENT)) difference from the unchanged walk; NaN for walks that fall."""
     unchanged: NDArray
-    """(S, K, len(MOVEMENT)) of the unchanged walk itself; where it falls NaN, and all else of its seed too."""
+    """(S, K, len(MOVEMENT)) the unchanged walk; NaN, like all results of that seed, where it falls."""
     cut: NDArray
-    """(C,) share of the asked changes that the range of the actions cuts short."""
+    """(C,) fraction of the changes that the range of the actions cuts short."""
 
     @property
     def falls(self) -> NDArray:
-        """(C, len(DURATIONS)) how many walks fell whose unchanged one did not."""
+        """Return (C, len(DURATIONS)) the number of changed walks that fell although their unchanged walk did not."""
         stood = np.isfinite(self.unchanged).all(axis=(1, 2))
         return (np.isnan(self.movement).any(axis=(3, 4)) & stood).sum(axis=2)
 
 
 def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
-    """Return (2,) what is added to ankle and toe actions to multiply their stiffness by 1 + `change`."""
+    """Return (2,) the change of ankle and toe actions that multiplies stiffness by 1 + `change`."""
     if settings.action_mode == "residual":
         return np.full(len(SPRINGS), np.log1p(change))
     low, high = stiffness_ranges(settings, body)
@@ -84,10 +84,11 @@ def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
 
 
 def step_at(model: mujoco.MjModel, data: mujoco.MjData, change: float) -> tuple[NDArray, NDArray]:
-    """Compute the effect of changing one spring's K by the share `change` at the state of `data`, with θ_eq kept.
+    """Compute the effect of K (1 + `change`) in each spring by itself at the state of `data`, its rest angle unchanged.
 
-    Contacts respond as the solver has them respond. Returns torque (side, (ankle, toe)) [N m], dorsiflexion positive,
-    and the CoM's acceleration (side, (ankle, toe), (forward, up)) [m/s^2]. Leaves `data` after `mj_forward`.
+    Contacts respond as the solver has them respond. Returns the change of torque (side, (ankle, toe)) [N m],
+    dorsiflexion positive, and of the CoM's acceleration (side, (ankle, toe), (forward, up)) [m/s^2]. Leaves `data`
+    after `mj_forward`.
     """
     control = data.ctrl.reshape(len(SIDES), len(JOINTS), 2)[:, FEET]
     joints = model.nv - len(SIDES) * len(JOINTS)  # those of the base come first
@@ -124,15 +125,15 @@ def paired_walks(
     threads: int = 2,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> PairedWalks:
-    """Walk without and with the change in each of `CELLS`, from the same start for each of `seeds`.
+    """Walk without and with the change in each of `CELLS`, from the same start for each seed.
 
     Args:
-        policy, settings: as `springfoot.evaluation.recording.policies.prepare` gives them.
-        change: of K, as a share of it: 0.1 for 10 % more.
+        policy, settings: from `springfoot.evaluation.recording.policies.prepare`.
+        change: of K, as a fraction of it: 0.1 for 10 % more.
         seeds: S of them; each draws the phase at which the walk starts.
         strides: K, from the left foot's first heel strike after `WARM_UP` on.
         threads: of the physics; any number gives the same bits.
-        progress: told the simulated time [s] of all walks together after every step.
+        progress: called with the simulated time [s] of all walks together after every step.
 
     Raises `SpringfootError` if fewer than two unchanged walks stay up.
     """
@@ -175,7 +176,7 @@ def paired_walks(
 
 
 class _Changes:
-    """Which walk changes which stiffness when: S of them nothing, then S for each cell and duration."""
+    """Changes of action in each walk: none in the first S walks, then S walks for each cell and duration."""
 
     def __init__(self, step: NDArray, num: int):
         rows = [(np.zeros(len(SPRINGS)), (0.0, 0.0), False)]
@@ -185,14 +186,15 @@ class _Changes:
         self._step, (self._begin, self._end) = own[:, None], edges.T[..., None]
 
     def added(self, phase: NDArray, stride: NDArray) -> NDArray:
-        """Return (N, 4) what is added to actions at `phase` (N, side) of the left foot's `stride` (N,), 0 the first."""
+        """Return the changes (N, 4) of the actions at `phase` (N, side) of the left foot's `stride` (N,), 0 the
+        first."""
         left = (stride == 0) | (self._lasts & (stride > 0))
         due = np.stack([left, left & self._lasts], -1)
         return ((due & (phase >= self._begin) & (phase < self._end))[..., None] * self._step).reshape(len(phase), -1)
 
 
 class _Record:
-    """What is kept of the walks, every 10 ms; S of them are unchanged and come first."""
+    """Record of the walks at every tick of 10 ms; the first S walks are unchanged."""
 
     def __init__(self, biped: Biped, change: float, num: int):
         self.stride = np.full(num, -1)
@@ -220,7 +222,7 @@ class _Record:
                 self._samples[cell, index] += 1.0, -torque[side, joint], *acceleration[side, joint]
 
     def paired(self, strides: int, active: NDArray, cut: NDArray) -> PairedWalks:
-        """Return each changed walk less the unchanged one of its seed."""
+        """Return each changed walk less the unchanged walk of its seed."""
         com, velocity, ankle, load, phase, stride = (np.stack(each) for each in zip(*self._ticks, strict=True))
         movement = np.full((len(active), strides, len(MOVEMENT)), np.nan)
         clocks = np.zeros((self._num, strides))
@@ -253,16 +255,17 @@ class _Record:
 
 
 def _ends(phase: NDArray, stride: NDArray) -> list[int]:
-    """Return the tick with which each of `PHASES` of the first stride ends, from a leg's `phase` and `stride` (T,)."""
+    """Return the last tick of each of `PHASES` in the first stride, from a leg's `phase` and `stride` (T,)."""
     gone = np.where(stride <= 0, phase, 1.0)
     begun = np.argmax(stride == 0)
     return [int(begun + np.argmax(gone[begun:] >= end)) - 1 for _, end in PHASES.values()]
 
 
 def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: NDArray, clock: NDArray) -> NDArray:
-    """Return (K, len(MOVEMENT)) of one walk's `com` (T, 2), `ankle` (T, side) [m] and contacts.
+    """Return the quantities of `MOVEMENT` in each stride, (K, len(MOVEMENT)), of one walk.
 
-    `landed` (K + 1,) are the left foot's heel strikes, `clock` (K,) the ends of the unchanged walk's mean strides [s].
+    `com` (T, 2) and `ankle` (T, side) are positions [m], `landed` (K + 1,) the left foot's heel strikes [s], and
+    `clock` (K,) the ends of the unchanged walk's mean strides [s].
     """
     place = sample(com[:, 0], landed, TICK, TICK)
     times, side = find_steps(contacts[LEFT], contacts[RIGHT], landed[0])

@@ -15,7 +15,7 @@ from springfoot.evaluation.numbers.tally import tally_strides
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
 from springfoot.gait import GRAVITY, Body, human_gait
-from springfoot.gait.people.cycle import CONTACT_THRESHOLD_BW, PERCENT
+from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, PERCENT
 
 BODY = Body()
 HUMAN = human_gait(1.2)

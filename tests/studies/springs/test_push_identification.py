@@ -13,7 +13,7 @@ from springfoot.envs.settings.settings import body_of
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
-from springfoot.gait.springs.perturbation import REACTS, SPRING
+from springfoot.gait.springs.identification_by_pushes import REACTS, SPRING
 from springfoot.studies.springs.push_experiment import Row, identified, prepare_pushed, samples
 
 PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}

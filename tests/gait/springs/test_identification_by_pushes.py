@@ -8,8 +8,15 @@ from scipy.signal import lfilter
 
 from springfoot.gait import SpringfootError
 from springfoot.gait.springs.identification import identify
+from springfoot.gait.springs.identification_by_pushes import (
+    REACTION_SHARE,
+    REACTS,
+    SPRING,
+    UNKNOWN,
+    PushedSpring,
+    identify_pushed,
+)
 from springfoot.gait.springs.jackknife import fit_by_trial
-from springfoot.gait.springs.perturbation import REACTION_SHARE, REACTS, SPRING, UNKNOWN, PushedSpring, identify_pushed
 from springfoot.gait.springs.spring_fit import Estimate
 
 BETA, TICK, STRIDE = 0.02, 0.01, 1.1
