@@ -50,7 +50,9 @@ def start() -> None:
             if Path(file).is_relative_to(repository)
         }
         path = Path(os.environ[FOLDER], f"{uuid.uuid4()}.json")
-        path.write_text(json.dumps(inside), encoding="utf-8")
+        written = path.with_suffix(".part")
+        written.write_text(json.dumps(inside), encoding="utf-8")
+        written.replace(path)  # a process that a test kills leaves no half-written file
 
     atexit.register(write)
 
