@@ -6,7 +6,7 @@ from springfoot.terminal import at_terminal
 
 
 def main() -> int:
-    """Evaluate; its imports take a while, in which Ctrl-C and SIGTERM end it all the same."""
+    """Evaluate; Ctrl-C and SIGTERM end it even while its imports run."""
     from springfoot.cli.evaluate import evaluate_main
 
     return evaluate_main()

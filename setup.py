@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the README of a package index, where no file of the repository lies beside it."""
+"""Add the README of the package index, where no file of the repository lies beside it, to pyproject.toml."""
 
 import re
 import runpy
@@ -13,9 +13,10 @@ LINK = re.compile(r"(!?)\[([^\]]+)\]\((?!https://)([^)]+)\)")
 
 
 def index_page(source: str | None, version: str) -> str:
-    """Return the README with its links made absolute by the repository's address `source`, or None: their texts alone.
+    """Return the README with links made absolute by the repository's address `source`; with None links become plain
+    text.
 
-    A release links to its tag, what comes before it to the newest commit, addressed as GitHub and GitLab do.
+    A release links to its tag, any other version to the newest commit, addressed as GitHub and GitLab do.
     """
     commit = "HEAD" if "dev" in version else f"v{version}"
 

@@ -6,7 +6,7 @@ from springfoot.terminal import at_terminal
 
 
 def main() -> int:
-    """Train; its imports take a while, in which Ctrl-C and SIGTERM end it all the same."""
+    """Train; Ctrl-C and SIGTERM end it even while its imports run."""
     from springfoot.cli.train import train_main
 
     return train_main()

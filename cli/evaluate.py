@@ -1,4 +1,4 @@
-"""The command that evaluates a policy: `evaluate.py`, `springfoot evaluate`."""
+"""Define the command that evaluates a policy: `evaluate.py`, `springfoot evaluate`."""
 
 import json
 import shlex
@@ -17,7 +17,7 @@ from springfoot.files.writing import whole_folder
 from springfoot.studies.base.flags import SettingsFlags, given
 
 LONGEST_NAME = 60
-"""Letters of the policies' names in the name of a folder; chosen."""
+"""Most letters of the policies' names in the name of a folder; chosen."""
 MOST_IN_REPORT = 6
 """Policies that the colours and dashes of a report tell apart."""
 
@@ -63,9 +63,9 @@ class EvaluateFlags:
 
 
 def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evaluate.py") -> int:
-    """Run the command line; returns its exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C, 143 by SIGTERM.
+    """Run the command line; return its exit code: 0 evaluated, 2 bad input, 130 ended by Ctrl-C, 143 by SIGTERM.
 
-    `arguments` are those of the process unless given; `program` is what messages call it.
+    `arguments` are those of the process unless given; `program` is the name in messages.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     flags = parse(EvaluateFlags, words, program)
@@ -73,7 +73,7 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
 
 
 def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> None:
-    """Evaluate, write the results, then print the tables and where the results are; `command` is told in the report."""
+    """Evaluate, write the results, and print the tables and the folder of the results; the report names `command`."""
     for name, least, most in (("episodes", 1, MOST_COUNT), ("seed", 0, MOST_COUNT), ("threads", 1, MOST_THREADS)):
         require_count(name, getattr(flags, name), least, most)
     if not flags.policies:
@@ -150,9 +150,9 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
 
 
 def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
-    """Return a bar with the time left, gone at its end, and not there for `delay` [s].
+    """Return a progress bar with the time left, which disappears at its end and appears only after `delay` [s].
 
-    Nothing where there is no terminal.
+    Shows nothing without a terminal.
     """
     return tqdm(
         total=total,
@@ -166,7 +166,7 @@ def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
 
 
 def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
-    """For `open_loop_copy`, which knows how long its walks are."""
+    """Return the `watch` of `open_loop_copy` that advances `bar`."""
 
     def watch(seconds: float) -> Callable[[float], object]:
         bar.total = seconds
@@ -176,8 +176,8 @@ def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """Return the names of the policies in results: no two the same, in capitals or not, and none as the page beside
-    them."""
+    """Return names of the policies for the results: all different, in capitals or not, and different from the
+    page's."""
     from springfoot.evaluation.recording.policies import policy_label
 
     labels: list[str] = []

@@ -1,4 +1,4 @@
-"""The command that writes a policy for use without springfoot: `springfoot export`."""
+"""Define the command that writes a policy for use without springfoot: `springfoot export`."""
 
 import shlex
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from springfoot.errors import SpringfootError
 class ExportFlags:
     """Write a policy as an ONNX file that runs without springfoot: raw observation in, action and stiffness out.
 
-    Beside FILE appears its contract, FILE.json: names, units, order and bounds of what goes in and comes out.
+    Beside FILE appears its contract, FILE.json: names, units, order and bounds of inputs and outputs.
     """
 
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")]
@@ -26,16 +26,16 @@ class ExportFlags:
 
 
 def export_main(arguments: Sequence[str] | None = None, program: str = "springfoot export") -> int:
-    """Run the command line; returns its exit code: 0 written, 2 bad input, 130 ended by Ctrl-C.
+    """Run the command line; return its exit code: 0 written, 2 bad input, 130 ended by Ctrl-C.
 
-    `arguments` are those of the process unless given; `program` is what messages call it.
+    `arguments` are those of the process unless given; `program` is the name in messages.
     """
     flags = parse(ExportFlags, arguments, program)
     return exit_code(program, lambda: run_export(flags))
 
 
 def run_export(flags: ExportFlags) -> None:
-    """Export, then print where the results are."""
+    """Export, and print the names of the files."""
     from springfoot.agents.policies.baselines import has_feedback
     from springfoot.agents.policies.export import export_policy, planned_files
     from springfoot.agents.policies.foreign import is_function

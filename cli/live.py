@@ -1,4 +1,4 @@
-"""The command that walks a policy live in a browser: `springfoot live`."""
+"""Define the command that walks a policy live in a browser: `springfoot live`."""
 
 import sys
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from springfoot.studies.base.flags import EVALUATED, given, optional_flags
 MOST_PORT = 65535
 """Largest number of a port."""
 LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=ELSEWHERE)
-"""Every environment setting as an optional flag; those that live refuses say so."""
+"""Every environment setting as an optional flag; the help of refused ones says so."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +42,13 @@ class LiveFlags:
 
 
 def live_main(arguments: Sequence[str], program: str = "springfoot live") -> int:
-    """Run the command line; returns its exit code: 0 ended, 2 bad input, 130 ended by Ctrl-C."""
+    """Run the command line; return its exit code: 0 ended, 2 bad input, 130 ended by Ctrl-C."""
     flags = parse(LiveFlags, arguments, program)
     return exit_code(program, lambda: run_live(flags))
 
 
 def run_live(flags: LiveFlags) -> None:
-    """Walk until the time is over; prints the address, and how many pictures a second were shown."""
+    """Print the address, walk until the time is over, and print the shown pictures a second."""
     require_count("seed", flags.seed, 0, MOST_COUNT)
     require_count("port", flags.port, 0, MOST_PORT)
     if flags.seconds is not None:

@@ -1,4 +1,4 @@
-"""The command `springfoot`: the same code as `train.py` and `evaluate.py`, and every study by its name."""
+"""Define the command `springfoot`: the code of `train.py` and `evaluate.py`, and every study by its name."""
 
 import shlex
 import sys
@@ -53,13 +53,13 @@ STUDIES = {
     "slope-tuning": ("searches.slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }
-"""Name of each study on the command line -> its class, imported when it is asked, and its question."""
+"""Name of each study on the command line -> its class, imported when asked for, and its question."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run `springfoot`; returns the exit code, 2 for bad input and for a package that is not installed.
+    """Run `springfoot`; return the exit code, 2 for bad input and for a package that is not installed.
 
-    `arguments` are those of the process unless given. Imports no more than the asked command needs.
+    `arguments` are those of the process unless given. Imports only the packages of the command.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     return at_terminal(lambda: _run(words))
@@ -109,7 +109,8 @@ def _run(words: list[str]) -> int:
 
 
 def study_main(arguments: Sequence[str]) -> int:
-    """Run the study whose name comes first: 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143 SIGTERM."""
+    """Run the study whose name comes first; return 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143
+    SIGTERM."""
     name, *words = arguments or ["--help"]
     if name in ("-h", "--help"):
         print(study_help())

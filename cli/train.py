@@ -1,4 +1,4 @@
-"""The command that trains a policy or goes on with a run: `train.py`, `springfoot train`."""
+"""Define the command that trains a policy or continues a run: `train.py`, `springfoot train`."""
 
 import dataclasses
 import shlex
@@ -18,7 +18,7 @@ from springfoot.studies.base.flags import given, optional_flags
 
 PRESET = PRESETS["walk"]
 RESUMED = {"timesteps", "threads", "reward_weights"}
-"""Settings that a run may be continued with others of."""
+"""Settings that may change when a run is continued."""
 TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
 FOLDER = tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")
 EnvironmentFlags = optional_flags("EnvironmentFlags", BipedSettings, PRESET.environment)
@@ -52,17 +52,17 @@ class TrainFlags:
 
 
 def train_main(arguments: Sequence[str] | None = None, program: str = "train.py") -> int:
-    """Run the command line; returns its exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 Ctrl-C,
-    143 SIGTERM.
+    """Run the command line; return its exit code: 0 trained, 1 a seed of several failed, 2 bad input, 130 Ctrl-C, 143
+    SIGTERM.
 
-    `arguments` are those of the process unless given; `program` is what messages call it.
+    `arguments` are those of the process unless given; `program` is the name in messages.
     """
     flags = parse(TrainFlags, arguments, program)
     return exit_code(program, lambda: run_training(flags))
 
 
 def run_training(flags: TrainFlags) -> int:
-    """Train or continue a run, then print where the results are."""
+    """Train or continue a run, then print the folder of the results."""
     settings = given(flags.training) | given(flags.environment)
     from springfoot.agents.policies.policy import RUN  # here, as below: help and bad flags need no simulator
     from springfoot.agents.training.run_record import runs_within
@@ -116,7 +116,7 @@ def run_training(flags: TrainFlags) -> int:
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
-    """Train from several seeds, then print how far they agree and where the results are."""
+    """Train from several seeds, then print their agreement and the folders of the results."""
     from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training import multi_seed
 
@@ -133,13 +133,13 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
 
 
 def _likewise(words: str, folders: Sequence[Path]) -> str:
-    """Return a command of the first of some folders, and the names of the others."""
+    """Return a command for the first of several folders, and the names of the others."""
     others = ", ".join(folder.name for folder in folders[1:])
     return f"{words} {_word(folders[0])}" + (f", then so with {others}" if others else "")
 
 
 def _word(folder: Path) -> str:
-    """Return the name of a folder as a shell reads it, spaces and all."""
+    """Return the name of a folder quoted for a shell."""
     return shlex.quote(str(folder))
 
 

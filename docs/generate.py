@@ -1,4 +1,4 @@
-"""Write the pages of the reference that are made from the code: `make docs` runs it, a test compares."""
+"""Write the reference pages that are made from the code: `make docs` runs it, a test compares."""
 
 import dataclasses
 import inspect

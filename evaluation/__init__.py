@@ -1,6 +1,6 @@
-"""From recorded walks to a verdict: how human a walk is.
+"""Turn recorded walks into a verdict: how human a walk is.
 
-A name is imported when it is first asked for: what draws needs matplotlib and Pillow, criteria and curves no simulator.
+A name is imported at its first use: drawing needs matplotlib and Pillow, criteria and curves need no simulator.
 """
 
 from typing import TYPE_CHECKING

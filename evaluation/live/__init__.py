@@ -1,1 +1,1 @@
-"""The walk that is steered from a browser while it runs."""
+"""Steer a walk from a browser while it runs."""

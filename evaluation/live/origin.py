@@ -1,6 +1,6 @@
-"""Whose pages may steer a live walk: its own alone, of all that a browser has open.
+"""Let only its own page steer a live walk, of all pages that a browser has open.
 
-A browser lets any page open a websocket to this machine, and says in `Origin` whose page it is; viser does not look.
+A browser lets any page open a websocket to this machine, and names that page in `Origin`; viser does not check it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,10 +16,10 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def is_own_page(headers: Mapping[str, str], host: str) -> bool:
-    """Return whether a request is of a page from the address it goes to, or of a program, which sends no `Origin`.
+    """Tell whether a request comes from a page of the requested address, or from a program, which sends no `Origin`.
 
-    Where `host`, the address listened on, is this machine's alone, the page's must be, too: a name that leads here
-    (DNS rebinding) is not enough.
+    Where `host`, the address listened on, belongs to this machine alone, the page's address must too: a name that
+    resolves to it (DNS rebinding) is not enough.
     """
     origin = headers.get("Origin")
     if origin is None:
@@ -30,7 +30,7 @@ def is_own_page(headers: Mapping[str, str], host: str) -> bool:
 
 @contextmanager
 def own_pages_only(host: str) -> Iterator[None]:
-    """Make a viser server that answers websockets of other pages with 403 inside the block."""
+    """Make a viser server answer websockets of other pages with 403 inside the block."""
     serve = websockets.serve
 
     def serve_own(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:

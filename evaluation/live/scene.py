@@ -1,8 +1,7 @@
-"""The body of a live walk in 3-D: its capsules and spheres, the ground that runs below it, arrows of its ground forces.
+"""Draw the body of a live walk in 3-D: capsules and spheres, the ground that runs below, arrows of its ground forces.
 
-The body stays in the middle of the picture, however far it walks: ground and forces are moved back by its place.
-Meshes are coarse, and lights cast no shadow and reflect nothing, so that a processor can draw it too, in a browser
-without a GPU.
+The body stays in the middle of the picture, however far it walks: ground and forces are shifted back by the distance.
+Meshes are coarse, and lights cast no shadow and reflect nothing, so that a browser without a GPU can draw them.
 """
 
 import mujoco
@@ -20,15 +19,15 @@ FORCE_LENGTH = 0.55
 FORCE_COLOUR = (213, 94, 0)
 GROUND_COLOUR = (190, 190, 190)
 GROUND_LENGTH, GROUND_WIDTH, GROUND_CELL = 14.0, 4.0, 0.5
-"""Of the grid that runs below it [m]; a metre is a whole number of cells."""
+"""Size and cell of the grid below the body [m]; a metre is a whole number of cells."""
 ROUND = 16
 """Faces around a capsule; chosen, with half as many along each of its ends."""
 DAYLIGHT, SUN = 1.6, 2.2
-"""Intensities of the light from all sides and from one [-]; chosen by eye."""
+"""Intensities of light from all sides and from one side [-]; chosen by eye."""
 
 
 class LiveScene:
-    """Draws what walks in `session` on the page of `server`."""
+    """Draw the body of `session` on the page of `server`."""
 
     def __init__(self, server: viser.ViserServer, session: LiveSession):
         self._server = server
@@ -38,7 +37,7 @@ class LiveScene:
         self._begin()
 
     def show(self) -> None:
-        """Draw the body as it stands now."""
+        """Draw the body in its present posture."""
         session = self._session
         if session.model is not self._model:
             self._server.scene.reset()
@@ -109,8 +108,10 @@ def _grid() -> NDArray:
 
 
 def _arrows(force: NDArray, feet: NDArray, away: NDArray) -> NDArray:
-    """Return (side, (start, end), 3) arrows of `force` as in a `Frame`, in the planes of the `feet` (side, 3); without
-    a force they have no length."""
+    """Return arrows (side, (start, end), 3) of `force` as in a `Frame`, in the planes of the `feet` (side, 3).
+
+    An arrow of no force has no length.
+    """
     points = np.zeros((len(force), 2, 3), np.float32)
     for side, (place, height, forward, up) in enumerate(force):
         start = np.array([place, feet[side, 1], height]) - away * (1, 0, 1)

@@ -1,7 +1,7 @@
-"""A walk that is steered while it runs: what is asked of it, what the body does, one step after another.
+"""Walk one step after another under wishes that may change at any time.
 
-It knows no browser and no clock: `live_view` shows it in real time, tests drive it step by step. The body is one
-`Biped`; K is set by its actions, and read back from what acted in the simulation.
+This module knows no browser and no clock: `live_view` shows the walk in real time, tests drive it step by step. The
+body is one `Biped`. Actions set K, and the K that acted in the simulation is read back.
 """
 
 import sys
@@ -31,18 +31,18 @@ from springfoot.gait.springs.stiffness import SPRINGS
 from ..recording.policies import prepare
 
 Source = Literal["policy", "scaled", "by hand"]
-"""Where K comes from: the policy, the policy times a factor, or a number held all the time."""
+"""Source of K: the policy, the policy times a factor, or a number that the user sets."""
 
 LIVE_SPEEDS = (0.6, 1.8)
-"""Commanded speeds [m/s]; chosen, those at which the fixed schedule walks and a little beyond."""
+"""Commanded speeds [m/s]; chosen: the range in which the fixed schedule walks, and a little beyond."""
 LIVE_HEIGHTS, LIVE_MASSES = (1.45, 2.0), (45.0, 110.0)
 """Heights [m] and masses [kg]; chosen, as adults are."""
 LIVE_FACTORS = (0.25, 4.0)
 """Factors on the policy's K [-]; chosen."""
 OFFSETS_DEG = (-15.0, 15.0)
-"""What is added to theta_eq [deg]; chosen, more than the ankle moves in stance."""
+"""Offsets of theta_eq [deg]; chosen, larger than the ankle's motion in stance."""
 LIVE_PUSHES, PUSH_SECONDS = (-400.0, 400.0), 0.1
-"""Horizontal pushes on the trunk, forward positive [N], and how long each lasts [s]; chosen."""
+"""Horizontal pushes on the trunk, forward positive [N], and the length of each [s]; chosen."""
 ELSEWHERE = {
     "push_newton": "the button Push pushes",
     "push_seconds": f"the button Push pushes for {PUSH_SECONDS:g} s",
@@ -54,31 +54,31 @@ ELSEWHERE = {
     "speed_interval": "the slider speed sets it",
     "slope_range_deg": "the slider slope sets it",
 }
-"""Settings that a live walk does not take, and why."""
+"""Setting that a live walk does not take -> reason."""
 ENDLESS = sys.maxsize
-"""Steps of a walk that ends in a fall alone."""
+"""Steps of a walk that only a fall ends."""
 LYING_SECONDS = 1.0
-"""Time for which a fallen body is shown before it walks anew [s]."""
+"""Time for which a fallen body is shown before the walk restarts [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """What is asked of the walk. Slope, body and feet begin it anew, all else acts while it runs."""
+    """Wishes for the walk. Slope, body and feet restart it; all others act while it runs."""
 
     ankle_source: Source = "policy"
     toe_source: Source = "policy"
     ankle_factor: float = 1.0
-    """On the policy's K where the source is `scaled` [-]."""
+    """Factor on the policy's K with the source `scaled` [-]."""
     toe_factor: float = 1.0
     ankle_stiffness: float = 300.0
-    """K where the source is `by hand` [N m/rad], of this body."""
+    """K with the source `by hand` [N m/rad], of this body."""
     toe_stiffness: float = 40.0
     ankle_offset_deg: float = 0.0
-    """Added to theta_eq of both feet, dorsiflexion positive [deg]."""
+    """Offset of theta_eq at both ankles, dorsiflexion positive [deg]."""
     toe_offset_deg: float = 0.0
-    """The same of the toe, up positive."""
+    """Offset of theta_eq at both toes, up positive [deg]."""
     speed: float = BipedSettings.speed
-    """Commanded [m/s]; the walk approaches it at the setting `speed_rate`."""
+    """Commanded speed [m/s]; the walk approaches it at the setting `speed_rate`."""
     slope_deg: float = BipedSettings.slope_deg
     height: float = BipedSettings.height
     mass: float = BipedSettings.mass
@@ -89,7 +89,7 @@ class Wishes:
 OFFSETS = ("ankle_offset_deg", "toe_offset_deg")
 """Wishes that move theta_eq."""
 ANEW = ("slope_deg", "height", "mass", "left_foot", "right_foot")
-"""Wishes that begin the walk anew."""
+"""Wishes that restart the walk."""
 WISH_RANGES = {
     "ankle_factor": LIVE_FACTORS,
     "toe_factor": LIVE_FACTORS,
@@ -99,28 +99,28 @@ WISH_RANGES = {
     "height": LIVE_HEIGHTS,
     "mass": LIVE_MASSES,
 }
-"""Allowed wishes that no setting bounds already."""
+"""Allowed values of wishes that no setting bounds."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame:
-    """What is told of one step; sides are left and right, joints ankle and toe."""
+    """Numbers of one step; sides are left and right, joints ankle and toe."""
 
     time: float
-    """Since the walk began [s]."""
+    """Time since the start of the walk [s]."""
     stiffness: NDArray
     """(side, joint) K that acted in the simulation in the step's last control window [N m/rad]."""
     equilibrium: NDArray
-    """(side, joint) theta_eq that acted in it [rad]."""
+    """(side, joint) theta_eq that acted in the same window [rad]."""
     force: NDArray
-    """(side, 4) ground reaction force of each foot: where it acts, forward and up [m], and its parts, forward and up
-    [body weights]."""
+    """(side, 4) ground reaction force of each foot: its point of action, forward and up [m], and its components,
+    forward and up [body weights]."""
     speed: float
     """Forward speed of the CoM [m/s]."""
     push: float
     """Push on the trunk in this step [N]."""
     fell: str
-    """Why the body fell, "" while it walks."""
+    """Reason of a fall, "" while the body walks."""
 
 
 class LiveSession:
@@ -128,7 +128,7 @@ class LiveSession:
 
     Args:
         policy: any name that `springfoot evaluate` takes.
-        given: settings asked for, none of those `ELSEWHERE`. What `Wishes` says is asked from there on.
+        given: initial settings, without those of `ELSEWHERE`. Settings that are also `Wishes` can change later.
         seed: of the walk.
 
     Raises `SpringfootError` for an unknown policy or a bad setting.
@@ -164,16 +164,16 @@ class LiveSession:
 
     @property
     def body(self) -> Body:
-        """The body that walks."""
+        """The body of the walk."""
         return body_of(replace(self._settings, height=self.wishes.height, mass=self.wishes.mass))
 
     @property
     def model(self) -> MjModel:
-        """The compiled model of the body that walks, another object whenever it is another body or other feet."""
+        """The compiled model; another object after every change of body or feet."""
         return self._biped.model_of(0)
 
     def data(self) -> MjData:
-        """Return a copy of its state, to draw."""
+        """Return a copy of the simulation's state, for drawing."""
         return self._biped.data(0)
 
     def stiffness_ranges(self) -> NDArray:
@@ -182,7 +182,7 @@ class LiveSession:
         return stiffness_of(ends, self._settings, self.body).T
 
     def ask(self, **wishes: Any) -> None:
-        """Change wishes, by name; raises `SpringfootError`, nothing changed, for what is no walk."""
+        """Change wishes, by name; raises `SpringfootError`, with nothing changed, for impossible wishes."""
         asked = replace(self.wishes, **wishes)
         self._check(asked)
         before = self.wishes
@@ -211,7 +211,7 @@ class LiveSession:
         self._push_steps = ceil(PUSH_SECONDS / self.dt)
 
     def restart(self) -> None:
-        """Begin the walk anew, with the wishes as they are."""
+        """Restart the walk with the present wishes."""
         who = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
         self._biped.reset(np.arange(1), [self._seed], None, who)
         self._walk: Iterator[Walked] = walked_steps(self._biped, self._action, ENDLESS)
@@ -230,7 +230,7 @@ class LiveSession:
         )
 
     def step(self) -> Frame:
-        """Walk one step of the environment. A fallen body lies for `LYING_SECONDS`, then walks anew."""
+        """Walk one step of the environment. A fallen body lies for `LYING_SECONDS`, then the walk restarts."""
         if self._lying:
             self._lying -= 1
             if not self._lying:
@@ -268,7 +268,7 @@ class LiveSession:
         return np.concatenate([place, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
     def _action(self, observation: NDArray) -> NDArray:
-        """Return (1, 4) the action of K as it is asked; the policy's own, untouched, where K is left to it."""
+        """Return the action (1, 4) for the wished K; the policy's own action, unchanged, with the source `policy`."""
         own = np.asarray(self._policy(observation), float).reshape(len(SIDES), len(SPRINGS))
         settings = self._settings
         body = self.body
@@ -309,5 +309,5 @@ class LiveSession:
 
 
 def _offset(wishes: Wishes) -> NDArray:
-    """Return (joint,) what is added to theta_eq [rad]."""
+    """Return the offset of theta_eq, (joint,) [rad]."""
     return np.radians([getattr(wishes, name) for name in OFFSETS])

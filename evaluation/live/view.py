@@ -1,7 +1,7 @@
-"""The live walk in a browser: viser's sliders, buttons and curves around a `LiveSession`, in real time.
+"""Show a `LiveSession` in a browser in real time: viser's sliders, buttons and curves.
 
-No OpenGL is needed here, the browser draws. viser's threads put what is asked into a queue, and one loop obeys, steps
-and shows.
+No OpenGL is needed here, as the browser draws. viser's threads put wishes into a queue; one loop obeys them, steps the
+walk and shows it.
 """
 
 import time
@@ -37,24 +37,24 @@ from .steered_walk import (
 )
 
 CURVE_SECONDS = 4.0
-"""How much of the walk the curves show [s]."""
+"""Length of the walk that the curves show [s]."""
 CURVES_HZ = 10.0
-"""How often curves and words are sent [1/s]; chosen, as they cost more than the body."""
+"""Rate at which curves and words are sent [1/s]; chosen, as they cost more than the body."""
 LATE = 0.25
-"""Delay after which the clock gives up on catching up [s]; chosen."""
+"""Delay after which the clock stops catching up [s]; chosen."""
 FIRST_PUSH = 150.0
-"""Push that the slider begins with [N]."""
+"""Initial push of the slider [N]."""
 SIDE_COLOURS = ("#0072B2", "#D55E00")
-"""Of left and right."""
+"""Colours of left and right."""
 
 
 class LiveView:
     """A page that shows and steers `session`; `run` walks it.
 
     Args:
-        session: what walks.
-        host: address to listen on; the default is reached from this machine alone.
-        port: the first one to try, the next free one is taken; 0 for any.
+        session: the walk.
+        host: address to listen on; only this machine reaches the default.
+        port: the first port to try; the next free one is taken, 0 for any.
     """
 
     def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 8080):
@@ -81,7 +81,7 @@ class LiveView:
         self._tell()
 
     def run(self, seconds: float | None = None) -> float:
-        """Walk in real time for `seconds`, for ever if None; returns how many pictures a second were shown."""
+        """Walk in real time for `seconds`, for ever if None; return the shown pictures a second."""
         dt = self._session.dt
         begin = time.perf_counter()
         shown = self.frames
@@ -108,7 +108,8 @@ class LiveView:
             self._server.stop()
 
     def _obey(self) -> None:
-        """Do what was asked since the last step; what cannot be is told, and the page shows what is."""
+        """Apply the wishes since the last step; for an impossible wish tell the error and show the present value
+        again."""
         wishes: dict[str, Any] = {}
         while not self._asked.empty():
             asked = self._asked.get()
@@ -167,7 +168,7 @@ class LiveView:
         handle.on_update(lambda event: self._asked.put({name: handle.value}) if event.client is not None else None)
 
     def _add_curves(self) -> dict[str, Any]:
-        """Charts by the name of what they show, over time."""
+        """Add the charts over time; return them by the name of their quantity."""
         titles = {"ankle": "K of the ankles, N·m/rad", "toe": "K of the toes, N·m/rad", "load": "Load, body weights"}
         panel = self._gui.add_panel()
         panel.dock_left()
@@ -211,5 +212,5 @@ class LiveView:
 
 
 def _shown(wish: Any) -> Any:
-    """Return a wish as its slider or list shows it: of a foot its kind."""
+    """Return the value of a wish for its slider or list: of a foot, its kind."""
     return wish["kind"] if isinstance(wish, dict) else wish

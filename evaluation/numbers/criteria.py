@@ -1,4 +1,4 @@
-"""What an evaluation must show: criteria on the numbers of metrics.json, each once, and which of them a gait misses."""
+"""List the criteria of an evaluation, on the numbers of metrics.json, and tell which of them a gait misses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,39 +9,40 @@ from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings.settings import settings_from
 
 LOOSENED_BY, LOOSENED_R_BY = 0.2, 0.02
-"""By how much criteria are loosened for each of several seeds: errors and forces as a share of the criterion; r [-]."""
+"""Loosening of criteria for each of several seeds: errors and forces as a fraction of the limit; r [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """A number of `numbers(metrics)` and the range it must lie in, ends included."""
+    """A number of `numbers(metrics)` and its allowed range, ends included."""
 
     name: str
     path: tuple[str, ...]
-    """Where it stands in `numbers(metrics)`."""
+    """Keys of the number in `numbers(metrics)`."""
     low: float = -inf
     high: float = inf
     unit: str = ""
     pattern: str = ".2f"
     loosen: Literal["share", "r", ""] = ""
-    """How `loosened` widens it."""
+    """Rule by which `loosened` widens the range."""
     label: str = ""
-    """What a table of one walk calls it; its name where there is none."""
+    """Name in the table of one walk; empty: the criterion's name."""
 
     def value(self, values: dict[str, Any]) -> float | None:
-        """Return the number; None where it could not be measured."""
+        """Return the number; None if it could not be measured."""
         place: Any = values
         for key in self.path:
             place = place[key]
         return place
 
     def holds(self, values: dict[str, Any]) -> bool:
-        """Return whether the number was measured and lies in the range."""
+        """Tell whether the number was measured and lies in the range."""
         value = self.value(values)
         return value is not None and self.low <= value <= self.high
 
     def loosened(self) -> "Criterion":
-        """With a wider range: by `LOOSENED_BY` of each end, by `LOOSENED_R_BY`, or unchanged, as `loosen` says."""
+        """Return the criterion with a wider range: by `LOOSENED_BY` of each end, by `LOOSENED_R_BY`, or unchanged, as
+        `loosen` says."""
         if self.loosen == "share":
             return replace(
                 self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)
@@ -58,7 +59,7 @@ class Criterion:
 
 
 def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
-    """metrics.json with two more keys: `off`, distances from command and plan, and `double_support_percent`."""
+    """Return metrics.json with two more keys: `off`, distances from command and plan, and `double_support_percent`."""
     settings = settings_from(**metrics["environment"])
     plan = reference_walk_at(settings, settings.speed).plan
     cadence = metrics["cadence_steps_min"]
@@ -84,7 +85,7 @@ def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
 
 
 def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
-    """Return the number as it stands in words, with its unit."""
+    """Return the number with its unit, as words."""
     value = criterion.value(values)
     return "?" if value is None else format(value, criterion.pattern) + criterion.unit
 
@@ -129,7 +130,7 @@ WALKS = (
     _force("vertical_peak2_bw", high=1.3),
     _r("vertical_r", ("grf", "vertical_r"), 0.93),
 )
-"""Of a walk: angles nearer to people's mean than one person's usually are, no hard landing."""
+"""Criteria of a walk: angles nearer to people's mean than one person's usually are, no hard landing."""
 
 MOVES_LIKE_PEOPLE = (
     _rmse("thigh", 2.5),
@@ -202,7 +203,7 @@ def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
 
 
 def _near_people(joint: str, sign: str, theirs: float) -> Criterion:
-    """Within the larger of 30 % and 0.05 J/kg of people's work in a stride [J/kg]."""
+    """Return the criterion of work within 30 % or, if larger, 0.05 J/kg of people's work in a stride [J/kg]."""
     band = max(0.3 * theirs, 0.05)
     return _work(joint, sign, round(max(theirs - band, 0.0), 3), round(theirs + band, 3))
 

@@ -1,4 +1,4 @@
-"""The numbers of an evaluation: how human the walk is.
+"""Compute the numbers of an evaluation: how human the walk is.
 
 `measure` is a pure function of a recording, so that anyone can recompute every number from `strides.npz`. Human-facing
 edge: angles in degrees, forces in body weights (BW), moments in N m/kg, work in J/kg.
@@ -35,12 +35,12 @@ MOMENT_CURVES = {
 
 @dataclass(kw_only=True, eq=False)
 class Gait:
-    """A measured gait: `metrics` as written to metrics.json, and the mean curves it stands on."""
+    """A measured gait: `metrics` as written to metrics.json, and the curves from which they come."""
 
     metrics: dict[str, Any] = field(default_factory=dict)
-    """Plain JSON values; None where something could not be measured."""
+    """Plain JSON values; None for a number that could not be measured."""
     tally: StrideTally = field(default_factory=StrideTally)
-    """What the numbers are computed from."""
+    """Curves and values from which the numbers are computed."""
 
     @property
     def feet(self) -> tuple[StrideCurves, StrideCurves]:
@@ -59,7 +59,7 @@ class Gait:
 
 
 def measure(recording: Recording) -> Gait:
-    """Every number of metrics.json and the mean curves, from the recording alone."""
+    """Compute every number of metrics.json and the mean curves, from the recording alone."""
     tally = tally_strides(recording)
     return Gait(metrics=_metrics(recording, tally), tally=tally)
 
@@ -164,7 +164,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
 
 
 def _reward_terms(recording: Recording) -> dict[str, dict[str, float]]:
-    """`reward_terms`: what each term brings to the return of an episode."""
+    """Return `reward_terms`: the contribution of each term to the return of an episode."""
     terms = np.nan_to_num(recording.series[REWARD].astype(float))
     weights = DEFAULT_WEIGHTS | recording.settings.reward_weights
     alive = terms[..., TERMS.index("alive")]
@@ -190,11 +190,12 @@ def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
 LATE_SWING_PERCENT = 80
 """Percent of the stride from which the hip holds the leg back before it lands."""
 SPRING_SOURCES = ("stiffness_changes", "equilibrium_changes", "spring_damping")
-"""What gives a spring its energy, and takes it, between the plan and the joint (`springfoot.envs.physics.energy`)."""
+"""Entries of the energy ledger that put energy into a spring and take it out, besides the joint's work
+(`springfoot.envs.physics.energy`)."""
 
 
 def _energy(tally: StrideTally) -> dict[str, float | None]:
-    """`energy_J_kg`: both legs, a stride, into the body positive."""
+    """Return `energy_J_kg`: of both legs in a stride, into the body positive."""
     order = ("actuators", "stiffness_changes", "equilibrium_changes", "passive_damping", "spring_damping", "contact")
     names = (*order, "pushes", "mechanical_change", "residual")
     if not tally.energy:
@@ -208,7 +209,7 @@ def _energy(tally: StrideTally) -> dict[str, float | None]:
 
 
 def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
-    """`springs_J_kg`: of one leg, a stride."""
+    """Return `springs_J_kg`: of one leg in a stride."""
     if not tally.energy:
         return {joint: dict.fromkeys(SPRING_SOURCES) for joint in JOINTS}
     entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
@@ -216,7 +217,8 @@ def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
 
 
 def _zmp(planned: NDArray, tally: StrideTally) -> dict[str, float | None]:
-    """`zmp`: the mean CoP against the plan over percent 0 to 99 of the step; at 100 % the plan is at the next foot."""
+    """Return `zmp`: the mean CoP against the plan over percent 0 to 99 of the step; at 100 % the plan is at the next
+    foot."""
     cop = tally.cop.mean("x")[:-1]
     alone = np.full(len(cop), False)
     if tally.step_time:

@@ -1,4 +1,4 @@
-"""The numbers of each leg by itself, where the feet differ, and how far the legs are apart."""
+"""Compute the numbers of each leg by itself, where the feet differ, and the asymmetry of the legs."""
 
 from typing import Any
 
@@ -21,23 +21,23 @@ ANGLE_COLUMNS = {
 
 
 def kinds_of(settings: BipedSettings) -> dict[str, str]:
-    """`feet` of metrics.json: the kind of the left and of the right foot."""
+    """Return `feet` of metrics.json: the kind of the left and of the right foot."""
     return {"left": settings.left_foot.kind, "right": settings.right_foot.kind}
 
 
 def differ(settings: BipedSettings) -> bool:
-    """Return whether the two feet are not the same."""
+    """Tell whether the two feet differ."""
     left, right = settings.feet
     return left != right
 
 
 def leg_numbers(tally: StrideTally) -> dict[str, dict[str, Any]]:
-    """`per_leg` of metrics.json: the numbers of the left and of the right leg."""
+    """Return `per_leg` of metrics.json: the numbers of the left and of the right leg."""
     return {side: _of_leg(tally, index) for index, side in enumerate(SIDES)}
 
 
 def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
-    """`asymmetry` of metrics.json: right less left over their mean, 0 for legs that do the same."""
+    """Return `asymmetry` of metrics.json: right less left over their mean, 0 for equal legs."""
     names = ("step_length_m", "stance_percent", "vertical_max_mean_bw")
     return {name.rpartition("_")[0]: _apart(*(legs[side][name] for side in SIDES)) for name in names}
 
@@ -82,7 +82,7 @@ def _mean(values: NDArray) -> float | None:
 
 
 def _signs(work: NDArray, joint: int) -> tuple[float | None, float | None]:
-    """Positive work, and negative work as a positive number, of one joint; from (strides, joint, 2)."""
+    """Return the positive work of a joint, and its negative work as a positive number, from (strides, joint, 2)."""
     if not len(work):
         return None, None
     up, down = work[:, joint].mean(0)

@@ -1,4 +1,4 @@
-"""The strides of one recorded episode: when each begins and ends, and its curves over percent of it.
+"""Find the strides of one recorded episode, and compute their curves over percent of the stride.
 
 Human-facing edge: angles in degrees, forces in body weights (BW), moments in N m/kg.
 """
@@ -65,7 +65,7 @@ def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: ND
 
 
 def mid_tick(state: NDArray) -> NDArray:
-    """Return a state at the ends of ticks (T, ...) at their middles."""
+    """Return a state, known at the ends of ticks (T, ...), at the middles of the ticks."""
     return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
 
 

@@ -1,4 +1,4 @@
-"""From the 100 Hz series of a recording to curves over the stride and one value for each stride, step and episode.
+"""Tally the 100 Hz series of a recording: curves over the stride, and one value for each stride, step and episode.
 
 Human-facing edge: angles in degrees, forces in body weights (BW), moments in N m/kg, work in J/kg.
 """
@@ -23,14 +23,14 @@ from .curves import StrideCurves
 from .series import GAIT_CYCLE_COLUMNS, foot_contacts, mid_tick, stride_curves, strides_within
 
 SHORTEST_SPEED = 1.0
-"""An episode that ends earlier than this after the warm-up [s] does not count for the speed."""
+"""Least time after the warm-up for which the speed of an episode counts [s]."""
 CLEARANCE_SWING = (0.25, 0.75)
-"""Part of the swing over which toe clearance is measured [share of the swing]."""
+"""Part of the swing over which toe clearance is measured [fraction of the swing]."""
 
 
 @dataclass(kw_only=True, eq=False)
 class StrideTally:
-    """What is collected stride by stride, step by step and episode by episode."""
+    """Curves and values collected stride by stride, step by step and episode by episode."""
 
     feet: tuple[StrideCurves, StrideCurves] = field(
         default_factory=lambda: (StrideCurves(names=GAIT_CYCLE_COLUMNS), StrideCurves(names=GAIT_CYCLE_COLUMNS))
@@ -49,31 +49,31 @@ class StrideTally:
     at_rest: int = 0
     """Episodes that ended standing still."""
     speed: list[float] = field(default_factory=list)
-    """Of each episode [m/s]."""
+    """Mean forward speed of each episode [m/s]."""
     distance: float = 0.0
-    """Walked in all episodes together [m]."""
+    """Distance walked in all episodes together [m]."""
     work: float = 0.0
     """Positive work of all joints in all episodes together [J]."""
     step_length: list[float] = field(default_factory=list)
-    """Of each step [m]."""
+    """Length of each step [m]."""
     step_time: list[float] = field(default_factory=list)
-    """Of each step [s]."""
+    """Duration of each step [s]."""
     double_support: list[float] = field(default_factory=list)
-    """Of each step [s]."""
+    """Double support at the start of each step [s]."""
     step_sides: list[int] = field(default_factory=list)
     """Foot that makes each step: 0 the left one swings and lands at the step's end, 1 the right one."""
     stride_sides: list[int] = field(default_factory=list)
     """Leg of each stride, 0 left, 1 right."""
     stride_time: list[float] = field(default_factory=list)
-    """Of each stride [s]."""
+    """Duration of each stride [s]."""
     toe_off: list[float] = field(default_factory=list)
-    """Of each stride [%]."""
+    """Toe-off of each stride [%]."""
     vertical_max: list[float] = field(default_factory=list)
     """Largest vertical force of each stride [BW]."""
     joint_work: list[NDArray] = field(default_factory=list)
     """(joint, 2) positive and negative work of one leg in each of its strides [J/kg]."""
     energy: list[NDArray] = field(default_factory=list)
-    """What each entry of the body's ledger (`springfoot.envs.physics.energy`) comes to in each stride [J/kg]."""
+    """Change of each entry of the body's ledger (`springfoot.envs.physics.energy`) in each stride [J/kg]."""
     travel: list[float] = field(default_factory=list)
     """Distance the loaded sole slides in each stance [m]."""
     clearance: list[float] = field(default_factory=list)
@@ -81,7 +81,7 @@ class StrideTally:
 
 
 def tally_strides(recording: Recording) -> StrideTally:
-    """Every stride, step and episode of a recording, its steady walk only, without the warm-up."""
+    """Tally every stride, step and episode of a recording: its steady walk, without the warm-up."""
     tally = StrideTally()
     body = body_of(recording.settings)
     fell = recording.fall_reason != ""
@@ -99,7 +99,15 @@ def tally_strides(recording: Recording) -> StrideTally:
 def add_episode(
     tally: StrideTally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool = False
 ) -> None:
-    """Add one episode's strides and steps; `steady` is the time [s] from which they are taken."""
+    """Add the strides and steps of one episode to a tally.
+
+    Args:
+        tally: to add to.
+        series: name -> (T, ...), as in a recording.
+        body: that walked.
+        steady: time span [s]; strides and steps outside it do not count.
+        fell: whether the episode ended in a fall.
+    """
     weight = body.mass * GRAVITY
     com = series["com"]
     begin, end = (round(min(time / TICK, len(com))) for time in steady)
@@ -165,9 +173,8 @@ def _add_steps(
 
 
 def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """Return (S, ...) sums of (T, ...) over spans from `begin` to `end` (S,) [s], ticks that lie in part counted in
-    part.
-    """
+    """Return (S, ...) sums of values per tick (T, ...) from `begin` to `end` (S,) [s]; a tick cut by an end counts in
+    part."""
     total = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
 
     def at(time: NDArray) -> NDArray:
@@ -180,8 +187,8 @@ def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
 
 
 def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """Return (S, entries) of the ledger (T, entries) in strides from `begin` to `end` (S,): its works, and the rise of
-    the mechanical energy [J]."""
+    """Return the ledger (S, entries) of strides from `begin` to `end` (S,) [s]: works, and the rise of mechanical
+    energy [J]."""
     flow = energy.copy()
     state = ledger_entries().index("mechanical")
     flow[1:, state] = np.diff(energy[:, state])
@@ -189,7 +196,7 @@ def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
 
 
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
-    """Return (T,) forward place of both feet's vertical force at the middle of each tick [m]; NaN in flight."""
+    """Return (T,) the forward CoP of both feet at the middle of each tick [m]; NaN in flight."""
     load = series["force"][..., 1]
     place = mid_tick(series["contact"][..., 0])
     total = load.sum(axis=(1, 2))

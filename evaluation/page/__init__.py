@@ -1,4 +1,4 @@
-"""The pages that a browser opens offline: report.html and play.html."""
+"""Write the pages that a browser opens offline: report.html and play.html."""
 
 from typing import TYPE_CHECKING
 

@@ -1,6 +1,7 @@
-"""What `report.html` draws of one policy, as plain JSON values: table, curves, schedules, loops, and the body.
+"""Collect the data that `report.html` draws of one policy, as plain JSON values.
 
-None stands for what could not be measured. Numbers are rounded to what a screen shows; those of metrics.json are not.
+Table, curves, schedules, loops, and the body. None stands for numbers that could not be measured. Numbers are rounded
+for the screen, those of metrics.json are not.
 """
 
 from typing import Any
@@ -29,7 +30,7 @@ FORCE_PANELS = {
 
 
 def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
-    """Return all that the page shows of one policy but its words and its table."""
+    """Return the data of one policy but its words and its table."""
     human = reference_gait(recording.settings)
     apart = differ(recording.settings)
     return {
@@ -66,7 +67,7 @@ def _of(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
 
 
 def _legs(gait: Gait, name: str, apart: bool) -> dict[str, Any]:
-    """`legs`: the same curve of the left and of the right leg, where the feet are `apart`."""
+    """Return `legs`: the same curve of the left and of the right leg if the feet are `apart`, that is differ."""
     if not apart:
         return {}
     return {
@@ -134,7 +135,7 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
 
 
 def _springs(recording: Recording) -> list[dict[str, Any]]:
-    """K and theta_eq over the leg's phase: its mean is the open-loop copy, the SD around it feedback."""
+    """Return K and theta_eq over the leg's phase: the mean is the open-loop copy, the SD around it feedback."""
     curves = schedule_curves(recording)
     group = "Stiffness and equilibrium over the leg's phase"
     panels = []
@@ -162,7 +163,7 @@ def _reward(gait: Gait) -> list[dict[str, Any]]:
 
 
 def _loops(recording: Recording, gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
-    """Moment over angle of ankle and toe; of the ankle also people's, and the thesis's straight lines."""
+    """Return moment over angle of ankle and toe; of the ankle also people's, and the thesis's straight lines."""
     phase = PERCENT / 100
     body = body_of(recording.settings)
     lines = [

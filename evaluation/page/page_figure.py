@@ -1,4 +1,4 @@
-"""The body of `report.html`: two strides of it tick by tick, as plain JSON values, and what its feet are."""
+"""Collect the body of `report.html`: two strides tick by tick, as plain JSON values, and the words of its feet."""
 
 from math import radians, tan
 from typing import Any
@@ -20,7 +20,7 @@ from ..report.animation import clip_of
 from ..report.exports import opensim_forces
 
 DRAWN_DIGITS = 4
-"""Significant digits of what is drawn; chosen: finer than a pixel."""
+"""Significant digits of drawn numbers; chosen: finer than a pixel."""
 
 
 def shown_numbers(values: NDArray) -> Any:
@@ -31,7 +31,7 @@ def shown_numbers(values: NDArray) -> Any:
 
 
 def figure_data(recording: Recording) -> dict[str, Any]:
-    """Two strides of the body, tick by tick: joints, forces, masses and plans, in metres of the world."""
+    """Return two strides of the body, tick by tick: joints, forces, masses and plans, in metres of the world."""
     settings = recording.settings
     body = body_of(recording.settings)
     _, first, last = clip_of(recording, body)
@@ -96,9 +96,8 @@ def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
 
 
 def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
-    """Return (T,) forward place of the planned ZMP [m]: over the step of the leg whose stance began last, from its
-    ankle.
-    """
+    """Return (T,) the planned ZMP [m forward of the world's origin], over the step of the foot whose stance began
+    last."""
     phase = series["phase"] % 1.0
     side = np.where(phase[:, 0] < phase[:, 1], 0, 1)
     every = np.arange(len(phase))
@@ -121,7 +120,7 @@ def _at_joint(joint: FootJoint) -> str:
 
 
 def foot_words(setting: FootSetting) -> str:
-    """Return a foot of the settings for people who read: its kind, and the numbers that were given of it."""
+    """Return a foot of the settings in words: its kind, and the numbers that the user gave."""
     given = setting.numbers
     known = KINDS[setting.kind] | SEGMENT_RATIOS
     words = [f"{_plain(name)} {given[name]:g} {known[name].unit}" for name in known if name in given]

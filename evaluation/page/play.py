@@ -1,4 +1,4 @@
-"""play.html: recorded walks, between which sliders blend; one file that opens offline, and says what it is."""
+"""Write play.html: recorded walks, between which sliders blend; one file that opens offline."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -9,12 +9,12 @@ from .template import as_json, filled
 
 
 class Grid(NamedTuple):
-    """Where walks are recorded: all combinations, the last axis fastest."""
+    """Points at which walks are recorded: all combinations, the last axis fastest."""
 
     feet: Sequence[str]
     """Kinds of the right foot."""
     speed: Sequence[float]
-    """Commanded [m/s]."""
+    """Commanded speeds [m/s]."""
     toe: Sequence[float]
     """Factors on K of the toes."""
     ankle: Sequence[float]
@@ -22,23 +22,23 @@ class Grid(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many combinations."""
+        """Number of combinations."""
         return len(self.feet) * len(self.speed) * len(self.toe) * len(self.ankle)
 
 
 class PlayPage(NamedTuple):
-    """A page, and what was found on the way."""
+    """A page, and the numbers of its walks."""
 
     text: str
     """HTML."""
     told: list[dict[str, Any]]
-    """The numbers of each walk, as `play_data.walk_of`."""
+    """Numbers of each walk, as `play_data.walk_of`."""
 
 
 def play_page(grid: Grid, recordings: Sequence[Recording], what: str, made: str) -> PlayPage:
     """Return the page of `recordings`, one for each combination of `grid` in its order.
 
-    `what` was recorded, in a sentence; `made` says how.
+    `what` describes the recordings in a sentence; `made` names the command.
     """
     told, walks = zip(*map(walk_of, recordings), strict=True)
     a_foot = len(recordings) // len(grid.feet)

@@ -1,7 +1,7 @@
-"""What `play.html` draws: of each recorded walk its mean stride, or where it only fell its last moments.
+"""Collect the data that `play.html` draws: the mean stride of each recorded walk, or its last moments if it only fell.
 
-A walk is an array (MOMENTS, columns). All walks of a page are kept as whole numbers of 16 bits, between the least and
-the largest value of each column: finer than a pixel, and a fifth of the same in digits.
+A walk is an array (MOMENTS, columns). All walks of a page are packed as integers of 16 bits between the least and the
+largest value of each column: finer than a pixel, and a fifth of the size of digits.
 """
 
 from base64 import b64encode
@@ -27,7 +27,7 @@ from .page_figure import figure_data, planned_zmp, shown_numbers
 MOMENTS = 51
 """Moments of a stride, every 2 %; of a fall, evenly over its time."""
 FALL_SECONDS = 1.5
-"""How much of a fall is shown, its end [s]."""
+"""Length of a fall's last moments that are shown [s]."""
 STIFFNESS_UNIT = "K, N·m/rad"
 PANELS = {
     "Thigh angle": (ANGLE_COLUMNS["thigh"], "flexion, deg", "thigh"),
@@ -40,24 +40,24 @@ PANELS = {
     "Ankle stiffness": ("ankle_stiffness_Nm_per_rad", STIFFNESS_UNIT, None),
     "Toe stiffness": ("toe_stiffness_Nm_per_rad", STIFFNESS_UNIT, None),
 }
-"""Title -> column of the curves over the stride, unit, and what of people stands behind it, if anything."""
+"""Title -> column of the curves over the stride, unit, and people's curve behind it, if any."""
 BODY_PARTS = {"base": 3, "angle": 8, "com": 2, "plan": 2, "zmp": 1, "forward": 2, "up": 2, "lever": 2, "stiffness": 4}
-"""What the body is drawn from, and how many columns that has; see `_figure_series`."""
+"""Part of the drawing -> number of its columns; see `_figure_series`."""
 PLAY_COLUMNS = (
     *(name for name, size in BODY_PARTS.items() for _ in range(size)),
     *(title for title in PANELS for _ in SIDES),
 )
 """The columns of a walk, in order."""
 LARGEST = 65535
-"""Largest whole number of 16 bits."""
+"""Largest integer of 16 bits."""
 
 
 def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
-    """Numbers, and series (MOMENTS, len(PLAY_COLUMNS)), of one recorded walk.
+    """Return numbers and series (MOMENTS, len(PLAY_COLUMNS)) of one recorded walk.
 
-    Of the episodes without a fall the mean stride of the left leg, after the warm-up; where there is none, as every one
-    fell, the end of the longest, and `ended` says why. Places are forward of the hip, which itself goes on by `length`
-    [m] in `seconds` [s].
+    The series is the mean stride of the left leg after the warm-up, over the episodes without a fall; if every episode
+    fell, the end of the longest one, and `ended` names the reason. Positions are forward of the hip, which moves on by
+    `length` [m] in `seconds` [s].
     """
     standing = recording.fall_reason == ""
     told = {"falls": int((~standing).sum()), "episodes": len(standing)}
@@ -122,8 +122,8 @@ def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], ND
 def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body) -> NDArray:
     """Return (T, 26) columns of `BODY_PARTS`.
 
-    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP, forward of the hip; forces in body weights;
-    `up` times where it acts forward of the hip, 0 without a force; K.
+    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP, forward of the hip; forces in body weights; the
+    vertical force times its CoP forward of the hip, 0 without a force; K.
     """
     hip = series["base"][:, :1]
     ahead = np.array([[1.0, 0.0]]) * hip
@@ -144,7 +144,7 @@ def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body)
 
 
 def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
-    """Return all series of a page as text: `low` and `high` of each column, and whole numbers between them."""
+    """Return all series of a page as text: `low` and `high` of each column, and integers between them."""
     values = np.stack(walks)
     values = np.where(values < LOCK.stiffness, values, 0.0)  # of a locked joint no K is drawn
     low = values.min(axis=(0, 1))
@@ -161,7 +161,7 @@ def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
 
 
 def people_behind(recording: Recording) -> dict[str, Any]:
-    """People's mean and SD behind each panel, over percent of the stride, and their toe-off [%]."""
+    """Return people's mean and SD behind each panel, over percent of the stride, and their toe-off [%]."""
     human = reference_gait(recording.settings)
     phase = PERCENT / 100
     curves = {}
@@ -177,7 +177,7 @@ def people_behind(recording: Recording) -> dict[str, Any]:
 
 
 def drawn_body(recording: Recording) -> dict[str, Any]:
-    """Lengths, feet and colours of the body."""
+    """Return lengths, feet and colours of the body."""
     names = ("slope", "height", "feet", "lengths", "ranges")
     whole = figure_data(recording)
     return {name: whole[name] for name in names}

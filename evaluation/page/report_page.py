@@ -1,7 +1,7 @@
-"""report.html: one page that opens offline, with the verdict in words and all that a walk's numbers come from.
+"""Write report.html: one page that opens offline, with the verdict in words and all curves behind a walk's numbers.
 
-Its drawings are SVG by a small script of its own (`drawing.js`, 18 kB): the bundle that pip brings with plotly is
-4.8 MB, and would not draw the body.
+Its drawings are SVG by a small script (`drawing.js`, 18 kB): the bundle that pip brings with plotly is 4.8 MB, and
+would not draw the body.
 """
 
 import json
@@ -26,7 +26,7 @@ JUDGED_SPEED = 1.2
 
 
 def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str = "") -> None:
-    """Write one page of one or several evaluated policies; `command` says how it was made."""
+    """Write one page of one or several evaluated policies; `command` names the command that made it."""
     data = {
         "policies": [policy_data(recording, gait) for recording, gait in walks],
         "tables": [table_rows(gait.metrics) for _, gait in walks],
@@ -51,7 +51,7 @@ def _made(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
 
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Of the policies, in their order; as in page.html."""
+"""Colours of the policies, in their order; as in page.html."""
 
 
 def _verdict(index: int, metrics: dict[str, Any]) -> str:
@@ -64,7 +64,7 @@ def _verdict(index: int, metrics: dict[str, Any]) -> str:
 
 
 def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
-    """Falls, speed, joints, forces and energy in words."""
+    """Return falls, speed, joints, forces and energy in words."""
     environment = metrics["environment"]
     people = people_metrics(reference_gait(settings_from(**environment)))
     judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED

@@ -1,4 +1,4 @@
-"""The parts that pages share: one style, one script that draws, and data that no text can leave."""
+"""Fill the pages' templates: one style, one drawing script, and data that cannot end the script around it."""
 
 import json
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from importlib import resources
 from typing import Any
 
 SHARED = {"STYLE": "page.css", "DRAWING": "drawing.js"}
-"""Marks in the pages, and the files that stand there."""
+"""Mark in the pages -> file that replaces it."""
 
 
 def filled(name: str, texts: Mapping[str, str]) -> str:
@@ -21,5 +21,5 @@ def filled(name: str, texts: Mapping[str, str]) -> str:
 
 
 def as_json(data: Any) -> str:
-    """JSON that can stand inside a page's script."""
+    """Return JSON that is safe inside a page's script."""
     return json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")

@@ -1,4 +1,4 @@
-"""The one loop over a walk: a policy's episodes as 100 Hz series."""
+"""Record walks: a policy's episodes as 100 Hz series, all through one loop."""
 
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,7 @@
-"""What of a policy's stiffness follows the phase alone: its mean K played open loop, and how much of K is the rest.
+"""Split a policy's stiffness into a schedule of the phase, which can be played open loop, and feedback.
 
-A policy decides K of ankle and toe from all that it observes. Its mean K over the stride is a schedule, which walks
-open loop at the same equilibrium; what K does besides, at equal phase, is feedback.
+A policy decides K of ankle and toe from its whole observation. Its mean K over the stride is a schedule, which walks
+open loop at the same equilibrium; differences of K at equal phase are feedback.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,35 +22,36 @@ from springfoot.gait.springs.stiffness import SPRINGS
 from .recording import TICK, WARM_UP, Recording, record
 
 MEAN_KNOTS = 50
-"""Phases at which a mean K is given, linear between them: every 2 % of the stride, on which all corners of the tuned
-schedule but one lie, and at 50 Hz a decision or so to each."""
+"""Phases of the mean K, linear between them: every 2 % of the stride. All corners of the tuned schedule but one lie on
+them, and at 50 Hz about one decision of a stride belongs to each."""
 SMOOTHING = 0.01
-"""Weight of the curvature at a knot against one decision on it: nothing, but where a leg skips phases."""
+"""Weight of the curvature at a knot against one decision on it: negligible, except where a leg skips phases."""
 COPY_EPISODES, COPY_SECONDS = 8, 12.0
-"""Undisturbed walking whose mean K is taken, at each speed; seeds 0 to 7: some 150 decisions to a knot."""
+"""Undisturbed episodes, seeds 0 to 7, and length of each [s], from which the mean K at a speed comes: some 150
+decisions for each knot."""
 UNDISTURBED: dict[str, Any] = {
     name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS if THEME_OF[name] in ("episode", "disturbance")
 } | {"unevenness_m": 0.0, "episode_seconds": COPY_SECONDS}
-"""Settings of that walking; body, speed, slope, friction and all else are those asked for."""
+"""Settings of those episodes; body, speed, slope, friction and all else are the given ones."""
 Watch = Callable[[float], Callable[[float], object]]
-"""How somebody follows a walk: told its length [s], it gives what is told each step's."""
+"""Function that is given the length of a walk [s] and returns a function to call with the seconds of each step."""
 SAME_K = 1e-9
-"""Variance of log K below which K is constant and has no share of anything."""
+"""Variance of log K below which K counts as constant."""
 
 
 def deciding_legs(settings: BipedSettings) -> list[int]:
-    """Return the sides whose springs follow the policy's stiffness at ankle and toe; in others either is a device."""
+    """Return the sides whose ankle and toe follow the policy's stiffness; a leg with a device at either is left out."""
     return [side for side, foot in enumerate(settings.feet) if not any(joint.device for joint in foot.joints)]
 
 
 def decided(
     recording: Recording, sides: Sequence[int] | None = None, series: str = "stiffness"
 ) -> tuple[NDArray, NDArray]:
-    """Phase (n,) of a leg at each decision and K (n, 2) [N m/rad] of ankle and toe from then on.
+    """Return the phase (n,) of a leg at each decision, and K (n, 2) [N m/rad] of ankle and toe from then on.
 
-    Of the steady walk, the first `WARM_UP` seconds left out; of all `sides` together. Where none are named, a leg whose
-    foot is a device decides nothing and is left out, unless both are. Times at which muscles are slack are left out.
-    `series` names another pair in place of K.
+    Decisions of the steady walk without its first `WARM_UP` seconds, of all `sides` together; by default the
+    `deciding_legs`, or both legs if there are none. Times with slack muscles are left out. `series` names another pair
+    in place of K.
     """
     begin, end = steady_walk(recording.settings)
     step = round(recording.settings.step_seconds / TICK)
@@ -67,9 +68,8 @@ def decided(
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """Return (MEAN_KNOTS, C) periodic curve, linear between knots, of least squares from `values` (n, C) at `phase`
-    (n,).
-    """
+    """Fit a periodic curve (MEAN_KNOTS, C), linear between knots, to `values` (n, C) at `phase` (n,) by least
+    squares."""
     normal = np.zeros((MEAN_KNOTS, MEAN_KNOTS))
     circle = np.arange(MEAN_KNOTS)
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
@@ -89,11 +89,12 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
 
 
 def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
-    """`feedback` of metrics.json: what the phase does not explain of log K, of ankle and toe; None without K.
+    """Return `feedback` of metrics.json: the part of log K of ankle and toe that the phase does not explain; None
+    without K.
 
-    `share` is that part of its variance [0..1], `spread` its standard deviation at equal phase (0.1: K varies by 10 %).
+    `share` is that part of the variance [0, 1], `spread` its standard deviation at equal phase (0.1: K varies by 10 %).
     The variance at equal phase is half the mean squared difference of neighbours in phase (Rice, Annals of Statistics
-    12 (1984) 1215), so that any schedule has none, steps or not.
+    12 (1984) 1215), so that any schedule has none, with or without steps.
     """
     phase, stiffness = decided(recording)
     if len(phase) < 2:
@@ -118,15 +119,15 @@ def open_loop_copy(
 
     Args:
         policy: observations to actions.
-        settings: in which it walks; the mean is of its body on its ground, `UNDISTURBED`.
-        name: what the policy is called in errors.
+        settings: of its environment; the mean is of its body on its ground, under `UNDISTURBED`.
+        name: of the policy, in errors.
         threads: of the physics; any number gives the same bits.
-        watch: told how long the walks for it are [s], returns what is told the seconds of each step.
+        watch: see `Watch`.
 
-    The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`). Where other
-    speeds can be commanded it is taken at each tabulated one, and linear between; for other bodies it scales. The
-    equilibrium is the settings' own. A residual action can leave the range of absolute ones, a copy cannot: K beyond
-    it is the nearer end's. Raises `SpringfootError` for a policy that walks no strides.
+    The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`). If other speeds
+    can be commanded, it is taken at each tabulated speed, and is linear between them; K scales with the body. The
+    equilibrium is that of the settings. A residual action can leave the range of absolute actions, a copy cannot: K
+    beyond the range becomes its nearer end. Raises `SpringfootError` for a policy that walks no strides.
     """
     alone = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     means: dict[float, NDArray] = {}

@@ -1,4 +1,4 @@
-"""The files of an evaluation: tables, figures, pictures, and files for other tools."""
+"""Write the files of an evaluation: tables, figures, pictures, and files for other tools."""
 
 from typing import TYPE_CHECKING
 

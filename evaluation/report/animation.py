@@ -1,4 +1,4 @@
-"""walk.gif: two strides of the walk as a stick figure with its ground reaction forces; needs no GL."""
+"""Draw walk.gif: two strides of the walk as a stick figure with its ground reaction forces; needs no GL."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def save_animation(path: Path, recording: Recording) -> None:
 
 
 def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
-    """Episode, first and last tick of what is shown."""
+    """Return episode, first and last tick of the clip."""
     episode = recording.example
     ticks = int(recording.ticks[episode])
     if not recording.fall_reason[episode]:
@@ -116,7 +116,7 @@ class _Canvas:
         self._draw.ellipse((x - r, y - r, x + r, y + r), **style)
 
     def _capsule(self, start: NDArray, end: NDArray, radius: float, colour: tuple) -> None:
-        """Return a round-ended line, `radius` in metres."""
+        """Draw a round-ended line with `radius` [m]."""
         width = max(1, round(2 * radius * self._scale))
         self._draw.line([self._pixel(start), self._pixel(end)], fill=colour, width=width)
         self._disc(start, radius, fill=colour)
@@ -246,6 +246,6 @@ def _palette() -> Image.Image:
 
 
 def _turned(offset: tuple[float, float], angle: float) -> NDArray:
-    """Return an offset (forward, up) in a segment's frame, in the world; toes-up positive."""
+    """Return an offset (forward, up) in a segment's frame as one in the world; toes-up positive."""
     forward, up = offset
     return np.array([forward * np.cos(angle) - up * np.sin(angle), forward * np.sin(angle) + up * np.cos(angle)])

@@ -1,6 +1,6 @@
-"""every_stride.csv and every_stride.parquet: each stride's own curves as one tidy table, a row for each percent of it.
+"""Write every_stride.csv and every_stride.parquet: the curves of each stride, one row for each percent.
 
-Parquet needs pyarrow (extra `parquet`), which other tools read a hundred times faster than text.
+Parquet needs pyarrow (extra `parquet`); other tools read it a hundred times faster than text.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +20,7 @@ from ..numbers.series import GAIT_CYCLE_COLUMNS, foot_contacts, stride_curves, s
 from ..recording.recording import WARM_UP, Recording
 
 STRIDE_KEYS = ("episode", "side", "stride", "begin_s", "stride_time_s", "fell", "percent")
-"""Columns that say which stride a row is of, before `GAIT_CYCLE_COLUMNS`."""
+"""Columns that identify the stride of a row, before `GAIT_CYCLE_COLUMNS`."""
 
 
 def write_every_stride(folder: Path, recording: Recording) -> None:
@@ -38,8 +38,11 @@ def write_every_stride(folder: Path, recording: Recording) -> None:
 
 
 def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]]:
-    """Return the strides that the mean curves are of, in their order: which one (`STRIDE_KEYS` without percent), and
-    its curves (101, C) as float32 in the order of `GAIT_CYCLE_COLUMNS`."""
+    """Yield the strides behind the mean curves, in order: the values of `STRIDE_KEYS` without percent, and the curves
+    (101, C).
+
+    Curves are float32, in the order of `GAIT_CYCLE_COLUMNS`.
+    """
     body = body_of(recording.settings)
     begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks.tolist()):

@@ -1,4 +1,4 @@
-"""What other tools read of a walk: OpenSim's motion and storage files, and the body as a MuJoCo model.
+"""Write the files of a walk for other tools: OpenSim's motion and storage files, and the body as a MuJoCo model.
 
 OpenSim: x forward, y up, z to the right. Coordinates are named as in its full-body models of walking, in which the
 knee's flexion is positive (Rajagopal et al. 2016); gait2392 has it negative. The pelvis is the trunk: `pelvis_tx` and
@@ -32,7 +32,7 @@ def write_opensim(folder: Path, recording: Recording) -> None:
 
 
 def opensim_coordinates(recording: Recording) -> dict[str, NDArray]:
-    """Column of `walk.mot` -> (T,): time at the end of each tick [s], angles [deg], places [m]."""
+    """Return column of `walk.mot` -> (T,): time at the end of each tick [s], angles [deg], positions [m]."""
     series = recording.shown()
     x, above, pitch = series["base"].T
     columns = {
@@ -48,10 +48,11 @@ def opensim_coordinates(recording: Recording) -> dict[str, NDArray]:
 
 
 def opensim_forces(recording: Recording) -> dict[str, NDArray]:
-    """Column of `walk.sto` -> (T,): time in the middle of each tick [s], forces [N], places [m], moments [N m].
+    """Return column of `walk.sto` -> (T,): time in the middle of each tick [s], forces [N], positions [m], moments [N
+    m].
 
-    Each foot's force acts at its centre of pressure on the mean ground, about which it has no moment; a foot that
-    bears nothing has it below its ankle.
+    Each foot's force acts at its centre of pressure on the mean ground, about which it has no moment. Without a force
+    the point lies below the ankle.
     """
     series = recording.shown()
     slope = _slope(recording.settings)

@@ -1,4 +1,4 @@
-"""walk.mp4: the first seconds of the walk as MuJoCo draws it; needs OpenGL and the extra `film`."""
+"""Write walk.mp4: the first seconds of the walk as MuJoCo draws it; needs OpenGL and the extra `film`."""
 
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -18,25 +18,25 @@ FILM_SECONDS = 10.0
 TICKS_A_FRAME = 4
 """Ticks of 10 ms from one picture to the next: 25 a second, in real time."""
 QUALITY = 7
-"""Of the encoder, 0 to 10; chosen."""
+"""Quality of the encoder, 0 to 10; chosen."""
 
 
 def require_film() -> None:
-    """Raise `SpringfootError`, saying what would help, where no film can be made."""
+    """Raise `SpringfootError`, with the remedy, if no film can be made."""
     if find_spec("imageio_ffmpeg") is None:
         raise SpringfootError("a film needs an encoder: pip install 'springfoot[film]'")
     Camera(mujoco.MjSpec().compile(), "rgb_array", 1.0).close()
 
 
 def film_seconds(recording: Recording) -> float:
-    """Return how long the film is [s]."""
+    """Return the length of the film [s]."""
     return min(FILM_SECONDS, TICK * int(recording.ticks[recording.example]))
 
 
 def save_film(path: Path, recording: Recording, progress: Callable[[float], object] = lambda seconds: None) -> None:
-    """Write the film; `progress` is told the seconds of it that each picture adds.
+    """Write the film; call `progress` with the seconds of film that each picture adds.
 
-    Raises `SpringfootError` where there is no OpenGL, no encoder, or the encoder fails.
+    Raises `SpringfootError` without OpenGL or an encoder, and if the encoder fails.
     """
     require_film()
     import imageio_ffmpeg  # pyright: ignore[reportMissingImports]  # optional

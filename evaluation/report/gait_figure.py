@@ -1,4 +1,4 @@
-"""gait.png: the gait cycle of the model over that of people."""
+"""Draw gait.png: the gait cycle of the model over that of people."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ OTHER_LEG = "#c77800"
 PLAN = "#d1495b"
 PEOPLE = "#8a8a8a"
 Legs = tuple[tuple[StrideCurves, str], ...]
-"""What is drawn of the model: curves and their colours, both feet together or, where they differ, left and right."""
+"""Drawn curves of the model and their colours: both feet together or, if they differ, left and right."""
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
@@ -45,7 +45,7 @@ STYLE: dict[Any, Any] = {
 
 
 def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
-    """Write the picture: angles, moments, forces, CoM and stiffness, people's mean ± SD behind each."""
+    """Draw angles, moments, forces, CoM and stiffness, people's mean ± SD behind each."""
     settings = recording.settings
     metrics = gait.metrics
     human = reference_gait(settings)
@@ -150,7 +150,7 @@ def _model(ax: Axes, legs: Legs, name: str) -> None:
 
 
 def _note(ax: Axes, value: float | None, pattern: str, r: float | None) -> None:
-    """Numbers above the panel, flush right."""
+    """Write numbers above the panel, flush right."""
     parts = [] if value is None else [pattern.format(value)]
     parts += [] if r is None else [f"r {r:.2f}"]
     ax.text(1.0, 1.02, ", ".join(parts), transform=ax.transAxes, ha="right", va="bottom", fontsize=8, color="#666666")

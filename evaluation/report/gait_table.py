@@ -1,4 +1,4 @@
-"""The table of an evaluation in the terminal: the walk's numbers beside people's, readable in 60 columns."""
+"""Print the table of an evaluation in the terminal: the walk's numbers beside people's, readable in 60 columns."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -63,7 +63,7 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
 
 
 def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
-    """Return the legs beside each other, where their feet differ; a foot's name may take two lines."""
+    """Return the table of the two legs, for feet that differ; a foot's name may take two lines."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     for name in ("each leg",) if narrow else ("each leg", ""):
         table.add_column(name, no_wrap=not narrow)
@@ -75,7 +75,7 @@ def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
 
 
 def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return quantity, unit, left and right leg; nothing where the feet are the same."""
+    """Return quantity, unit, left and right leg; empty if the feet are the same."""
     if metrics["per_leg"] is None:
         return []
     legs = metrics["per_leg"].values()
@@ -106,13 +106,13 @@ def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
 
 
 def print_results(out: Path, files: Sequence[str]) -> None:
-    """Print where the results are: the place as it is, to be copied, and the names of the files."""
+    """Print the folder of the results, ready to copy, and the names of the files."""
     print(f"\nResults: {out}")
     print_words(", ".join(files))
 
 
 def print_words(text: str) -> None:
-    """Print a sentence as it is, wrapped between words where the output is a terminal."""
+    """Print a sentence, wrapped between words if the output is a terminal."""
     console = Console(highlight=False, markup=False, emoji=False)
     console.print(printable(text), soft_wrap=not console.is_terminal)
 
@@ -120,7 +120,7 @@ def print_words(text: str) -> None:
 NARROW = 76
 """Columns of a terminal below which the unit goes into the label, which may take two lines; numbers never do."""
 TableRow = tuple[str, str, str, str, str, str]
-"""What, unit, model, people, r, share inside people's mean ± SD."""
+"""Quantity, unit, model, people, r, fraction inside people's mean ± SD."""
 
 
 def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
@@ -243,7 +243,7 @@ def people_metrics(human: HumanGait) -> dict[str, Any]:
 
 
 def _people_work(human: HumanGait, joint: str) -> dict[str, float]:
-    """Positive and negative work of one of people's joints in a stride [J/kg], from their mean power."""
+    """Return positive and negative work of one of people's joints in a stride [J/kg], from their mean power."""
     power = human.mean(f"{joint}_power", PERCENT / 100)[None]
     positive, negative = score.stride_work(power, np.array([human.stride_time]))
     return {"positive": float(positive[0]), "negative": float(negative[0])}

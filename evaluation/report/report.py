@@ -39,13 +39,13 @@ FILES = (
     "walk.sto",
     "model.xml",
 )
-"""What every evaluation writes, and `gait_cycle` of each leg."""
+"""Files of every evaluation, and `gait_cycle` of each leg."""
 
 
 def write_report(
     folder: Path, recording: Recording, gait: Gait, progress: Callable[[float], object] = lambda share: None
 ) -> None:
-    """Write every file of an evaluation into the existing `folder`; `progress` is told which share is newly done."""
+    """Write every file of an evaluation into the existing `folder`; call `progress` with the fraction newly done."""
     writers: tuple[Callable[[], object], ...] = (
         lambda: _write_numbers(folder, recording, gait),
         lambda: save_gait_figure(folder / "gait.png", recording, gait),
@@ -70,7 +70,7 @@ def _write_numbers(folder: Path, recording: Recording, gait: Gait) -> None:
 
 
 def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) -> None:
-    """Return one gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
+    """Write one gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
 
     The leading columns repeat the whole gait's values on each row, as in the reference data.
     """

@@ -1,4 +1,4 @@
-"""A walk's springs as tables for a controller: K and theta_eq over the stride, and as a few finite states.
+"""Write a walk's springs as tables for a controller: K and theta_eq over the stride, and as a few finite states.
 
 Both are read back as policies (`springfoot.agents.policies.schedules`).
 """
@@ -52,8 +52,10 @@ def write_schedules(folder: Path, recording: Recording) -> None:
 
 
 def schedule_curves(recording: Recording) -> dict[str, NDArray]:
-    """Column of `stiffness_schedule.csv` -> (101,) over percent of the leg's phase: mean K [N m/rad] and theta_eq [deg]
-    of each spring at the moments of decision, and their standard deviation at equal phase. NaN without decisions.
+    """Return column of `stiffness_schedule.csv` -> (101,) over percent of the leg's phase.
+
+    Mean K [N m/rad] and theta_eq [deg] of each spring at its decisions, and their standard deviation at equal phase;
+    NaN without decisions.
     """
     curves: dict[str, NDArray] = {}
     for side, name in enumerate(SIDES):
@@ -70,7 +72,7 @@ def schedule_curves(recording: Recording) -> dict[str, NDArray]:
 
 
 def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """Mean and standard deviation (101, 2) at equal phase of `values` (n, 2) at `phase` (n,)."""
+    """Return mean and standard deviation (101, 2) at equal phase of `values` (n, 2) at `phase` (n,)."""
     if not len(phase):
         nothing = np.full((len(PERCENT), values.shape[1]), np.nan)
         return nothing, nothing
@@ -86,12 +88,13 @@ def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
 
 
 def finite_states(recording: Recording) -> dict[str, Any]:
-    """`finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of the `deciding_legs` together.
+    """Return `finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of the `deciding_legs`
+    together.
 
     K is the mean over the state; theta_eq is the angle at which the state's spring has its mean torque at its mean
-    angle and rate. None where the walk has no such state; times at which muscles are slack are left out. The states
-    begin at the gait events of the walk that the body is held to (`gait_events`), the inner ones half-way between two.
-    Raises `SpringfootError` where both feet have a device.
+    angle and rate. None stands for a state that the walk does not have; times with slack muscles are left out. The
+    states begin at the gait events of the target (`gait_events`), the inner ones half-way between two. Raises
+    `SpringfootError` if both feet have a device.
     """
     settings = recording.settings
     body = body_of(recording.settings)

@@ -11,34 +11,34 @@ from springfoot.files.markdown import text_of
 from springfoot.files.writing import csv_text
 
 COMPARED_JOINTS = ("thigh", "knee", "ankle")
-"""Whose angles are compared; people's toe is that of other people."""
+"""Joints whose angles are compared; people's toe comes from another measurement of other people."""
 
 
 OPEN_LOOP = "open loop"
-"""What tables call a policy's open-loop copy."""
+"""Name of a policy's open-loop copy in tables."""
 
 
 def open_loop_note(name: str) -> str:
-    """Return the sentence under a table that has the open-loop copy of a policy; empty where it has none."""
+    """Return the sentence under a table with a policy's open-loop copy; empty if the policy has none."""
     copies = ", ".join(f"`{copy}`" for copy in and_copy(name)[1:])
     return copies and f" Open loop: {copies}, the policy's mean K over the stride at the same θ_eq, without feedback."
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: its label, the format of its numbers, and where they stand in nested metrics."""
+    """Column of a table: its label, the format of its numbers, and their keys in nested metrics."""
 
     label: str
     pattern: str
     path: tuple[str, ...]
 
     def of(self, metrics: Mapping[str, Any]) -> Any:
-        """Return the number; None where it could not be measured."""
+        """Return the number; None if it could not be measured."""
         return reduce(getitem, self.path, metrics)
 
     @property
     def csv_name(self) -> str:
-        """Return its name in a CSV file: the place, joined."""
+        """Return the column's name in a CSV file: its keys, joined."""
         return "_".join(self.path)
 
 
@@ -55,11 +55,11 @@ WALK_COLUMNS = (
         for phase in ("loading", "mid_stance", "push_off", "swing")
     ),
 )
-"""The numbers of a walk that `compare` tabulates over several policies, and that CSV files of walks hold."""
+"""Numbers of a walk in the tables of `compare` and in CSV files of walks."""
 
 
 def walks_csv(rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
-    """CSV: a line for each walk, of what it is of and its metrics: `WALK_COLUMNS` and the number of episodes."""
+    """Return the CSV with a line for each walk: its labels, `WALK_COLUMNS`, and the number of episodes."""
     head = [*rows[0][0], "episodes", *(each.csv_name for each in WALK_COLUMNS)]
     lines = ([*of.values(), metrics["episodes"], *(each.of(metrics) for each in WALK_COLUMNS)] for of, metrics in rows)
     return csv_text(head, lines)
@@ -71,5 +71,5 @@ def falls_text(metrics: Mapping[str, Any]) -> str:
 
 
 def rmse_text(metrics: Mapping[str, Any]) -> str:
-    """RMSE of `COMPARED_JOINTS` to people's mean [deg], in words."""
+    """Return the RMSE of `COMPARED_JOINTS` to people's mean [deg], in words."""
     return " / ".join(text_of(metrics["joints"][joint]["rmse_deg"], ".1f") for joint in COMPARED_JOINTS)

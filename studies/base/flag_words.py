@@ -1,4 +1,4 @@
-"""What stands behind a flag on the command line -> the value of a setting of that type, or what is wrong with it."""
+"""Convert the words behind a flag to the value of a setting's type, or say what is wrong with them."""
 
 from collections.abc import Callable
 from types import NoneType, UnionType
@@ -15,7 +15,7 @@ class _NotGiven:
 
 
 NOT_GIVEN: Final = _NotGiven()
-"""Default of a flag that may be left out."""
+"""Default of an optional flag."""
 _NONE = "None"
 _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
     int: (int, "a whole number"),
@@ -25,9 +25,9 @@ _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 
 def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
-    """Return how tyro reads a flag of this type.
+    """Return tyro's reader of a flag of this type.
 
-    The word `None` is a value of those that can be None, and of no others.
+    The word `None` is a value only of types that can be None.
     """
     inner = next((part for part in _parts(kind) if get_origin(part) is tuple), kind)
     items = get_args(inner) if get_origin(inner) is tuple else ()
@@ -38,7 +38,7 @@ def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
 
 
 def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro.constructors.PrimitiveConstructorSpec:
-    """Return a flag of `count` words that `read` makes a value of; its default is `NOT_GIVEN`."""
+    """Return a flag of `count` words, which `read` converts to a value; its default is `NOT_GIVEN`."""
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs=count,
         metavar=metavar,
@@ -49,7 +49,7 @@ def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro
 
 
 def metavar_of(kind: Any) -> str:
-    """Return how a value of this type is written on the command line."""
+    """Return the help's placeholder for a value of this type."""
     parts = get_args(kind)
     if get_origin(kind) is Literal:
         return "|".join(map(str, parts))
@@ -64,7 +64,7 @@ def _parts(kind: Any) -> tuple[Any, ...]:
 
 
 def _read(kind: Any, words: list[str]) -> Any:
-    """Return the value, or `ValueError` that says what it must be."""
+    """Return the value; raise `ValueError` with the allowed values for other words."""
     parts = _parts(kind)
     if NoneType in parts and words == [_NONE]:
         return None

@@ -1,4 +1,4 @@
-"""Command-line flags made from dataclasses of settings: their names, types and help stand once, in the dataclass."""
+"""Make command-line flags from dataclasses of settings, where name, type and help of each flag stand once."""
 
 import ast
 import dataclasses
@@ -51,10 +51,10 @@ def _read_json(words: list[str]) -> dict[str, Any]:
 
 
 def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
-    """Return the setting `human` from what `--human` is given; `trust_units` as in `read_gait`.
+    """Return the setting `human` for the value of `--human`; `trust_units` as in `read_gait`.
 
-    A file of `read_gait`; FILE:CONDITION for one of several in a CSV; several files of one walk with commas between.
-    Raises `SpringfootError` for a file that cannot be read.
+    The value is a file of `read_gait`; FILE:CONDITION for one condition of a CSV; or several files of one walk with
+    commas between. Raises `SpringfootError` for a file that cannot be read.
     """
     if Path(words).is_file():
         return read_gait(words, trust_units=trust_units).to_json()
@@ -71,25 +71,26 @@ def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | 
 
 
 def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
-    """Return a word as it is, a name of a file too; a dictionary from JSON text."""
+    """Return a dictionary from JSON text, or the word itself, which may name a file."""
     return _read_json(words) if words[0].lstrip().startswith("{") else words[0]
 
 
 def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
-    """Return the foot that a flag is given: as it is, or that of the file of that name; no kind's name has a suffix."""
+    """Return the foot setting for a flag's value: the foot of that file if the value is a file's name, else the
+    value."""
     if isinstance(given, str) and (Path(given).is_file() or Path(given).suffix):
         return read_foot(given)
     return given
 
 
 FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]
-"""The type of a flag for a foot; `foot_given` makes a setting of what is given."""
+"""Type of a flag for a foot; `foot_given` converts its value to a setting."""
 FILE_FLAGS = {"human": read_own_gait}
-"""Settings whose flag is the name of a file, and what makes the setting of it."""
+"""Setting whose flag is a file's name -> function that reads the setting from the file."""
 
 
 TRUST = "trust_units"
-"""Flag beside those of files: take them as they are."""
+"""Flag beside flags of files: skip the check of units and signs."""
 _TRUST_FLAG = Annotated[
     tyro.conf.FlagCreatePairsOff[bool],
     tyro.conf.arg(help="Take the file of --human as it is, even if its units or signs look wrong."),
@@ -106,9 +107,13 @@ def optional_flags(
 ) -> type:
     """Return a dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
 
-    The help of each flag is the docstring of the field, with its value in `defaults` (an instance). Fields that name a
-    theme become flags of a dataclass inside, one for each theme, which `--help` shows as a group with the text that
-    `themes` has for it. Of the fields that the command refuses, by name, the help says `refused`: what is there for it.
+    Args:
+        name: of the dataclass.
+        settings: dataclass of the fields; the help of a flag is the docstring of its field.
+        defaults: instance of `settings`; the help shows its values.
+        leave_out: fields that become no flag.
+        themes: theme -> help text. Fields with a theme become flags of an inner dataclass, a group of `--help`.
+        refused: field -> reason, for fields that the command refuses; their help gives the reason.
     """
     help_of = field_help(settings)
     flags = []
@@ -142,7 +147,7 @@ def _words(default: Any) -> Any:
 
 
 def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
-    """Return the annotation of a flag for a setting of this type, with its help and the hint behind it."""
+    """Return the annotation of a flag for a setting of type `kind`, with its help `text` and the `hint` behind it."""
     parts = get_args(kind)
     if name in FILE_FLAGS:
         how = spec(lambda words: words[0], "FILE")
@@ -156,9 +161,9 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
 
 
 def given(flags: Any) -> dict[str, Any]:
-    """Return the flags that were given, by name, themes aside and files read.
+    """Return name -> value of the flags that the user gave, without themes, with files read.
 
-    Raise `SpringfootError` for a bad file.
+    Raises `SpringfootError` for a bad file.
     """
     values: dict[str, Any] = {}
     for item in dataclasses.fields(flags):
@@ -173,7 +178,7 @@ def given(flags: Any) -> dict[str, Any]:
 
 
 def _evaluated(theme: str) -> str:
-    """Return the help of a theme in an evaluation: which of its settings a trained policy brings with it."""
+    """Return the help of a theme in an evaluation: the settings of the theme that a trained policy brings with it."""
     names = [name for name, its in THEME_OF.items() if its == theme and name != "episode_seconds"]  # given as --seconds
     own = [f"--{name.replace('_', '-')}" for name in names if name not in CONDITION_SETTINGS]
     if len(own) == len(names):
@@ -182,6 +187,6 @@ def _evaluated(theme: str) -> str:
 
 
 EVALUATED = {theme: _evaluated(theme) for theme in THEMES}
-"""The help of each theme in an evaluation."""
+"""Theme -> its help in an evaluation."""
 SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings(), themes=EVALUATED)
-"""Every environment setting as an optional flag, of an evaluation, in groups by theme (dataclass for `tyro`)."""
+"""Every environment setting as an optional flag of an evaluation, in groups by theme (dataclass for `tyro`)."""

@@ -1,4 +1,6 @@
-"""How sure a number is: intervals of means and shares, and tests of two rows that walked the same episodes."""
+"""Compute how sure a number is: intervals of means and fractions, and a test of two rows that walked the same
+episodes.
+"""
 
 import numpy as np
 from scipy.stats import binomtest, bootstrap, t
@@ -8,14 +10,15 @@ from springfoot.arrays import NDArray
 RESAMPLES = 10_000
 """Resamples of the bootstrap."""
 LEVEL = 0.95
-"""Of every interval."""
+"""Confidence level of every interval."""
 
 
 def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
-    """Percentile bootstrap interval of the mean of a sample (n,), from `RESAMPLES` resamples of a fixed seed.
+    """Return the percentile bootstrap interval of the mean of a sample (n,), from `RESAMPLES` resamples of a fixed
+    seed.
 
-    Falls make returns two-humped and skewed, so no normal distribution is assumed. Of one value, that value. Of the
-    differences between two rows on the same episodes it is a paired interval.
+    Falls make returns bimodal and skewed, so no normal distribution is assumed. For a single value both ends are that
+    value. The differences of two rows on the same episodes give a paired interval.
     """
     if len(values) < 2:
         return float(values[0]), float(values[0])
@@ -31,7 +34,8 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
 
 
 def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
-    """Student's interval of the mean of a few values (n,), as of training seeds; of one value, everything."""
+    """Return Student's interval of the mean of a few values (n,), such as training seeds; for a single value all
+    numbers."""
     if len(values) < 2:
         return -np.inf, np.inf
     mean = float(np.mean(values))
@@ -41,15 +45,15 @@ def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
 
 
 def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
-    """Wilson's score interval of a share of which `count` of `total` were seen [0..1]."""
+    """Return Wilson's score interval [0, 1] of the fraction `count` / `total`."""
     found = binomtest(count, total).proportion_ci(confidence_level=level, method="wilson")
     return float(found.low), float(found.high)
 
 
 def paired_p(fell: NDArray, other: NDArray) -> float:
-    """McNemar's exact test: how likely two rows that fall equally often fall as unequally as these (n,) did.
+    """Return p of McNemar's exact test that two rows fall equally often, from falls (n,) in the same episodes.
 
-    Only episodes in which one row fell and the other did not tell; 1 without any.
+    Only episodes in which one row fell and the other did not count; without any p is 1.
     """
     alone = int((fell & ~other).sum())
     other_alone = int((other & ~fell).sum())

@@ -1,4 +1,4 @@
-"""The one cache of studies: numbers by the question they answer, kept in a file, so that a stopped study goes on."""
+"""Keep the numbers of a study by the question that they answer, in a file, so that a stopped study goes on."""
 
 import json
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from springfoot.files.writing import write_atomically
 
 
 class Kept:
-    """Numbers by question, kept in a file if there is a `path`."""
+    """Answers by question, kept in a file if there is a `path`."""
 
     def __init__(self, path: Path | None):
         self._path = path
@@ -18,7 +18,7 @@ class Kept:
             self._known = json.loads(path.read_text(encoding="utf-8"))
 
     def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Return the answer to `question`, a JSON value; `make` it where it is not kept."""
+        """Return the kept answer to `question`, a JSON value, or `make` and keep it."""
         text = json.dumps(question, sort_keys=True)
         if text not in self._known:
             self._known[text] = make()

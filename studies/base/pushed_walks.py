@@ -1,4 +1,4 @@
-"""Walks of a policy undisturbed and pushed, from the same seeds; a result is kept in a file until asked otherwise."""
+"""Measure a policy's walks undisturbed and pushed, from the same seeds, and keep the result in a file."""
 
 import json
 from collections.abc import Callable
@@ -15,12 +15,12 @@ from .study import OnProgress
 
 @dataclass(frozen=True, kw_only=True)
 class PushedWalks:
-    """Episodes that each row of a table walks, undisturbed and pushed."""
+    """Episodes of each row of a table, undisturbed and pushed."""
 
     episodes: int = 20
-    """Episodes of each row, and of each seed, undisturbed, and as many pushed."""
+    """Undisturbed episodes of each row and seed, and as many pushed."""
     seconds: float = 20.0
-    """Length of each."""
+    """Length of each episode."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
     seed: int = 0
@@ -54,6 +54,6 @@ class PushedWalks:
 
 
 def measured(path: Path, how: PushedWalks, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the metrics that `make` finds, kept in the file `path` for this `how` and `key`."""
+    """Return the metrics kept in the file `path` for this `how` and `key`, or `make` and keep them."""
     asked = json.loads(json.dumps({"how": {**vars(how), "threads": None, "progress": None}, "of": key}))
     return Kept(path).get(asked, make)

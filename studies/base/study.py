@@ -1,4 +1,4 @@
-"""One way to make a study: its flags, its progress, what it prints, and the files and the page it leaves behind.
+"""Define a study once: its flags, its progress, its printed answer, its files and its report.
 
 A study is a frozen dataclass of flags and a question: a subclass of `Study` (of `WalkingStudy` where policies walk
 episodes) gives the flags, their defaults and their `QUICK` values, and answers in `ask`. A line in
@@ -19,9 +19,9 @@ from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, require
 from springfoot.files.writing import whole_folder
 
 OnProgress = Callable[[float], object]
-"""Called with how much more is done: simulated seconds, or what `Study.UNIT` names."""
+"""Function that a study calls with each advance of its progress: simulated seconds, or the unit `Study.UNIT`."""
 REPORT_FILE = "report.md"
-"""The file of a study's folder that holds its text."""
+"""File of a study's text, in its folder."""
 QUICK_NOTE = "Made with --quick, only to see that it runs: these figures mean nothing."
 
 
@@ -30,11 +30,11 @@ class Answer:
     """The answer of a study."""
 
     text: str
-    """Markdown that the command prints and keeps as `REPORT_FILE`; pictures in it are named files."""
+    """Markdown that the command prints and keeps as `REPORT_FILE`; its pictures are among `files`."""
     files: Mapping[str, str | Callable[[Path], object]] = field(default_factory=dict)
     """Name of a file in the study's folder -> its text, or a function that writes it at a path."""
     failed: bool = False
-    """Whether a part of the study failed; the exit code is then 1."""
+    """True if a part of the study failed; the exit code is then 1."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,14 +51,14 @@ class Study:
     QUICK: ClassVar[Mapping[str, Any]] = {}
     """Name of a flag -> its value with `--quick`."""
     UNIT: ClassVar[str] = "s"
-    """What its progress counts."""
+    """Unit of its progress."""
 
     def check(self) -> None:
         """Raise `SpringfootError` for a bad flag; called before anything else."""
 
     @property
     def total(self) -> float | None:
-        """Progress at the end; None where it is not known."""
+        """Progress at the end; None if unknown."""
         return None
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -66,9 +66,9 @@ class Study:
         raise NotImplementedError
 
     def run(self, name: str) -> int:
-        """Do the study, print its answer and write its files; `name` is that of its command.
+        """Do the study, print its answer and write its files; `name` is the study's name on the command line.
 
-        Returns the exit code: 0, or 1 where a part of the study failed. Raises `SpringfootError`, with nothing written,
+        Returns the exit code: 0, or 1 if a part of the study failed. Raises `SpringfootError`, with nothing written,
         for a bad flag and for an `out` that exists.
         """
         study = replace(self, **self.QUICK) if self.quick else self
@@ -92,7 +92,7 @@ class Study:
 
 
 def without_places(command: str) -> str:
-    """Return a command without the folder and the files that it writes to."""
+    """Return a command without the folders and files that it writes."""
     words = shlex.split(command)
     for flag in ("--out", "--keep", "--feet"):
         if flag in words:
@@ -111,12 +111,12 @@ def _write(path: Path, content: str | Callable[[Path], object]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class WalkingStudy(Study):
-    """A study whose rows are episodes of policies, the same seeds in every row."""
+    """A study whose rows are episodes of policies, all from the same seeds."""
 
     episodes: int = 20
     """Episodes of each row."""
     seconds: float = 20.0
-    """Length of each."""
+    """Length of each episode."""
     seed: int = 0
     """Episode i is seeded with seed + i, in every row."""
     threads: int = 2
@@ -137,5 +137,5 @@ class WalkingStudy(Study):
 
     @property
     def what_ran(self) -> str:
-        """The episodes of each row, in words."""
+        """Return the episodes of each row, in words."""
         return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"

@@ -1,4 +1,4 @@
-"""Studies that train: what they train is kept in a folder of its own, and gone on with."""
+"""Train policies in a study, and keep them in a folder, so that a stopped study goes on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from .study import WalkingStudy
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingStudy(WalkingStudy):
-    """A study of trainings. A seed that is finished is not trained again: it may be stopped and begun anew."""
+    """A study of trainings; finished seeds are not trained again."""
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/trainings")
-    """Folder of all trainings; what is finished in it is kept."""
+    """Folder of all trainings; finished ones are kept."""
     seeds: int = 3
     """Seeds of each training, 0 and the next ones."""
     timesteps: int | None = None
     """Steps of 20 ms of each training, the preset's unless given."""
     train: bool = True
-    """Train what is missing; without, use what there is."""
+    """Train missing seeds; without, use the finished ones."""
 
     QUICK: ClassVar[dict[str, Any]] = {**WalkingStudy.QUICK, "seeds": 1, "timesteps": 8192}
 
@@ -36,9 +36,9 @@ class TrainingStudy(WalkingStudy):
             require_count("timesteps", self.timesteps)
 
     def train_missing(self, jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> bool:
-        """Train each configuration in its folder that is not finished there; returns whether a training failed.
+        """Finish the training of each configuration in its folder; return True if a training failed.
 
-        Raises `KeyboardInterrupt` where the user stopped them.
+        Raises `KeyboardInterrupt` if the user stopped it.
         """
         status = train_missing(jobs) if self.train else "finished"
         if status == "interrupted":

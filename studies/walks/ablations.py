@@ -1,10 +1,10 @@
-"""Ablations: what each part of preset `walk` contributes, trained without it, and each input of the fixed walk.
+"""Measure the contribution of each part of preset `walk`, by training without it, and of each input of the fixed walk.
 
     springfoot study ablations --seeds 3 --constant 363 79.5
 
-Every row differs from the preset in its flags and in nothing else. A seed that is finished is not trained again, nor
-measured again, so the command may be stopped, begun anew with more rows or seeds, and run with `--no-train` to write
-the page from what there is. All rows earn the default reward when measured, so their returns compare.
+Every row differs from the preset in its flags and in nothing else. A finished seed is neither trained nor measured
+again, so the command may be stopped, started again with more rows or seeds, and run with `--no-train` to report the
+finished ones. All rows are measured with the default reward, so their returns compare.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,8 +50,8 @@ ABLATIONS: dict[str, dict[str, Any]] = {
     "ankle-only": {"stiffness_joints": "ankle"},
     "toe-only": {"stiffness_joints": "toe"},
 }
-"""Environment settings in which each training differs from preset `walk` (planned, absolute, 50 Hz, all terms,
-both joints); `phase` also has the schedule of `phase_schedule`."""
+"""Row -> environment settings that differ from preset `walk` (planned, absolute, 50 Hz, all terms, both joints);
+`phase` also has the schedule of `phase_schedule`."""
 MEANING = {
     "walk": "the preset: planned equilibrium, 50 Hz, every reward term, ankle and toe",
     "residual": "a factor on the fixed schedule, in place of K itself",
@@ -78,7 +78,8 @@ INPUTS: dict[str, Callable[[LegConstants], LegConstants]] = {
     "no speed feedback to the stance hip": lambda c: replace(c, speed_torque=0.0),
     "no shift of the swing hip by speed": lambda c: replace(c, swing_speed_gain=0.0),
 }
-"""Inputs of the fixed walk (baseline `schedule`, planned equilibrium), each taken away by itself, the rest as tuned."""
+"""Row -> the fixed walk's leg constants (baseline `schedule`, planned equilibrium) without one input, the rest as
+tuned."""
 ABLATION_COLUMNS = (
     Column("falls", ".1f", ("undisturbed", "falls")),
     Column("pushed", ".1f", ("pushed", "falls")),
@@ -96,15 +97,15 @@ ABLATION_COLUMNS = (
 """Columns of every table."""
 
 RESULT = "ablation.json"
-"""In a trained row's folder, what was measured of it."""
+"""File of a trained row's metrics, in its folder."""
 
 
 def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
-    """Return the planned equilibrium and fixed schedule of `settings`, constant on and between the plateaus of K: ten
-    springs.
+    """Return the planned equilibrium and fixed schedule of `settings` as ten springs, constant on and between K's
+    plateaus.
 
-    Each has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer, as between gait events,
-    the fixed schedule falls.
+    Each spring has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer springs, as between
+    gait events, the fixed schedule falls.
     """
     walk = reference_walk_at(settings, settings.speed)
     planned = replace(settings, equilibrium="planned", schedule=None)
@@ -120,7 +121,8 @@ def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
 
 
 def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> TrainingConfig:
-    """Return the training of a row: as much walking as the preset's, or as `timesteps` of 20 ms, whatever the step."""
+    """Return the training of a row: as much walking as the preset's, or `timesteps` of 20 ms, whatever the row's
+    step."""
     preset = PRESETS["walk"]
     own = dict(ABLATIONS[name])
     if name == "phase":
@@ -138,7 +140,7 @@ def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> Trainin
 
 
 def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> list[tuple[TrainingConfig, Path, str]]:
-    """Return each row and seed to train: configuration, folder and what it is called."""
+    """Return configuration, folder and label of the training of each row and seed."""
     order = product(range(seeds), names)  # every row once before any twice
     return [
         (config_of(name, seed, timesteps), out / name / f"seed-{seed}", f"{name}, seed {seed}") for seed, name in order
@@ -146,7 +148,7 @@ def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> 
 
 
 def trained(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
-    """Row -> the metrics of each of its finished seeds, in order; rows without any are left out."""
+    """Return row -> the metrics of its finished seeds, in order; rows without a finished seed are left out."""
     rows = {}
     for name in ABLATIONS:
         folders = sorted((out / name).glob("seed-*"), key=lambda each: int(each.name.removeprefix("seed-")))
@@ -157,7 +159,8 @@ def trained(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
 
 
 def inputs(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
-    """Return each of `INPUTS`, and the ankle's angle alone as its equilibrium -> the metrics of the fixed schedule."""
+    """Return row -> the metrics of the fixed schedule, for each of `INPUTS` and for the ankle's angle alone as
+    equilibrium."""
     own = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
     rows: dict[str, list[dict[str, Any]]] = {}
     for number, (name, change) in enumerate(INPUTS.items()):
@@ -184,7 +187,7 @@ Rows = dict[str, list[dict[str, Any]]]
 
 
 def rows_table(rows: Rows, head: str, people: bool = False) -> str:
-    """Markdown: rows down, `ABLATION_COLUMNS` across, mean ± SD (n - 1) over the seeds of a row that has several."""
+    """Return the Markdown table of `ABLATION_COLUMNS`, mean ± SD (n - 1) over the seeds of each row."""
     lines = []
     for name, seeds in rows.items():
         cells = [name, str(len(seeds))]
@@ -202,7 +205,7 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
 
 
 def _known(metrics: dict[str, Any], column: Column) -> str:
-    """Return a number of people's, where there is one."""
+    """Return people's number of a column; empty if there is none."""
     value: Any = metrics
     for key in column.path[1:]:
         value = value.get(key) if isinstance(value, dict) else None
@@ -210,7 +213,7 @@ def _known(metrics: dict[str, Any], column: Column) -> str:
 
 
 def _numbers(tables: dict[str, Rows]) -> str:
-    """CSV: a line for each seed of each row."""
+    """Return the CSV with a line for each seed of each row."""
     lines = [
         [section, row, index, *(each.of(metrics) for each in ABLATION_COLUMNS)]
         for section, rows in tables.items()
@@ -222,17 +225,17 @@ def _numbers(tables: dict[str, Rows]) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Ablations(TrainingStudy):
-    """Train preset `walk` without each of its parts, measure, and tell what each contributes.
+    """Train preset `walk` without each of its parts, and measure the contribution of each.
 
-    A seed that is finished is neither trained nor measured again: the command may be stopped and begun anew.
+    A finished seed is neither trained nor measured again: the command may be stopped and started again.
     """
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/ablations")
-    """Folder of all trainings and what was measured of them; what is finished in it is kept."""
+    """Folder of all trainings and their metrics; finished ones are kept."""
     only: tuple[str, ...] = ()
     """Rows to train, all of them unless given."""
     constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
-    """A fixed spring [N m/rad] to hold the trained policies against."""
+    """A fixed spring [N m/rad] to compare the trained policies with."""
     push_newton: float = 150.0
     """Size of the pushes [N]."""
 
@@ -242,7 +245,7 @@ class Ablations(TrainingStudy):
     }
 
     def check(self) -> None:
-        """Refuse unknown rows as well."""
+        """Refuse unknown rows."""
         super().check()
         for name in self.only:
             if name not in ABLATIONS:
@@ -255,7 +258,7 @@ class Ablations(TrainingStudy):
         return 2 * rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Train what is missing, and measure."""
+        """Train missing seeds, and measure."""
         how = PushedWalks(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
         failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
         rows = trained(self.runs, how)

@@ -1,8 +1,8 @@
-"""Many bodies at many speeds: one episode of a policy for each pair drawn, held against people at its Froude speed.
+"""Walk one episode with each of many random bodies and speeds, and compare it with people at its Froude speed.
 
     springfoot study bodies pretrained --pairs 300
 
-Heights, masses and speeds are drawn independently and evenly over the ranges of `train.py --preset any-body`; a
+Heights, masses and speeds are drawn independently and uniformly over the ranges of `train.py --preset any-body`. A
 height and a mass that make no body (`springfoot.gait.body.body.BMI_RANGE`) are drawn again.
 """
 
@@ -29,26 +29,26 @@ from ..base.flags import SettingsFlags, given
 from ..base.study import Answer, OnProgress, Study
 
 RANGES = {f"{name}_range": getattr(PRESETS["any-body"].environment, f"{name}_range") for name in DRAWN}
-"""What is drawn from unless flagged otherwise [m], [kg], [m/s]."""
+"""Default ranges of the draw [m], [kg], [m/s]."""
 PAIRS = "pairs.csv"
-"""Name of the file with a row for each pair."""
+"""File with a row for each pair of body and speed."""
 PAIRS_OPEN_LOOP = "pairs_open_loop.csv"
-"""Name of the file with a row for each pair as walked by the policy's open-loop copy."""
+"""File with a row for each pair, walked by the policy's open-loop copy."""
 VERTICAL_R = "grf_vertical_r"
-"""The one column that is not told of the copy."""
+"""The one column that the open-loop copy does not have."""
 WORST_FALLS = 10
-"""Falls that are told one by one."""
+"""Falls that the report names one by one."""
 
 BODY_COLUMNS = (
     ("speed error %", "speed_error_percent", ".1f", abs),
     *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
     ("vertical force r", VERTICAL_R, ".3f", lambda r: -r),
 )
-"""Label, column, format, and how bad a value is."""
+"""Label, column, format, and the badness of a value."""
 
 
 def draw_pairs(settings: BipedSettings, pairs: int, seed: int = 0) -> dict[str, NDArray]:
-    """`height` [m], `mass` [kg] and `speed` [m/s], (pairs,) each, drawn as at a reset of `settings`."""
+    """Draw `height` [m], `mass` [kg] and `speed` [m/s], (pairs,) each, as a reset of `settings` draws them."""
     subjects = Subjects(settings, tabulated_speeds(settings), pairs)
     subjects.reset(np.arange(pairs), [np.random.default_rng(seed)] * pairs)
     height, mass = np.array([(body.height, body.mass) for body in subjects.bodies]).T
@@ -66,10 +66,10 @@ def walk_pairs(
     block: int = BATCH,
     progress: OnProgress = lambda seconds: None,
 ) -> list[dict[str, Any]]:
-    """Return one episode of each pair, and its numbers as in pairs.csv (docs/reference/metrics.md); None where there is
-    none.
+    """Walk one episode of each pair, and return its numbers as in pairs.csv (docs/reference/metrics.md).
 
-    Arguments as for `recording.record_each`; `block` pairs at a time, whose series are then let go.
+    None stands for a number that could not be measured. Arguments as for `recording.record_each`; `block` pairs walk at
+    a time, whose series are then freed.
     """
     rows = []
     for first in range(0, len(who["height"]), block):
@@ -101,9 +101,10 @@ def _row(recording: Recording) -> dict[str, Any]:
 
 
 def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, Any]] = ()) -> str:
-    """Markdown: falls, and of the pairs that did not fall the median, what 95 % of them keep within, and the worst.
+    """Return the Markdown table of the pairs: falls, and without them the median, the 95 % bound and the worst of each
+    number.
 
-    The same pairs walked by the policy's open-loop `copy` stand beside, falls, speed and angles.
+    Falls, speed and angles of the policy's open-loop `copy` on the same pairs stand beside.
     """
     lines: list[list[str]] = [["falls", _falls(rows), "", "", "", *([_falls(copy), "", ""] if copy else [])]]
     for label, column, pattern, badness in BODY_COLUMNS:
@@ -125,7 +126,7 @@ def _falls(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
-    """Return the pairs that did not fall, the worst last."""
+    """Return the pairs without a fall, the worst last."""
     return sorted(
         (row for row in rows if not row["fall"] and row[column] is not None), key=lambda row: badness(row[column])
     )
@@ -145,7 +146,7 @@ def _who(row: Mapping[str, Any]) -> str:
 class Bodies(Study):
     """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs.
 
-    A trained policy stands beside its open-loop copy, whose mean stiffness goes with the speed and scales with body.
+    A trained policy stands beside its open-loop copy, whose mean stiffness changes with speed and scales with the body.
     """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"
@@ -153,13 +154,13 @@ class Bodies(Study):
     pairs: int = 300
     """Bodies and speeds drawn, from --height-range, --mass-range and --speed-range."""
     seconds: float = 20.0
-    """Length of the one episode of each."""
+    """Length of the episode of each pair."""
     seed: int = 0
-    """Of the draw; the episode of pair i is seeded with seed + i."""
+    """Seed of the draw; the episode of pair i has seed + i."""
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What to walk in; a trained policy brings its own settings, standard conditions aside."""
+    """Environment; a trained policy brings its own settings, standard conditions aside."""
 
     QUICK: ClassVar[dict[str, Any]] = {"pairs": 2, "seconds": 5.0}
 

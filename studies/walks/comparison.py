@@ -1,4 +1,4 @@
-"""Policies held against each other, against springs that need no learning, and against themselves elsewhere.
+"""Compare policies with each other, with springs that need no learning, and with themselves under other conditions.
 
     springfoot study compare pretrained --constant 363 79.5 --factor 1.07
     springfoot study compare runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --no-springs --pushes 0
@@ -29,7 +29,7 @@ from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 PUSHES = (150.0, 200.0)
-"""Pushes [N] of `compare`."""
+"""Default pushes of `compare` [N]."""
 WORLD: tuple[dict[str, Any], ...] = (
     {},
     {"push_newton": 150.0},
@@ -50,18 +50,18 @@ WORLD: tuple[dict[str, Any], ...] = (
 QUASI_SPEED = 1.35
 """Commanded speed [m/s] at which people's quasi-stiffness, which is not tuned, walks about 1.2 m/s."""
 COMPARABLE = ("speed", "reward_weights")
-"""Settings in which rows must be alike for their returns to be compared."""
+"""Settings that rows must share for a comparison of their returns."""
 SIGNIFICANT = 0.05
-"""Below this p, McNemar's, one row falls less often than another."""
+"""Largest p of McNemar's test with which a row falls less often than another."""
 INTERVALS = (
     f"Intervals: 95 %, percentile bootstrap over episodes (scipy.stats, {RESAMPLES:,} resamples), of the difference "
     "paired; falls: Wilson's, and p of McNemar's exact test against the first row."
 )
-"""How they are made."""
+"""Sentence of the report on its intervals."""
 
 
 class Contender(NamedTuple):
-    """A policy, what its row is called, and the environment it walks in."""
+    """A policy, the name of its row, and its environment."""
 
     name: str
     policy: PolicyFunction
@@ -70,26 +70,26 @@ class Contender(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Row:
-    """One policy's episodes in numbers."""
+    """Episodes of one policy in numbers."""
 
     name: str
-    """What was run."""
+    """Name of the policy in tables."""
     metrics: dict[str, Any]
-    """As in metrics.json."""
+    """Metrics as in metrics.json."""
     returns: NDArray
-    """(episodes,) return of each."""
+    """(episodes,) return of each episode."""
     fell: NDArray
-    """(episodes,) whether it fell."""
+    """(episodes,) True for an episode that ended in a fall."""
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the mean return."""
+        """Return the 95 % interval of the mean return."""
         return mean_interval(self.returns)
 
     def difference(self, first: "Row") -> tuple[float, float, float] | None:
         """Return the mean return of `first` less this row's, and its interval.
 
-        None where another speed was commanded, or another reward was earned.
+        None if the rows have other commanded speeds or other rewards.
         """
         if any(self.metrics["environment"].get(name) != first.metrics["environment"].get(name) for name in COMPARABLE):
             return None
@@ -112,7 +112,7 @@ def contenders(
     seed: int = 0,
     threads: int = 2,
 ) -> list[Contender]:
-    """Return the policy `name`, its open-loop copy, and the springs that it has to beat, in its own environment.
+    """Return the policy `name`, its open-loop copy, and the springs to compare it with, in its own environment.
 
     `given` are environment settings that differ from the evaluation's standard conditions and the policy's own.
     """
@@ -120,7 +120,7 @@ def contenders(
 
 
 def with_copy(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> list[Contender]:
-    """Return the policy `name` and, where it has one, its mean K played open loop."""
+    """Return the policy `name` and, for a policy with feedback, its open-loop copy."""
     return [Contender(each, *prepare(each, given, seed, threads)) for each in and_copy(name)]
 
 
@@ -131,11 +131,11 @@ def springs_beside(
     factor: float | None = None,
     seed: int = 0,
 ) -> list[Contender]:
-    """Return the springs that need no learning, in the environment and reward of the policy `name`.
+    """Return the springs that need no learning, in the environment and with the reward of the policy `name`.
 
-    They are the start of its training; the tuned schedule, and a `factor` on it; a `constant` (ankle, toe) [N m/rad]
+    These are the start of its training; the tuned schedule, and a `factor` on it; a `constant` (ankle, toe) [N m/rad]
     and the default one; people's quasi-stiffness as it is, and commanded `QUASI_SPEED`; the thesis's lines, completed
-    and as printed; random actions. Each row pays for changing its own action.
+    and as printed; random actions. Each row pays for changes of its own action.
     """
     _, settings = prepare(name, given, seed)
     found = []
@@ -156,7 +156,7 @@ def rivals(constant: tuple[float, float] | None, factor: float | None) -> list[s
 
 
 def comparison_table(rows: Sequence[Row]) -> str:
-    """Markdown: the first row's policy against the others."""
+    """Return the Markdown table of the first row's policy against the others."""
     first = rows[0]
     head = ["policy", "falls [95 %]", "p", "return", f"{first.name} is ahead by [95 %]", "speed m/s"]
     lines = []
@@ -176,7 +176,7 @@ def comparison_table(rows: Sequence[Row]) -> str:
 
 
 def verdict(rows: Sequence[Row]) -> str:
-    """Which rows the first one is ahead of, in return and in falls, and which not."""
+    """Return, in words, the rows that the first row is ahead of in return and in falls, and the rows that it is not."""
     first, *others = rows
     differences = [row.difference(first) for row in others]
     behind = [
@@ -197,7 +197,8 @@ def verdict(rows: Sequence[Row]) -> str:
 
 
 def spread_table(rows: Sequence[Row]) -> str:
-    """Return markdown: numbers down, policies across, and their mean ± SD over the policies (n - 1)."""
+    """Return the Markdown table with a line for each number and a column for each policy, and their mean ± SD (n -
+    1)."""
     lines = []
     for each in WALK_COLUMNS:
         values = [each.of(row.metrics) for row in rows]
@@ -208,7 +209,8 @@ def spread_table(rows: Sequence[Row]) -> str:
 
 
 def elsewhere_table(name: str, rows: Sequence[tuple[str, Sequence[Row]]]) -> str:
-    """Return markdown: a line for each of the conditions, with the policy `name` and, if it has one, its copy."""
+    """Return the Markdown table with a line for each condition, of the policy `name` and its open-loop copy if it has
+    one."""
     lines = []
     for words, (own, *copies) in rows:
         m = own.metrics
@@ -229,11 +231,10 @@ def _walked(m: dict[str, Any]) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Compare(WalkingStudy):
-    """Hold policies against each other, against springs that need no learning, and against themselves elsewhere.
+    """Compare policies with each other, with springs that need no learning, and with themselves under other conditions.
 
-    Each policy walks in its own environment, springs in the first policy's, all on the same seeds. A trained policy
-    has its open-loop copy beside it. Several policies, such as one training from several seeds, get their mean and
-    spread.
+    Each policy walks in its own environment, springs in the first policy's, all on the same seeds. A trained policy has
+    its open-loop copy beside it. Several policies, such as one training from several seeds, get their mean and spread.
     """
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("pretrained",)
@@ -251,12 +252,12 @@ class Compare(WalkingStudy):
     episodes: int = 100
     """Episodes of each row."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What to walk in; a trained policy brings its own settings, standard conditions aside."""
+    """Environment; a trained policy brings its own settings, standard conditions aside."""
 
     QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,), "world": False}
 
     def check(self) -> None:
-        """Refuse an empty list of policies as well."""
+        """Refuse an empty list of policies."""
         super().check()
         if not self.policies:
             raise SpringfootError("give one policy or more: run folders, .safetensors files or names")
@@ -271,7 +272,7 @@ class Compare(WalkingStudy):
         return rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every row under every push, then elsewhere."""
+        """Walk every row under every push, then under other conditions."""
         parts = []
         lines = []
         for push in self.pushes:
@@ -306,7 +307,7 @@ class Compare(WalkingStudy):
         return {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)
 
     def _with_copy_if_it_walks(self, name: str, conditions: dict[str, Any]) -> list[Contender]:
-        """Return a policy and its copy; the policy alone where it falls too soon for a copy of it."""
+        """Return a policy and its open-loop copy; the policy alone if it falls too soon for a copy."""
         alone = Contender(name, *prepare(name, conditions, self.seed))
         try:
             return [alone, *with_copy(name, conditions, self.seed, self.threads)[1:]]
@@ -314,7 +315,7 @@ class Compare(WalkingStudy):
             return [alone]
 
     def _elsewhere(self, name: str, progress: OnProgress) -> list[tuple[str, list["Row"]]]:
-        """Walk a policy and its copy under each of `WORLD`: the conditions in words, and the rows."""
+        """Walk a policy and its open-loop copy under each of `WORLD`; return each condition in words and its rows."""
         found = []
         for conditions in WORLD:
             beside = self._with_copy_if_it_walks(name, self._conditions | conditions)
@@ -338,7 +339,7 @@ def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
 
 
 def what_ran(study: WalkingStudy, row: Row) -> str:
-    """Return the episodes of a table in one sentence."""
+    """Return a sentence on the episodes of a table."""
     ran = row.metrics["environment"]
     pushes = "no pushes"
     if ran["push_newton"]:

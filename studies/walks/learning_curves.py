@@ -1,4 +1,4 @@
-"""How fast a walk is learned: curves of one training from several seeds, and whether each came to walk.
+"""Show how fast a walk is learned: curves of one training from several seeds, and the criteria that each run misses.
 
 springfoot study learning-curves runs/seed-0 runs/seed-1 runs/seed-2
 """
@@ -26,11 +26,11 @@ from ..base.columns import walks_csv
 from ..base.study import Answer, OnProgress, WalkingStudy
 
 KEYS = ("timesteps", "seconds", "return_mean", "falls")
-"""Of a periodic evaluation: what is drawn and kept."""
+"""Numbers of a periodic evaluation that are drawn and kept."""
 
 
 def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """Return the first periodic evaluation in which, and after which, no episode fell."""
+    """Return the first periodic evaluation from which on no episode fell; None if there is none."""
     steady = None
     for entry in evaluations:
         steady = None if entry["falls"] else steady or entry
@@ -38,7 +38,7 @@ def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | N
 
 
 def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
-    """Write the picture: return of the periodic evaluations over environment steps and over wall time, a line a run."""
+    """Draw the return of the periodic evaluations over environment steps and over wall time, a line for each run."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 3.0), layout="constrained")
         by_steps, by_time = figure.subplots(1, 2, sharey=True)
@@ -57,17 +57,17 @@ def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class LearningCurves(WalkingStudy):
-    """Learning curves of several runs of the same training, and whether each came to walk.
+    """Draw learning curves of several runs of the same training, and tell whether each learned to walk.
 
-    Tells the wall time of each whole training, when its policy first fell in no evaluation episode, and which criteria
-    of a walk its best policy misses.
+    Tells the wall time of each whole training, the step from which no evaluation episode fell, and the criteria of a
+    walk that its best policy misses.
     """
 
     runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
     """Run folders of train.py."""
 
     def check(self) -> None:
-        """Refuse an empty list of runs as well."""
+        """Refuse an empty list of runs."""
         super().check()
         if not self.runs:
             raise SpringfootError("give one run folder of train.py or more")
@@ -78,7 +78,7 @@ class LearningCurves(WalkingStudy):
         return len(self.runs) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Judge every run."""
+        """Evaluate every run."""
         runs = {folder.name: _read(folder) for folder in self.runs}
         lines = []
         walks = []

@@ -1,4 +1,4 @@
-"""A page to play with: walks recorded over stiffness, speed and feet, between which its sliders blend.
+"""Write a page to play with: walks over stiffness, speed and feet, between which its sliders blend.
 
 springfoot study play
 """
@@ -29,10 +29,10 @@ PAGE_NAME = "play.html"
 
 @dataclass(frozen=True, kw_only=True)
 class Play(WalkingStudy):
-    """Record walks of a policy whose K of ankle and toe is scaled, over speed and right foot; write a page of them."""
+    """Record walks of a policy with scaled K of ankle and toe, over speed and right foot, and write a page of them."""
 
     policy: str = "schedule"
-    """Whose stiffness is scaled."""
+    """Policy whose stiffness is scaled."""
     ankle: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4, 2.0)
     """Factors on the stiffness of both ankles, ascending; a device keeps its own."""
     toe: tuple[float, ...] = (0.5, 1.0, 2.0)
@@ -44,9 +44,9 @@ class Play(WalkingStudy):
     episodes: int = 2
     """Episodes of each point."""
     seconds: float = 12.0
-    """Length of each."""
+    """Length of each episode."""
     seed: int = 0
-    """Of the first episode of each foot and speed; the next ones count on."""
+    """Seed of the first episode of each foot and speed."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {
         "episodes": 1,
@@ -58,7 +58,7 @@ class Play(WalkingStudy):
     }
 
     def check(self) -> None:
-        """Refuse marks of a slider that do not ascend, and too many episodes of a point."""
+        """Refuse slider marks that do not ascend, and too many episodes of a point."""
         super().check()
         for name in ("ankle", "toe", "speed"):
             marks = getattr(self, name)
@@ -72,7 +72,7 @@ class Play(WalkingStudy):
 
     @property
     def grid(self) -> Grid:
-        """What is recorded."""
+        """Points to record."""
         return Grid(feet=self.feet, speed=self.speed, toe=self.toe, ankle=self.ankle)
 
     @property
@@ -105,10 +105,8 @@ class Play(WalkingStudy):
         return Answer(text=text, files={PAGE_NAME: page.text})
 
     def _walks(self, foot: str, speed: float, progress: OnProgress) -> Iterator[Recording]:
-        """Return a recording of each pair of factors, the ankle's changing fastest.
-
-        As many side by side as a batch takes.
-        """
+        """Yield a recording of each pair of factors, the ankle's changing fastest, as many side by side as a batch
+        takes."""
         conditions = {"right_foot": foot, "speed": speed, "episode_seconds": self.seconds}
         policy, settings = prepare(self.policy, conditions, self.seed, self.threads)
         if settings.action_mode != "absolute":
@@ -131,7 +129,7 @@ class Play(WalkingStudy):
 
 
 def _scaled(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) -> PolicyFunction:
-    """`policy` with K of ankles and toes times `factor` (N, 2), as far as actions go."""
+    """Return `policy` with K of ankles and toes times `factor` (N, 2), within the range of actions."""
     body = body_of(settings)
 
     def scaled(observation: NDArray) -> NDArray:
