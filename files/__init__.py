@@ -1,1 +1,1 @@
-"""Reading and writing: tables, JSON, tensors and arrays with a digest, whole files or none, one owner a folder."""
+"""Read and write files: tables, JSON, tensors and arrays with a digest; whole files or none, one owner a folder."""

@@ -1,6 +1,6 @@
-"""Arrays with a JSON header in one .npz file, and a digest of both, so that damage is noticed; no objects, no pickles.
+"""Read and write arrays with a JSON header in one .npz file; a digest of both finds damage. No objects, no pickles.
 
-The members of the archive are stored, not compressed, so that no file says it is small and fills the memory.
+The members of the archive are stored, not compressed, so that a small file cannot fill the memory.
 """
 
 import io
@@ -19,7 +19,7 @@ from springfoot.errors import SpringfootError
 from .tensor_file import DIGEST, digest_of
 
 HEADER = "header"
-"""Name of the array that holds the JSON text."""
+"""Name of the array with the JSON text."""
 
 
 def write_arrays(path: Path, header: dict[str, Any], arrays: dict[str, NDArray]) -> None:
@@ -30,7 +30,8 @@ def write_arrays(path: Path, header: dict[str, Any], arrays: dict[str, NDArray])
 
 
 def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Header and arrays of a file that `write_arrays` wrote; else `SpringfootError`, which says it is no `what`."""
+    """Return header and arrays of a file of `write_arrays`; raise `SpringfootError` for any other, calling it no
+    `what`."""
     try:
         with ZipFile(path) as archive:
             if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
@@ -58,7 +59,7 @@ def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArra
 def _array(content: bytes) -> NDArray:
     """Return the array in an .npy file's content.
 
-    `ValueError` for what says it is larger than it is, and for objects.
+    Raises `ValueError` for objects, and for a header that claims more data than there is.
     """
     file = io.BytesIO(content)
     read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))

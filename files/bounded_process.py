@@ -1,7 +1,7 @@
-"""A process of its own for code of others that reads files, with bounds on its memory and its time.
+"""Read files with other people's code in a process of its own, with bounds on memory and time.
 
-Libraries believe what a file says of itself: a few changed bytes make them ask for gigabytes, run for ever or crash.
-Here that ends the child, and the parent says so in one line.
+Libraries believe a file's claims about itself: a few changed bytes make them ask for gigabytes, run for ever or crash.
+Here that ends the child process, and the parent says so in one line.
 """
 
 import os
@@ -10,14 +10,14 @@ import sys
 from pathlib import Path
 
 MOST_MEMORY, MOST_SECONDS, MOST_WAIT = 2**29, 60, 300
-"""Memory that reading a file may take beyond the imports [bytes], its processor time and its time on the clock [s];
-chosen. A measured walk of ten minutes takes a tenth of them."""
+"""Memory beyond the imports [bytes], processor time and wall time [s] of reading a file; chosen. A measured walk of ten
+minutes takes a tenth of each."""
 
 
 def in_process(code: str, *words: str) -> bytes | None:
-    """Return the standard output of Python `code` in a new process, None where that is ended or fails.
+    """Return the standard output of Python `code` in a new process; None if the process fails or is ended.
 
-    It calls `bound_resources` once it has imported what it needs; `words` are its arguments.
+    `code` calls `bound_resources` after its imports; `words` are its arguments.
     """
     try:
         done = subprocess.run(
@@ -34,7 +34,7 @@ def in_process(code: str, *words: str) -> bytes | None:
 
 
 def bound_resources() -> None:
-    """From here on this process may take so much more memory, and so much time."""
+    """Bound the further memory and the further processor time of this process."""
     try:
         import resource  # not on every system
     except ImportError:

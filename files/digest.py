@@ -1,7 +1,7 @@
-"""A digest inside a text file of ours, CSV or JSON, by which the file tells whether it is still as it was written.
+"""Put a digest into text files, CSV or JSON, and check it, so that changes of a file are found.
 
-It is of every byte of the file, with zeros where the digest itself stands, however often. It finds what a disk, a copy
-or an editor has changed. It is no signature: whoever changes a file on purpose can write a fitting one.
+The digest covers every byte of the file, with zeros in place of the digest itself. It finds changes by a disk, a copy
+or an editor. It is no signature: a forger can write a fitting one.
 """
 
 import re
@@ -11,19 +11,19 @@ from pathlib import Path
 from springfoot.errors import SpringfootError
 
 SEAL = "sha256"
-"""Name of the digest: of a column, of a JSON entry; it stands before its digits, too, so that no one bit hides both."""
+"""Name of the digest's CSV column or JSON entry; it also stands before the digits, so that no single bit hides both."""
 BLANK = f"{SEAL}:{'0' * 64}"
-"""What a text says in the place of its digest before it is sealed."""
+"""Placeholder for the digest in a text without one."""
 _DIGITS = re.compile(rb"sha256:([0-9a-f]{64})")
 
 
 def sealed(text: str) -> str:
-    """`text` with its digest in every place where it says `BLANK`."""
+    """Return `text` with its digest in place of every `BLANK`."""
     return text.replace(BLANK, f"{SEAL}:{sha256(text.encode()).hexdigest()}")
 
 
 def require_whole(path: Path, content: bytes) -> None:
-    """Raise `SpringfootError` for the content of a file that is sealed and not as it was written."""
+    """Raise `SpringfootError` if a file's content has a digest that does not fit."""
     if SEAL.encode() not in content:
         return  # of somebody else, or of an earlier version
     found = _DIGITS.search(content)

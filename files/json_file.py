@@ -1,4 +1,4 @@
-"""JSON files: of a size that fits into memory, whole if they are sealed, an object in braces."""
+"""Read and write JSON files: an object in braces, small enough for the memory, with a fitting digest if it has one."""
 
 import json
 from collections.abc import Mapping
@@ -11,7 +11,8 @@ from .digest import BLANK, SEAL, require_whole, sealed
 from .text_table import read_bytes
 
 MOST_JSON_BYTES = 2**23
-"""Largest JSON file that is read; chosen, hundreds of times a usual one: an object takes twenty times its text."""
+"""Largest JSON file to read; chosen, hundreds of times a usual one: objects take twenty times the memory of their
+text."""
 
 
 def sealed_object(values: Mapping[str, Any]) -> bytes:
@@ -22,7 +23,7 @@ def sealed_object(values: Mapping[str, Any]) -> bytes:
 def read_object(path: Path, what: str) -> dict[str, Any]:
     """Return the object in a JSON file, without its digest.
 
-    Else `SpringfootError`, which says that the file is no `what`.
+    Raises `SpringfootError` for any other file, calling it no `what`.
     """
     content = read_bytes(path, MOST_JSON_BYTES)
     require_whole(path, content)
@@ -36,7 +37,7 @@ def read_object(path: Path, what: str) -> dict[str, Any]:
 
 
 def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object's keys and values as a dictionary; ValueError for a key that stands twice."""
+    """Return a JSON object's keys and values as a dictionary; raise `ValueError` for a repeated key."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:

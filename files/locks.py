@@ -1,9 +1,9 @@
-"""One owner a folder: who writes into it, so that nobody else does. What a dead owner left is taken over.
+"""Give each folder one owner, the only process that writes into it, and take over folders of dead owners.
 
-The owner holds a lock on the file `.owner` in the folder, and its process id, host and start stand in that file. The
-system lets go of the lock when the process ends, however it ends; so a lock that is free, of a file that is there, was
-a dead owner's. Locks do not reach from host to host everywhere: the owner touches its file every minute, and one on
-another host counts as dead after ten minutes without.
+The owner holds a lock on the file `.owner` in the folder, which holds its process id, host and start. The system
+releases the lock when the process ends, however it ends; so a free lock on an existing file belonged to a dead owner.
+Locks do not reach from host to host everywhere: the owner touches its file every minute, and an owner on another host
+counts as dead after ten minutes without a touch.
 """
 
 import json
@@ -26,21 +26,22 @@ except ImportError:  # a system without such locks: every owner is taken as one 
     fcntl = None
 
 OWNER = ".owner"
-"""Name of the file that says who owns a folder."""
+"""File that names the owner of its folder."""
 BEAT, DEAD = 60.0, 600.0
-"""Time between two signs of life, and time without after which an owner on another host is dead [s]; chosen."""
+"""Time between two touches, and time without a touch after which an owner on another host is dead [s]; chosen."""
 
 
 class TakenError(SpringfootError):
-    """Somebody else has the folder."""
+    """Another process owns the folder."""
 
 
 @contextmanager
 def owned(folder: Path) -> Iterator[None]:
-    """Own `folder`, made where it is not there, until the block ends; one that was made and is empty then vanishes.
+    """Own `folder` until the block ends.
 
-    Says so on standard error where it takes the folder over from a dead owner. Raises `SpringfootError`, with nothing
-    changed, where it cannot be made, and `TakenError` where another process owns it.
+    A missing folder is made, and removed at the end if it is empty. A message on standard error says when the folder
+    comes from a dead owner. Raises `SpringfootError`, with nothing changed, if the folder cannot be made, and
+    `TakenError` if another process owns it.
     """
     try:
         str(folder).encode()
@@ -82,9 +83,9 @@ def owned(folder: Path) -> Iterator[None]:
 
 
 def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
-    """Return a handle of the file at `path`, and whether it is locked, as it is where there are locks.
+    """Return a handle of the file at `path`, and whether it is locked, as it always is where file systems have locks.
 
-    The folders that it takes are made, and told in `made`.
+    Makes missing folders above it, and adds them to `made`.
     """
     while True:
         made += _make(path.parent)
@@ -107,7 +108,7 @@ def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and those above it; return those that were not there, outermost first."""
+    """Make a folder and those above it; return the new ones, outermost first."""
     missing = [each for each in (folder, *folder.parents) if not each.exists()][::-1]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -130,7 +131,7 @@ def _live(path: Path, over: threading.Event) -> None:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return who owns; empty for nobody, and for who has only just locked it."""
+    """Return the record of the owner; empty if there is none, or if it has only just locked the file."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -139,7 +140,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _runs(owner: dict[str, Any]) -> bool:
-    """Return whether there is a process of that id on this host."""
+    """Tell whether this host runs a process of that id."""
     try:
         os.kill(int(owner["pid"]), 0)
     except (ProcessLookupError, KeyError, TypeError, ValueError, OverflowError):

@@ -1,4 +1,4 @@
-"""Markdown: tables and the numbers in them."""
+"""Format Markdown tables and the numbers in them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,7 +18,7 @@ def text_of(value: float | None, pattern: str) -> str:
 def plus_minus(spread: Mapping[str, float | None], pattern: str, *, alone: bool = True) -> str:
     """Return a spread of `mean_sd` as "mean ± SD".
 
-    Where there is no SD the mean `alone`, or else with `MISSING` for it.
+    Without an SD the mean stands `alone`, or else with `MISSING` for the SD.
     """
     mean, sd = (text_of(spread[name], pattern) for name in ("mean", "sd"))
     return mean if alone and spread["sd"] is None else f"{mean} ± {sd}"

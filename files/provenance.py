@@ -1,4 +1,4 @@
-"""What made a result: versions of what runs, and the commit it comes from."""
+"""Tell the origin of a result: versions of packages, and the commit."""
 
 import platform
 import subprocess
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def source(packages: Iterable[str]) -> dict[str, Any]:
-    """Versions of Python and `packages`, and the git commit (None outside a clone of the project)."""
+    """Return the versions of Python and `packages`, and the git commit (None outside a clone of the project)."""
 
     def git(*words: str) -> str | None:
         command = ["git", "-C", str(Path(__file__).parent), *words]

@@ -1,7 +1,6 @@
-"""Tensors with a JSON header in one .safetensors file, and a digest of both, so that damage is noticed.
+"""Read and write tensors with a JSON header in one .safetensors file; a digest of both finds damage.
 
-A digest finds what a disk or a copy has changed, down to one bit. It is no signature: whoever changes a file on purpose
-can write a fitting one.
+A digest finds changes by a disk or a copy, down to one bit. It is no signature: a forger can write a fitting one.
 """
 
 import json
@@ -22,7 +21,7 @@ from .writing import write_atomically
 DIGEST = "sha256"
 """Name of the digest among the entries of the header."""
 MOST_TENSOR_BYTES, MOST_HEADER = 2**27, 2**24
-"""Largest file, and largest header in it, that are read or written [bytes]; chosen, hundreds of times usual ones."""
+"""Largest file, and largest header in it, to read or write [bytes]; chosen, hundreds of times the usual sizes."""
 
 
 def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping[str, np.ndarray]) -> None:
@@ -39,11 +38,17 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
 def read_tensors(
     path: Path, key: str, what: str, entries: AbstractSet[str], finite: bool = True, sealed: bool = False
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Return the JSON under `key` of a .safetensors header, and the tensors, all finite; else `SpringfootError`.
+    """Return the JSON under `key` of a .safetensors header, and the tensors.
 
-    `what` it is called in messages, and `entries` are those that its JSON may have. Unless `finite`, numbers may be of
-    any kind, infinite ones and NaN too. A file without a digest, of an earlier version, is read without that check;
-    with `sealed` it is refused.
+    Args:
+        path: of the file.
+        key: of the header's JSON text.
+        what: name of such a file, in messages.
+        entries: allowed entries of the JSON.
+        finite: refuse infinite numbers and NaN.
+        sealed: refuse a file without a digest; files of earlier versions have none.
+
+    Raises `SpringfootError` for any other file.
     """
     try:
         if (size := path.stat().st_size) > MOST_TENSOR_BYTES:
@@ -85,7 +90,7 @@ def _text(header: Mapping[str, Any]) -> str:
 
 
 def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
-    """Return the digest of a JSON header and arrays: of their names, types, shapes and bytes, in whatever order."""
+    """Return the digest of a JSON header and arrays: of their names, types, shapes and bytes, in any order."""
     found = sha256(_text(header).encode())
     for name in sorted(tensors):
         found.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())

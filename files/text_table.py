@@ -1,4 +1,4 @@
-"""Text files of numbers under a line of names, of sizes that fit into memory; errors name file, line and column."""
+"""Read text files of numbers under a line of names, of bounded size; errors name file, line and column."""
 
 import csv
 import io
@@ -16,10 +16,10 @@ from springfoot.errors import SpringfootError
 from .digest import require_whole
 
 MOST_TEXT_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_000_000
-"""Largest text file that is read: bytes, letters of a line, columns, cells; chosen: 25 minutes of 20 curves at 100 Hz,
-which take less than half a gigabyte."""
+"""Largest text file to read: bytes, letters of a line, columns, cells; chosen: 25 minutes of 20 curves at 100 Hz, which
+take less than half a gigabyte."""
 LARGEST_VALUE = 1e12
-"""Largest magnitude of a number in a cell; chosen: means and squares of such are numbers."""
+"""Largest magnitude of a number in a cell; chosen, so that means and squares are finite."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,16 +32,17 @@ class Table:
     """Line number in the file, cells."""
 
     def has(self, column: str) -> bool:
-        """Return whether there is such a column, not all empty."""
+        """Tell whether the table has the column, with at least one cell that is not empty."""
         return column in self.columns and any(cells[self.columns.index(column)].strip() for _, cells in self.rows)
 
     def numbers(self, column: str) -> NDArray:
-        """Return a column's cells, all finite numbers; raise `SpringfootError` for others."""
+        """Return a column's cells as finite numbers; raise `SpringfootError` for any other cell."""
         at = self.columns.index(column)
         return np.array([self._number(line, column, cells[at]) for line, cells in self.rows])
 
     def ascending(self, column: str) -> NDArray:
-        """As `numbers`, each greater than the one before, or `SpringfootError`."""
+        """Return a column's cells as `numbers` does; raise `SpringfootError` unless each is greater than the one
+        before."""
         values = self.numbers(column)
         for (line, _), before, value in zip(self.rows[1:], values[:-1], values[1:], strict=True):
             if value <= before:
@@ -49,7 +50,7 @@ class Table:
         return values
 
     def error(self, line: int, column: str, what: str) -> SpringfootError:
-        """Return the error that names the fault of a cell in one line."""
+        """Return the error that names a cell and its fault in one line."""
         return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
 
     def _number(self, line: int, column: str, cell: str) -> float:
@@ -65,16 +66,16 @@ class Table:
 
 
 def existing(path: Path) -> Path:
-    """Return the path of a file that is there, or `SpringfootError`."""
+    """Return the path if it is a file; raise `SpringfootError` otherwise."""
     if not path.is_file():
         raise SpringfootError(f"no file {path}")
     return path
 
 
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
-    """Return the content of a file; raise `SpringfootError` if there is none, or more than `most` bytes.
+    """Return the content of a file; raise `SpringfootError` if it is missing or larger than `most` bytes.
 
-    More bytes are not read.
+    Never reads more than that.
     """
     with existing(path).open("rb") as file:
         size = path.stat().st_size
@@ -85,7 +86,7 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
 
 
 def read_csv(path: Path) -> Table:
-    """Return a CSV file: header, then rows of as many cells. Raises `SpringfootError` for anything else."""
+    """Return a CSV file: header, then rows of as many cells. Raises `SpringfootError` for any other file."""
     try:
         return make_table(path.name, enumerate(csv.reader(text_lines(path), strict=True), 1))
     except csv.Error as error:
@@ -93,7 +94,7 @@ def read_csv(path: Path) -> Table:
 
 
 def text_lines(path: Path) -> Iterator[str]:
-    """Return the lines of a text file, whole if it is sealed; `SpringfootError` for any other file."""
+    """Yield the lines of a text file whose digest, if it has one, fits; raise `SpringfootError` for any other file."""
     content = read_bytes(path)
     require_whole(path, content)
     if b"\0" in content:
@@ -108,7 +109,7 @@ def text_lines(path: Path) -> Iterator[str]:
 
 
 def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
-    """Numbered lines of cells, the first the header, empty ones left out."""
+    """Return the table of numbered lines of cells: the first is the header, empty lines are left out."""
     filled = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
     header, names = next(filled, (0, []))
     columns = [_coordinate(column.strip()) for column in names]
@@ -135,5 +136,5 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
 
 
 def _coordinate(name: str) -> str:
-    """`/jointset/knee_r/knee_angle_r/value` -> `knee_angle_r`."""
+    """Shorten OpenSim's `/jointset/knee_r/knee_angle_r/value` to `knee_angle_r`."""
     return name.split("/")[-2] if name.startswith("/") and name.endswith("/value") else name

@@ -1,4 +1,4 @@
-"""Files and folders of results: written whole or not at all, and never over an older one."""
+"""Write files and folders of results whole or not at all, and never over older ones."""
 
 import csv
 import io
@@ -36,7 +36,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have a folder's entries on the disk, where the system can say so of a folder."""
+    """Flush a folder's entries to the disk, where the system can."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -46,7 +46,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def remove_temporary(folder: Path) -> None:
-    """Remove what a process that was killed in `write_atomically` left in a folder that nobody else writes into."""
+    """Remove leftovers of a `write_atomically` that was killed, in a folder without other writers."""
     for path in folder.glob(".*"):
         if _is_temporary(path):
             path.unlink(missing_ok=True)
@@ -80,11 +80,10 @@ def require_new_files(paths: Iterable[Path]) -> None:
 
 @contextmanager
 def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
-    """Return a folder to write into, and the new folder that it becomes where the block ends well; elsewhere it
-    vanishes.
+    """Give a folder to write into, and the new folder that it becomes if the block ends without an error.
 
-    That one is `out`, or if None the first of `free`-1, `free`-2, … that neither exists nor is being made. What a
-    process that was killed had written for it is removed. Raises `SpringfootError` for an `out` that is taken.
+    The new folder is `out`, or if None the first of `free`-1, `free`-2, … that neither exists nor is being made. After
+    an error nothing is left; leftovers of a killed process are removed. Raises `SpringfootError` for an existing `out`.
     """
     with ExitStack() as stack:
         names = (free.with_name(f"{free.name}-{number}") for number in count(1)) if out is None else [out]
@@ -101,9 +100,9 @@ def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
 
 @contextmanager
 def _part(out: Path) -> Iterator[Path]:
-    """Return the hidden folder that becomes `out`.
+    """Give the hidden folder that becomes `out`.
 
-    Raises `TakenError` where `out` exists or another process makes it.
+    Raises `TakenError` if `out` exists or another process makes it.
     """
     part = out.parent / f".{out.name}.part"
     try:
@@ -123,7 +122,7 @@ def _part(out: Path) -> Iterator[Path]:
 
 
 def _settle(part: Path, out: Path) -> None:
-    """Rename a finished folder; if the name was taken meanwhile, use another and say so."""
+    """Rename a finished folder; if another process has taken the name meanwhile, use another name and say so."""
     name = out
     for number in count(2):
         try:
@@ -149,7 +148,8 @@ def _empty(folder: Path) -> None:
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Return a CSV file: numbers to six significant digits, nothing for None and for what is not finite."""
+    """Return a CSV file: numbers to six significant digits, empty cells for None and for numbers that are not
+    finite."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
@@ -166,7 +166,7 @@ def _cell(value: Any) -> Any:
 def require_new(out: str | Path) -> Path:
     """Return `out` as a path; raise `SpringfootError` if it exists and is not an empty folder.
 
-    What a process leaves that was killed before it wrote its first file counts as nothing.
+    Files of a process that was killed before its first result do not count.
     """
     out = Path(out)
     if out.exists() and not (out.is_dir() and all(path.name == OWNER or _is_temporary(path) for path in out.iterdir())):
@@ -175,7 +175,7 @@ def require_new(out: str | Path) -> Path:
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder and those above it; raise `SpringfootError` where that is impossible."""
+    """Make the folder and those above it; raise `SpringfootError` if that is impossible."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The type of every array here. Its shape and its unit stand in the docstring of what has it."""
+"""Define the type of every array; shape and unit stand in the docstring of its function or attribute."""
 
 from typing import Any, TypeAlias
 

@@ -1,4 +1,4 @@
-"""What every command does around its work: tell bad input in one line, return an exit code, name its results."""
+"""Run a command: tell bad input in one line, return an exit code, name its results."""
 
 import errno
 import io
@@ -17,9 +17,10 @@ from springfoot.terminal import INTERRUPTED, TERMINATED
 
 Flags = TypeVar("Flags")
 LONGEST_WORD = 160
-"""Characters of a word in an error's line; longer ones are cut in their middle; chosen, two lines of a terminal."""
+"""Most characters of a word in an error's line; longer words are cut in their middle; chosen, two lines of a
+terminal."""
 _NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
-"""Errors of the system that end a writing: full, read-only, forbidden, broken, vanished."""
+"""System errors that end a writing: full, read-only, forbidden, broken, vanished."""
 _OURS = {
     r"^Error parsing (--\S+): ": r"\1 ",
     r"invalid literal for int\(\) with base 10: ": "must be a whole number, got ",
@@ -27,13 +28,13 @@ _OURS = {
     r"^Missing value for argument '(\S+)'. Expected 1 values": r"\1 needs a value",
     r"^Missing value for argument '(\S+)'. Expected (\d+) values": r"\1 needs \2 values",
 }
-"""What tyro says, and what we say in its place."""
+"""tyro's wording -> ours."""
 
 
 def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flags:
-    """Return the flags on the command line, `words` or those of the process; help on standard output ends with 0.
+    """Return the flags on the command line, `words` or those of the process; `--help` exits with 0.
 
-    Bad flags end with 2, after one line on standard error that says what is wrong with which.
+    Bad flags exit with 2, after one line on standard error that names the flag and its fault.
     """
     said = io.StringIO()
     try:
@@ -46,7 +47,7 @@ def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flag
 
 
 def _of_box(text: str) -> str:
-    """Return the text of a box of tyro in one line: its first part, and the first flag that it suggests."""
+    """Return the text of one of tyro's drawn boxes in one line: its first part, and the first suggested flag."""
     lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
     parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))
     if not text.startswith("╭"):  # where there is no UTF-8, the title is above a line of its own
@@ -62,8 +63,8 @@ def _of_box(text: str) -> str:
 def exit_code(name: str, work: Callable[[], int | None]) -> int:
     """Run the `work` of the command `name` and return its exit code.
 
-    That is what `work` returns (0 for None); 2 after one line on standard error for bad input, a file that cannot be
-    read or written, or too little memory; 130 after Ctrl-C, 143 after SIGTERM, which says so in a line as well.
+    The code is the value of `work` (0 for None); 2, after one line on standard error, for bad input, a file that cannot
+    be read or written, or too little memory; 130 after Ctrl-C and 143 after SIGTERM, with a line too.
     """
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:  # closed
@@ -89,7 +90,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
 
 
 def end_in_order() -> None:
-    """From here on SIGINT and SIGTERM raise, so that what is being written is cleared up on the way out.
+    """Make SIGINT and SIGTERM raise from here on, so that unfinished writing is cleared up.
 
     A command calls it after its imports, and before it writes anything.
     """
@@ -112,7 +113,7 @@ def stopped_by(record: dict[str, Any]) -> int:
 
 
 def _told(error: Exception) -> str:
-    """Return the message of an error, and which files are safe where some cannot be written."""
+    """Return the message of an error; if files cannot be written, with those that are safe."""
     if isinstance(error, MemoryError):
         return "not enough memory; results are written whole or not at all"
     if isinstance(error, UnicodeEncodeError):
@@ -126,6 +127,6 @@ def _told(error: Exception) -> str:
 
 
 def _in_a_line(text: str) -> str:
-    """Return a line for a terminal, in which no word, as names of files are, is longer than `LONGEST_WORD`."""
+    """Return one line for a terminal, with words, such as names of files, cut to `LONGEST_WORD`."""
     half = LONGEST_WORD // 2 - 2
     return re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: f"{word[0][:half]}...{word[0][-half:]}", printable(text))

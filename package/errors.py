@@ -1,4 +1,4 @@
-"""The one exception of springfoot, and the checks that raise it most."""
+"""Define the one exception of springfoot, and the checks that most often raise it."""
 
 from math import inf, isfinite, isinf, isnan, nan
 from numbers import Integral, Real
@@ -10,19 +10,19 @@ MOST_THREADS = 1024
 
 
 class SpringfootError(ValueError):
-    """Bad input or an impossible request: one printable line saying what was wrong and what is allowed."""
+    """Bad input or an impossible request: one printable line with the fault and the allowed values."""
 
     def __init__(self, message: object = "") -> None:
         super().__init__(printable(str(message)))
 
 
 def printable(text: str) -> str:
-    """`text` as one line that does nothing to a terminal: control characters as Python writes them."""
+    """Return `text` as one line that is harmless to a terminal: control characters as Python writes them."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def quoted(value: object, most: int = 60) -> str:
-    """Return the quotation of a bad value in a message: its `repr`, or the beginning of it beyond `most` letters."""
+    """Return the `repr` of a bad value for a message, cut to `most` letters."""
     try:
         text = repr(value)
     except ValueError:  # a whole number of thousands of digits
@@ -31,7 +31,7 @@ def quoted(value: object, most: int = 60) -> str:
 
 
 def as_float(value: object) -> float:
-    """Return a number as a float, infinite if too large for one; NaN for what is no number."""
+    """Return a number as a float, infinite if it is too large; NaN for any other value."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return nan
     try:
@@ -41,7 +41,7 @@ def as_float(value: object) -> float:
 
 
 def require_within(name: str, value: object, allowed: tuple[float, float], unit: str = "") -> float:
-    """`value` as a float, or `SpringfootError` if it is not a finite number in [low, high] of `unit`."""
+    """Return `value` as a float; raise `SpringfootError` unless it is a finite number in [low, high] of `unit`."""
     low, high = allowed
     number = as_float(value)
     if not low <= number <= high:
@@ -53,7 +53,8 @@ def require_within(name: str, value: object, allowed: tuple[float, float], unit:
 def require_number(
     name: str, value: object, low: float, high: float = inf, unit: str = "", *, above: bool = False
 ) -> float:
-    """`value` as a float, or `SpringfootError` if it is not finite and in [low, high], (low, high] with `above`."""
+    """Return `value` as a float; raise `SpringfootError` unless it is finite and in [low, high], with `above` in (low,
+    high]."""
     number = as_float(value)
     if not (isfinite(number) and low <= number <= high) or (above and number == low):
         bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == inf else f" and <= {high:.4g}")
@@ -63,7 +64,7 @@ def require_number(
 
 
 def require_count(name: str, value: object, least: int = 1, most: int = MOST_COUNT) -> int:
-    """`value` as an int, or `SpringfootError` if it is not a whole number in [least, most]."""
+    """Return `value` as an int; raise `SpringfootError` unless it is a whole number in [least, most]."""
     count = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if count is None or not least <= count <= most:
         bounds = f">= {least}" + ("" if most == MOST_COUNT and (count is None or count <= most) else f" and <= {most}")

@@ -1,4 +1,4 @@
-"""Which extra of springfoot brings a package that is not installed."""
+"""Name the extra of springfoot that installs a missing package."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ EXTRA_OF = {
 
 @contextmanager
 def naming_extras() -> Iterator[None]:
-    """Around imports: the error of a package that is not installed says what installs it."""
+    """Add the extra to install to the error of a missing package, for imports inside the block."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Public names of a package, imported from its modules when they are first asked for."""
+"""Import the public names of a package from its modules at their first use."""
 
 from collections.abc import Callable, Mapping
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""What a command does about the terminal or pipe that it writes to, whatever it is: gone, closed, full or narrow."""
+"""Guard a command against its terminal or pipe: gone, closed, full or narrow."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 NARROWEST = 40
-"""Columns that help is laid out in at least; in fewer, tyro never ends."""
+"""Least columns for help; with fewer, tyro never ends."""
 READER_LEFT = 128 + 13
 """Exit code after the reader of a pipe has left, as a shell gives it for a program that SIGPIPE ends."""
 
@@ -23,10 +23,9 @@ _SAID = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"ended 
 
 
 def at_terminal(command: Callable[[], int]) -> int:
-    """Run a command; returns its exit code, 141 where its reader left, 2 where its output cannot be written.
+    """Run a command; return its exit code, 141 if its reader left, 2 if its output cannot be written.
 
-    Until the command handles Ctrl-C and SIGTERM itself, as it does once it writes anything, they end the process with
-    one line.
+    Ctrl-C and SIGTERM end the process with one line until the command handles them itself, before its first writing.
     """
     _name_glfw_library()
     in_main = threading.current_thread() is threading.main_thread()
@@ -39,7 +38,7 @@ def at_terminal(command: Callable[[], int]) -> int:
 
 
 def _name_glfw_library() -> None:
-    """Name glfw's library, so that its import starts no process to ask for it, which a signal would reach too."""
+    """Name glfw's library, so that its import starts no process to look for it, which a signal would reach too."""
     found = find_spec("glfw")
     if found is None or found.origin is None:
         return
@@ -82,7 +81,7 @@ def _written_out(command: Callable[[], int]) -> int:
 
 
 def _forget(stream: object) -> None:
-    """Let what is left in a stream go nowhere, or Python would try again at its end."""
+    """Discard the rest of a stream's buffer, which Python would try to write again at its end."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())  # type: ignore[attr-defined]
     os.close(nowhere)

@@ -1,7 +1,7 @@
-"""A policy by its name, and the environment it is evaluated in: the one place where names of policies are understood.
+"""Return a policy by its name, and its environment in an evaluation: the one place that understands names of policies.
 
 A name is a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `predicted`, `module:function`, a
-baseline (`springfoot.agents.policies.baselines`), or `frozen:POLICY`, the open-loop copy of one that was trained.
+baseline (`springfoot.agents.policies.baselines`), or `frozen:POLICY`, the open-loop copy of a trained policy.
 """
 
 from dataclasses import replace
@@ -27,9 +27,9 @@ from springfoot.errors import SpringfootError
 from .open_loop import Watch, open_loop_copy
 
 LONGEST_LABEL = 60
-"""Letters of what results call a policy; chosen, in any script a folder may have so long a name."""
+"""Most letters of a policy's name in results; chosen, a length that a folder can have in any script."""
 CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
-"""The settings' defaults that every evaluation has unless told otherwise, whatever the policy was trained on."""
+"""Standard conditions of every evaluation: defaults that replace the settings of the policy's training."""
 
 
 def prepare(
@@ -39,13 +39,13 @@ def prepare(
     threads: int = 2,
     watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """Return a policy by name and the environment it is evaluated in.
+    """Return a policy by name, and its environment in an evaluation.
 
     Args:
         name: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, `module:function`, a
             baseline of `agents.policies.baselines`, or `frozen:POLICY`, the mean K of one of the first four, which
             first walks for it (`open_loop_copy`).
-        given: environment settings asked for; they win over `CONDITIONS`, and those over the policy's own.
+        given: environment settings asked for. They replace `CONDITIONS`, and `CONDITIONS` replace the policy's own.
         seed: of the baseline `random`.
         threads: of the physics where a copy is made; any number gives the same bits.
         watch: as for `open_loop_copy`.
@@ -75,7 +75,7 @@ def prepare(
 
 
 def _prepare_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -> tuple[PolicyFunction, BipedSettings]:
-    """`frozen:POLICY`: its K is of the policy's own decisions, whenever the copy decides."""
+    """Prepare `frozen:POLICY`: its mean K comes from the policy's own decisions, at whatever rate the copy decides."""
     other = name.partition(":")[2]
     if not other:
         raise SpringfootError(f"{FROZEN} is the copy of a policy, as in {FROZEN}:pretrained, got {name!r}")
@@ -92,7 +92,7 @@ def _prepare_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) 
 def policy_label(name: str) -> str:
     """Return the name of a policy in results: its own, that of its run or that of its file, without folders.
 
-    It names a folder inside that of the results, whatever `name` is: printable, no path, not hidden, not too long.
+    The label can name a folder, whatever `name` is: printable, no path, not hidden, not too long.
     """
     kind, _, other = name.partition(":")
     label = f"{FROZEN}-{policy_label(other)}" if kind == FROZEN and other else _own_name(name)

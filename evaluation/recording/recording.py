@@ -1,4 +1,4 @@
-"""Episodes of a policy as 100 Hz series: what every number and picture of an evaluation is computed from."""
+"""Record episodes of a policy as 100 Hz series, from which all numbers and pictures of an evaluation are computed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ from springfoot.gait.plan.com_plan import ComPlan
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
 WARM_UP = 3.0
-"""Beginning of each steady walk left out of the gait's numbers [s]; a fall in it counts."""
+"""Beginning of each steady walk that the gait's numbers leave out [s]; a fall in it counts."""
 LONGEST_RECORDING = 100_000
 """Longest recording, all episodes together [s]; chosen: its series have some 6 GB."""
 BATCH = 32
@@ -63,23 +63,27 @@ SERIES: dict[str, Callable[[Tick], NDArray]] = {
     "stiffness": lambda tick: tick.stiffness[..., FEET],  # (side, (ankle, toe)) [N m/rad]
     "equilibrium": lambda tick: tick.equilibrium[..., FEET],  # (side, (ankle, toe)) [rad]
 }
-"""Name -> what is taken of a tick.
+"""Name of a series -> function that takes its values from a tick.
 
 Joint signs: flexion, dorsiflexion, toe-up positive; orders as in `envs.physics.model`.
 """
 REWARD = "reward"
-"""The series (TERMS,) that no tick knows: the reward's terms, unweighted, of the step that a tick is part of."""
+"""Series (TERMS,) of the reward's unweighted terms, in the step around each tick; a `Tick` itself does not have
+them."""
 _TERMS = slice(INFO.index(f"reward/{TERMS[0]}"), INFO.index(f"reward/{TERMS[-1]}") + 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """E episodes of up to T ticks of 10 ms; sample k stands at its end, (k + 1) * 10 ms; forces are its mean."""
+    """E episodes of up to T ticks of 10 ms.
+
+    Sample k holds states at the end of its tick, (k + 1) * 10 ms, and forces averaged over the tick.
+    """
 
     policy: str
-    """What was run."""
+    """Name of the policy."""
     settings: BipedSettings
-    """The environment it was run in."""
+    """Settings of its environment."""
     seed: int
     """Episode i was seeded with seed + i."""
     ticks: NDArray
@@ -87,7 +91,7 @@ class Recording:
     returns: NDArray
     """(E,) sum of the reward over each episode."""
     fall_reason: NDArray
-    """(E,) why an episode ended early, "" where it did not."""
+    """(E,) reason of a fall, "" for an episode without one."""
     plan_com: NDArray
     """(101, 2) planned CoM over percent of the step: x from the ankle of the foot whose stance began last, z [m]."""
     plan_zmp: NDArray
@@ -97,7 +101,7 @@ class Recording:
 
     @property
     def example(self) -> int:
-        """The episode that pictures and exports show: the first without a fall, else the longest."""
+        """Return the episode for pictures and exports: the first without a fall, else the longest."""
         standing = np.flatnonzero(self.fall_reason == "")
         return int(standing[0]) if len(standing) else int(np.argmax(self.ticks))
 
@@ -107,7 +111,7 @@ class Recording:
         return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
 
     def save(self, path: Path) -> None:
-        """Write `strides.npz`: the series and, as JSON text, what they are of. No object arrays."""
+        """Write `strides.npz`: the series and a header of JSON text. No object arrays."""
         header = {
             "policy": self.policy,
             "settings": settings_to_json(self.settings),
@@ -122,8 +126,10 @@ class Recording:
 
 
 def load_recording(path: str | Path) -> Recording:
-    """Return the recording in a `strides.npz`; raise `SpringfootError` for any other file, and for one of another
-    version."""
+    """Return the recording in a `strides.npz`.
+
+    Raises `SpringfootError` for any other file, and for a recording of another version.
+    """
     header, arrays = read_arrays(Path(path), "strides.npz written by evaluate.py")
     try:
         if missing := [name for name in ("plan_zmp", *SERIES, REWARD) if name not in arrays]:
@@ -138,7 +144,7 @@ def load_recording(path: str | Path) -> Recording:
 
 
 def _require_whole(recording: Recording) -> None:
-    """Raise `SpringfootError` for arrays that are not of the same episodes."""
+    """Raise `SpringfootError` for arrays of different numbers of episodes or ticks."""
     episodes, length = recording.series["phase"].shape[:2]
     for name in ("ticks", "returns", "fall_reason"):
         if getattr(recording, name).shape != (episodes,):
@@ -171,20 +177,20 @@ def record(
     legs: LegConstants | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> Recording:
-    """Run `episodes` episodes of `settings.episode_seconds` each, episode i seeded with `seed` + i.
+    """Record `episodes` episodes of `settings.episode_seconds` each, episode i from seed `seed` + i.
 
     Args:
         policy: deterministic, observations to actions.
         settings: of the environment.
-        name: what the policy is called in reports.
+        name: of the policy, in reports.
         episodes: how many.
         seed: of the first.
         threads: of the physics; any number gives the same bits.
-        model: the body's with other options, as for `envs.physics.simulation.Simulation`.
+        model: of the body, with other options, as for `envs.physics.simulation.Simulation`.
         legs: leg constants in place of the committed ones.
-        progress: told the simulated time [s] of all episodes together after every step.
+        progress: called with the simulated time [s] of all episodes together after every step.
 
-    Raises `SpringfootError` for settings that draw what may differ between episodes.
+    Raises `SpringfootError` for settings that draw body, speed or world anew for each episode.
     """
     if any(getattr(settings, name) is not None for name in DRAWN_SETTINGS):
         raise SpringfootError(
@@ -206,10 +212,11 @@ def record_each(
     threads: int = 2,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> list[Recording]:
-    """As `record`, one episode for each of E bodies and speeds, side by side; a recording each, with its own settings.
+    """Record, as `record` does, one episode for each of E bodies and speeds, side by side.
 
-    `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,) each, within what the `settings` draw from. Raises
-    `SpringfootError` for settings whose commanded speed changes within an episode.
+    Returns a recording for each, with its own settings. `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,)
+    each, within the ranges that the `settings` draw from. Raises `SpringfootError` for settings whose commanded speed
+    changes within an episode.
     """
     if settings.speed_interval is not None:
         raise SpringfootError(
@@ -241,7 +248,10 @@ def record_feet(
     threads: int = 2,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> list[Recording]:
-    """As `record`, the same episodes for each of the `right_feet`, settings of feet, side by side; a recording each."""
+    """Record, as `record` does, the same episodes on each of the `right_feet` (settings of feet), side by side.
+
+    Returns a recording for each foot.
+    """
     each = [replace(settings, right_foot=foot) for foot in right_feet]
     feet = [own.feet for own in each for _ in range(episodes)]
     seeds = [seed + episode for _ in each for episode in range(episodes)]
@@ -298,10 +308,10 @@ def record_walk(
     steps: int | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> None:
-    """Walk the episodes `rows` of `kept` in `biped`, which was reset, and keep every tick of them.
+    """Walk the episodes `rows` of `kept` in the reset batch `biped`, and keep every tick.
 
-    Everything that is measured of a walk is measured of what this keeps. `act` and `steps` as for
-    `springfoot.envs.batch.walk.walked_steps`; `progress` is told the simulated time [s] after every step.
+    All measurements of walks start from these series. `act` and `steps` as for
+    `springfoot.envs.batch.walk.walked_steps`; `progress` is called with the simulated time [s] after every step.
     """
     ticks = kept.ticks[rows]
 
@@ -342,7 +352,7 @@ def record_all(
 ) -> Episodes:
     """Walk one episode for each of E `seeds`, `BATCH` of them side by side.
 
-    `given` as in `Biped.reset`, `model` and `legs` as in `record`, `feet` those of each episode.
+    `given` as in `Biped.reset`, `model` and `legs` as in `record`; `feet` are those of each episode.
     """
     require_recordable(settings, len(seeds))
     step = settings.step_seconds
@@ -358,7 +368,7 @@ def record_all(
 
 
 def planned_course(plan: ComPlan) -> dict[str, NDArray]:
-    """`plan_com` and `plan_zmp` of a `Recording`."""
+    """Return `plan_com` and `plan_zmp` of a `Recording`."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
     return {"plan_com": np.stack(plan.com(step_phase), -1), "plan_zmp": plan.zmp(step_phase)}
