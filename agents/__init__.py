@@ -1,7 +1,7 @@
-"""What needs a learner: training by PPO, policies as files, and the baselines they are held against.
+"""Train policies by PPO, keep them as files, and define the baselines to compare them with.
 
-A name is imported when it is first asked for: a policy can be loaded and run where torch is not installed, and the
-configuration of a training needs no simulator.
+A name is imported at its first use: a policy can be loaded and run without torch, and the configuration of a training
+needs no simulator.
 """
 
 from typing import TYPE_CHECKING

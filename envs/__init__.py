@@ -1,6 +1,6 @@
 """The walking model in MuJoCo, as Gymnasium environments; importing it registers `SegmentedFootBiped-v0`.
 
-Settings need no simulator; MuJoCo and numba are imported with the first name that walks.
+Settings need no simulator; MuJoCo and numba are imported at the first use of a name that walks.
 """
 
 from typing import TYPE_CHECKING

@@ -74,12 +74,12 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
 
     @property
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The generator of each environment; None before its first reset."""
+        """Return the generator of each environment; None before its first reset."""
         return tuple(self.biped.generators)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The seed of each environment's generator; -1 before its first reset."""
+        """Return the seed of each environment's generator; -1 before its first reset."""
         return tuple(self._seeds)
 
     def reset(
@@ -106,7 +106,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         return self.biped.observe(), _infos(self._start_values(), np.zeros(self.num_envs, int), mask)
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        """Hold the stiffnesses that `actions` (N, 4) stand for during a step, 20 ms by default."""
+        """Hold the stiffnesses of `actions` (N, 4) during a step, 20 ms by default."""
         self._check_running()
         resetting = self._over
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
@@ -184,12 +184,12 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
 
 
 def _infos(values: NDArray, termination: NDArray, mask: NDArray | None = None) -> dict[str, Any]:
-    """Gymnasium's form of a vector's info: arrays by name, and for each a mask `_name` of where it holds.
+    """Return a vector's info in Gymnasium's form: arrays by name, and for each a mask `_name` of valid entries.
 
     Args:
         values: (N, len(INFO)) as `StepResult.values`; the infos are views of it.
-        termination: (N,) codes; handed out as they are.
-        mask: (N,) where they hold, everywhere if None; elsewhere they are 0.
+        termination: (N,) codes, not copied.
+        mask: (N,) valid entries, all if None; other entries are 0.
     """
     if mask is None:
         mask = np.ones(len(values), bool)
@@ -204,7 +204,7 @@ def _infos(values: NDArray, termination: NDArray, mask: NDArray | None = None) -
 
 
 def _final(result: StepResult, ended: NDArray) -> dict[str, Any]:
-    """Last observation and info of the episodes that ended in this step."""
+    """Return the last observation and info of the episodes that ended in this step."""
     last = np.full(len(ended), None, dtype=object)
     for index in np.flatnonzero(ended):
         last[index] = result.observation[index].copy()

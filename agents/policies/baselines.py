@@ -1,7 +1,7 @@
-"""Baselines: policies that need no learning, against which a learned one is judged.
+"""Define baselines: policies that need no learning, to compare learned policies with.
 
-Each is, like a trained policy, a function of observations (N, D) that returns actions (N, 4) in [-1, 1]. They turn a
-stiffness in N m/rad into an action by the inverse of the environment's log scale, so they need
+Each is, like a trained policy, a function of observations (N, D) that returns actions (N, 4) in [-1, 1]. Baselines turn
+a stiffness in N m/rad into an action by the inverse of the environment's log scale, so they need
 `action_mode="absolute"`.
 """
 
@@ -30,7 +30,7 @@ PolicyFunction = Callable[[NDArray], NDArray]
 """Observations (N, D) -> actions (N, 4) in [-1, 1]."""
 
 CONSTANT_STIFFNESS = (300.0, 40.0)
-"""Ankle and toe of `constant` [N m/rad] for 1.70 m and 63 kg: round numbers that walk, not the best ones."""
+"""Ankle and toe stiffness of `constant` [N m/rad] for 1.70 m and 63 kg: round numbers that walk, not the best ones."""
 
 _SIN, _COS, _SPEED = (
     [entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos", "command_speed")
@@ -64,9 +64,9 @@ def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
 
 
 def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
-    """Return a fixed stiffness over the stride, times `factor`: that of `settings.schedule`, or that of the leg tuning.
+    """Return a fixed stiffness over the stride, times `factor`: `settings.schedule`, or the schedule of the leg tuning.
 
-    The tuned one goes with the speed that is commanded at each moment, and each leg has its own where a person has
+    The tuned schedule depends on the momentary commanded speed, and differs between the legs of a person who has
     adapted to a foot. Both scale with the body.
     """
     body = body_of(settings)
@@ -85,7 +85,7 @@ def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
-    """People's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and `TOE_STIFFNESS`, as K."""
+    """Return people's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and `TOE_STIFFNESS`, as K."""
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)
     stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
@@ -95,8 +95,8 @@ def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
 def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
     """Return the policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
 
-    Where the legs have their own it is (speeds, samples, side, (ankle, toe)). Phase and Froude speed are read from the
-    observation; between two of `speeds` [m/s, of `body`] it is linear.
+    With an axis of sides, (speeds, samples, side, (ankle, toe)), each leg has its own. Phase and Froude speed are read
+    from the observation; stiffness is linear between two of `speeds` [m/s, of `body`].
     """
     require_absolute(settings)
     froude = np.array([body.froude_speed(speed) for speed in speeds])
@@ -117,7 +117,7 @@ def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: B
 
 
 def require_absolute(settings: BipedSettings) -> None:
-    """Raise `SpringfootError` for settings in which an action is no stiffness of its own."""
+    """Raise `SpringfootError` for settings in which an action does not set a stiffness by itself."""
     if settings.action_mode != "absolute":
         raise SpringfootError("a stiffness schedule or constant needs action_mode 'absolute', got 'residual'")
 
@@ -129,9 +129,9 @@ FROZEN = "frozen"
 """`frozen:POLICY` is the mean stiffness of a trained policy over the stride, played open loop
 (`springfoot.evaluation.recording.open_loop`)."""
 SCHEDULE_SUFFIXES = (".csv", ".json")
-"""How the names of schedule files end."""
+"""Endings of the names of schedule files."""
 SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
-"""Swing springs of the thesis's lines: completed, and as printed."""
+"""Springs of the thesis's lines in swing: completed, and as printed."""
 
 
 def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
@@ -155,26 +155,28 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
 
 
 def has_feedback(name: str) -> bool:
-    """Return whether the policy of that name may decide by more than the phase: no baseline does, nor an open-loop
-    copy, nor a schedule in a file."""
+    """Tell whether the named policy may decide by more than the phase.
+
+    Baselines, open-loop copies and schedules in files have no feedback.
+    """
     return name.partition(":")[0] not in (*BASELINES, FROZEN) and not is_schedule_file(name)
 
 
 def is_schedule_file(name: str) -> bool:
-    """Return whether a policy of that name is a schedule in a file (`springfoot.agents.policies.schedules`)."""
+    """Tell whether the name is that of a schedule file (`springfoot.agents.policies.schedules`)."""
     return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
 
 
 def and_copy(name: str) -> tuple[str, ...]:
-    """Return the policies of a table that judges one: the policy and, unless it has no feedback, its open-loop copy."""
+    """Return the policies of a table: the policy and, unless it has no feedback, its open-loop copy."""
     return (name, f"{FROZEN}:{name}") if has_feedback(name) else (name,)
 
 
 def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
     """Return the environment settings that a baseline needs, for the body and speed of `settings`.
 
-    What is stiffness in N m/rad acts absolutely; `untrained` and `random` act as `settings` say. The thesis's lines
-    bring the springs between gait events, their rest angles included.
+    Baselines with a stiffness in N m/rad act absolutely; `untrained` and `random` act as `settings` say. The thesis's
+    lines bring springs between gait events, with their rest angles.
     """
     if name in ("untrained", "random"):
         return {}

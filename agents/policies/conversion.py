@@ -1,7 +1,7 @@
-"""Policies from networks that were trained elsewhere: any MLP's weights, and stable-baselines3's models.
+"""Convert networks trained elsewhere into policies: any MLP's weights, and stable-baselines3's models.
 
-They become `Policy`, which `save_policy` writes as a .safetensors file. Models are given as objects: their own files
-are pickles, which run code when read, and are never opened here. Nothing in this module imports torch.
+The result is a `Policy`, which `save_policy` writes as a .safetensors file. Models are given as objects: their files
+are pickles, which run code when read, and are never opened here. This module does not import torch.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,13 +20,13 @@ from .fingerprint import fingerprint
 from .policy import ACTIVATIONS, VARIANCE_FLOOR, Output, Policy
 
 TORCH_NAMES = {"tanh": "Tanh", "relu": "ReLU", "leaky_relu": "LeakyReLU", "elu": "ELU", "silu": "SiLU"}
-"""Class of `torch.nn` that each of `ACTIVATIONS` is, with its default arguments."""
+"""Name in `ACTIVATIONS` -> class of `torch.nn` with the same function, at its default arguments."""
 
 NEVER_VARIED = 1e-6
-"""Variance below which an observation told the policy nothing in training [unit squared]; one that varies has more than
-1e-5."""
+"""Variance below which an entry of the observation counts as constant in training [unit squared]; entries that vary
+have more than 1e-5."""
 IGNORED = 1e12
-"""Variance that such an observation gets in the policy, so that no value of it reaches the network."""
+"""Variance that a constant entry gets in the policy, so that it does not reach the network."""
 
 Layers = Sequence[tuple[Any, Any]]
 """Weight (outputs, inputs) and bias (outputs,) or None of each layer, from the observation to the action: arrays, or
@@ -47,12 +47,12 @@ def policy_from_mlp(
     """Return a policy from the weights of a multilayer perceptron that gives the mean action.
 
     Args:
-        layers: weight (outputs, inputs) and bias (outputs,) of each layer, torch's way round; a bias may be None.
-        settings: what the environment was made with, as its `settings` or as its keyword arguments.
-        activation: what stands between the layers: tanh, relu, leaky_relu (slope 0.01), elu (alpha 1) or silu.
-        output: what makes an action in [-1, 1] of the last layer's output: clip (as PPO) or tanh (as SAC).
-        observation_mean: (D,) what was subtracted from observations in training; None if they were not normalised.
-        observation_variance: (D,) whose root observations were divided by.
+        layers: weight (outputs, inputs) and bias (outputs,) of each layer, in torch's orientation; a bias may be None.
+        settings: of the training's environment, as its `settings` or as keyword arguments.
+        activation: between the layers: tanh, relu, leaky_relu (slope 0.01), elu (alpha 1) or silu.
+        output: bounds the last layer's output to [-1, 1]: clip (as PPO) or tanh (as SAC).
+        observation_mean: (D,) mean subtracted from observations in training; None if they were not normalised.
+        observation_variance: (D,) variance whose root divided observations in training.
         observation_clip: largest magnitude of a normalised observation; None for no limit.
         variance_floor: added to the variance before the root.
 
@@ -107,16 +107,16 @@ def policy_from_sb3(
     """Return the mean action of a stable-baselines3 model with an MLP policy: of PPO, A2C, TRPO, SAC, TQC, TD3 or DDPG.
 
     Args:
-        model: the model; its environment, where it has one, knows `settings` and `normalizer`.
-        settings: what the environment was made with, if the model has no environment of springfoot's.
+        model: the model; its environment, if it has one, knows `settings` and `normalizer`.
+        settings: of the training's environment, if the model has no environment of springfoot's.
         normalizer: the `VecNormalize` of the training, if the model's environment is not inside it.
-        ignore_unvaried: whether entries that never varied in training (body, commanded speed) get no part in the
-            action, as in train.py; their weights are still random, and other bodies and speeds would meet them.
+        ignore_unvaried: leave entries of the observation that never varied in training (body, commanded speed) out of
+            the action, as train.py does; their weights are still random, and other bodies and speeds would meet them.
 
     For every observation it acts as `model.predict(normalizer.normalize_obs(observation), deterministic=True)` does, to
     the precision of float32; with `ignore_unvaried`, for those that training could meet. Raises `SpringfootError`, one
-    line, for a network that is no MLP of one activation, behind a Gymnasium wrapper of observations, and where settings
-    are missing.
+    line, for a network that is no MLP of one activation, behind a Gymnasium wrapper of observations, and for missing
+    settings.
     """
     if settings is None:
         try:
@@ -147,7 +147,10 @@ def ignoring_unvaried(policy: Policy) -> Policy:
 
 
 def actor_of(network: Any) -> tuple[Layers, str, Output]:
-    """Layers, activation and output of the actor in a stable-baselines3 policy; `SpringfootError` for no plain MLP."""
+    """Return layers, activation and output of the actor in a stable-baselines3 policy.
+
+    Raises `SpringfootError` for other networks than a plain MLP.
+    """
     if hasattr(network, "lstm_actor"):
         raise SpringfootError("a recurrent policy has a memory; a policy of springfoot sees one observation only")
     actor = getattr(network, "actor", network)
@@ -178,10 +181,8 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
 
 
 def statistics_of(normalizer: Any) -> dict[str, Any]:
-    """Return how a `VecNormalize` normalises observations, as keyword arguments of `policy_from_mlp`.
-
-    {} if it does not.
-    """
+    """Return the normalisation of a `VecNormalize` as keyword arguments of `policy_from_mlp`; {} if it does not
+    normalise."""
     if normalizer is None or not normalizer.norm_obs:
         return {}
     return {
@@ -193,7 +194,7 @@ def statistics_of(normalizer: Any) -> dict[str, Any]:
 
 
 def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDArray, ...], tuple[NDArray, ...]]:
-    """Weights and biases as arrays; raises `SpringfootError` where they do not lead from observation to action."""
+    """Return weights and biases as arrays; raise `SpringfootError` if they do not lead from observation to action."""
     weights = []
     biases = []
     inputs = width

@@ -1,7 +1,7 @@
-"""Export of policies: one ONNX file that runs without springfoot, and its contract in JSON.
+"""Export policies: one ONNX file that runs without springfoot, and its contract in JSON.
 
-The contract names what goes in and what comes out, with units, order and bounds; its numbers, `scale_of`, stand in the
-graph as well. Nothing in either tells where or when it was made.
+The contract describes inputs and outputs, with names, units, order and bounds; its scale, `scale_of`, is part of the
+graph too. Neither file tells where or when it was made.
 """
 
 import json
@@ -74,22 +74,22 @@ PACKAGES = ("springfoot", "mujoco", "numpy")
 
 
 class Scale(NamedTuple):
-    """What an exported policy returns besides its actions: middle x factor^action, of the actions that count.
+    """Scale of the second output of an exported policy: middle x factor^action, of the deciding actions.
 
-    In absolute mode that is `stiffness` [N m/rad] of the body of 1.70 m and 63 kg; in residual mode, where an action
-    says how many times the schedule, `stiffness_factor` [-].
+    In absolute mode the output is `stiffness` [N m/rad] of the body of 1.70 m and 63 kg; in residual mode, where an
+    action is a factor on the schedule, `stiffness_factor` [-].
     """
 
     name: str
-    """Name of that output."""
+    """Name of the output."""
     unit: str
     """Its unit."""
     joints: list[int]
-    """Indices of the actions that count: not those of a joint that `stiffness_joints` leaves out, nor of a device."""
+    """Indices of the deciding actions: without a joint that `stiffness_joints` leaves out, and without devices."""
     middle: NDArray
-    """(joints,) its value at action 0."""
+    """(joints,) output at action 0."""
     factor: NDArray
-    """(joints,) how many times that it is at action 1."""
+    """(joints,) output at action 1 over that at action 0."""
 
 
 def scale_of(settings: BipedSettings) -> Scale:
@@ -102,7 +102,7 @@ def scale_of(settings: BipedSettings) -> Scale:
 
 
 def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
-    """Return float32 numbers whose sum is `value` to twice their precision.
+    """Return two float32 numbers whose sum is `value` to twice their precision.
 
     float32 alone is too coarse: an observation's mean can be 1,000 times its standard deviation.
     """
@@ -111,7 +111,7 @@ def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def contract_of(policy: Policy) -> dict[str, Any]:
-    """Return the contract of a policy, as plain JSON values; docs/how-to/policies.md explains each of them."""
+    """Return the contract of a policy, as plain JSON values; docs/how-to/policies.md explains its entries."""
     settings = policy.settings
     scale = scale_of(policy.settings)
     header = policy.header
@@ -158,9 +158,7 @@ def contract_of(policy: Policy) -> dict[str, Any]:
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
     """Return the schedule that a residual action multiplies, at each percent of the leg's stride, by speed.
 
-    It is of the body of the contract.
-
-    `right` is the right leg's, where a person has adapted to a foot; the rest is then the left leg's.
+    It is of the body of the contract. For a person who has adapted to a foot, `right` is the right leg's schedule.
     """
     left, right = walks_of_legs(settings)
     found = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
@@ -175,15 +173,15 @@ def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str
 
 
 OPSET, IR_VERSION = 17, 8
-"""What the file asks of its reader, no newer than needed: onnxruntime has it since 1.12 (2022)."""
+"""ONNX versions of the file, no newer than needed: onnxruntime reads them since 1.12 (2022)."""
 OPERATORS = {"tanh": "Tanh", "relu": "Relu", "leaky_relu": "LeakyRelu", "elu": "Elu"}
-"""Operator of each activation that has one of its own, by default with the slopes of ours."""
+"""Activation -> ONNX operator with the same function; silu has none."""
 
 
 def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
-    """Return the file: input `observation` (N, D), outputs `action` (N, 4) and that of `scale`.
+    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, 4) and that of `scale`.
 
-    `contract` stands in its metadata.
+    The metadata holds `contract`.
     """
     import onnx  # an extra of its own
     from onnx import helper, numpy_helper

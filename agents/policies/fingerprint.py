@@ -1,4 +1,4 @@
-"""What a policy relies on, as digests: a policy of another environment is refused, not walked."""
+"""Digest the environment that a policy relies on, so that a policy of another environment is refused."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -23,11 +23,11 @@ _MODEL_NUMBERS = (
 
 
 def fingerprint(biped: Biped) -> dict[str, str]:
-    """SHA-256 of what a policy relies on: its `observation`, its `action`, the compiled `model`, and the `legs`.
+    """Return SHA-256 digests of the `observation`, the `action`, the compiled `model`, and the `legs`.
 
-    The legs are the constants of hips, knees and foot springs and the curves they follow, at every tabulated speed; the
-    planned place of the CoM counts where a gain reads it.
-    Numbers count to six significant digits, so that compilers and processors agree.
+    The legs are the constants of hips, knees and foot springs, and the target curves, at every tabulated speed; the
+    planned position of the CoM counts if a gain reads it. Numbers count to six significant digits, so that compilers
+    and processors agree.
     """
     model = biped.model
     probe = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
@@ -47,12 +47,12 @@ def fingerprint(biped: Biped) -> dict[str, str]:
 
 
 def _used(legs: LegConstants) -> dict[str, Any]:
-    """Return the constants; a `swing_place_gain` of 0 is none, so that policies from before there was one walk on."""
+    """Return the constants without a `swing_place_gain` of 0, so that policies older than that constant still load."""
     return {name: value for name, value in asdict(legs).items() if value or name != "swing_place_gain"}
 
 
 def require_same(name: object, stored: Mapping[str, str], current: Mapping[str, str]) -> None:
-    """Raise `SpringfootError` where the policy `name` has another fingerprint than this version's environment."""
+    """Raise `SpringfootError` if the policy `name` has another fingerprint than this version's environment."""
     if different := [part for part in current if current[part] != stored.get(part)]:
         raise SpringfootError(
             f"{name} was trained on another version of this environment: other {' and '.join(different)}; "

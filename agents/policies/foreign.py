@@ -1,6 +1,6 @@
-"""Policies from elsewhere: an ONNX file, or a function of a module that the user names. Both take raw observations.
+"""Load policies from elsewhere, which take raw observations: an ONNX file, or a function that the user names.
 
-An ONNX file is data, as a .safetensors file is: reading it executes nothing but what onnxruntime computes.
+An ONNX file is data, as a .safetensors file is: onnxruntime computes its graph and executes nothing else.
 `module:function` is the user's own code, and runs because the user typed its name; no file or folder can ask for it.
 """
 
@@ -27,16 +27,19 @@ from .fingerprint import fingerprint, require_same
 from .onnx_process import INPUT_TYPES, one_line, onnx_session
 
 CONTRACT_KEY = "springfoot"
-"""Key of an ONNX file's metadata under which an exported policy carries its contract."""
+"""Key of an ONNX file's metadata with the contract of an exported policy."""
 
 
 def contract_path(path: Path) -> Path:
-    """Return the contract that stands beside a file: walk.onnx.json beside walk.onnx."""
+    """Return the path of a file's contract: walk.onnx.json beside walk.onnx."""
     return path.with_name(f"{path.name}.json")
 
 
 def observation_rows(observation: Any, width: int) -> NDArray:
-    """Observations (N, D) or (D,) as float64; `SpringfootError` for another width and for what is not finite."""
+    """Return observations (N, D) or (D,) as float64 (N, D).
+
+    Raises `SpringfootError` for another width and for numbers that are not finite.
+    """
     rows = np.asarray(observation, dtype=np.float64)
     if rows.ndim not in (1, 2) or rows.shape[-1] != width:
         raise SpringfootError(f"observations must be (N, {width}), got {rows.shape}")
@@ -47,20 +50,20 @@ def observation_rows(observation: Any, width: int) -> NDArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ForeignPolicy:
-    """A policy that is not ours, with the same face as `Policy`: observations (N, D) or (D,) to actions in [-1, 1].
+    """A policy from elsewhere, called like `Policy`: observations (N, D) or (D,) to actions in [-1, 1].
 
-    Raises `SpringfootError` for bad observations, and where it returns other than finite actions (N, 4). Its last bits
-    may differ with N.
+    Raises `SpringfootError` for bad observations, and if it returns other values than finite actions (N, 4). Its last
+    bits may differ with N.
     """
 
     name: str
-    """What errors call it."""
+    """Name in errors."""
     settings: BipedSettings
-    """The task it was made for: of its contract, of the function's own `settings`, or the defaults."""
+    """Settings of its task: of its contract, of the function's attribute `settings`, or the defaults."""
     width: int
     """Entries D of an observation."""
     act: Callable[[NDArray], Any]
-    """From float32 observations (N, D) to actions (N, 4); what leaves [-1, 1] is clipped."""
+    """Function of float32 observations (N, D) that returns actions (N, 4), which are clipped to [-1, 1]."""
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Actions (N, 4) in [-1, 1] for observations (N, D)."""
@@ -83,9 +86,9 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     output.
 
     The input is (N, D), (1, D) or (D,), of float32 or float64. Its settings are those of the contract beside it, else
-    of the contract inside it (exported policies carry theirs), else the defaults. Raises `SpringfootError`, one line,
-    without onnxruntime, for a file it does not run within the bounds of `onnx_process`, for other widths, and for a
-    contract that is wrong or of another version of the environment.
+    of the contract inside it (exported policies carry one), else the defaults. Raises `SpringfootError`, one line,
+    without onnxruntime, for a file that it does not run within the bounds of `onnx_process`, for other widths, and for
+    a contract that is wrong or of another version of the environment.
     """
     try:
         import onnxruntime  # noqa: F401  # not above: an extra
@@ -116,16 +119,16 @@ def onnx_policy(path: Path) -> ForeignPolicy:
 
 
 def is_function(name: str) -> bool:
-    """Return whether a policy's name is of the form `module:function`, and no file's."""
+    """Tell whether a policy's name has the form `module:function` and is not a file's."""
     return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name) is not None and not Path(name).exists()
 
 
 def function_policy(name: str) -> ForeignPolicy:
-    """Return the function that `module:function` names, of observations (N, D), (1, D) or (D,); imports the module.
+    """Import a module and return the policy `module:function` of observations (N, D), (1, D) or (D,).
 
     The module is one that Python finds, else one in the current folder. An attribute `settings` of the function, a
-    mapping or `BipedSettings`, says what it was made for. Raises `SpringfootError`, one line, where module or function
-    are missing, and where it returns other than four finite actions for the first observations of two episodes.
+    mapping or `BipedSettings`, describes its task. Raises `SpringfootError`, one line, if module or function are
+    missing, and if it returns other values than four finite actions for the first observations of two episodes.
     """
     module_name, _, function_name = name.partition(":")
     if os.getcwd() not in sys.path:
@@ -148,10 +151,7 @@ def function_policy(name: str) -> ForeignPolicy:
 
 
 def _asked_by(path: Path, inside: str | None) -> Biped:
-    """Return the environment that the contract beside the file asks for, else the one inside it.
-
-    The default one without.
-    """
+    """Return the environment of the contract beside the file, else of the contract inside it, else the default one."""
     beside = contract_path(path)
     if inside is None and not beside.is_file():
         return Biped(BipedSettings(), 1)
@@ -169,7 +169,7 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
 
 
 def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
-    """Return the policy that `act` is; which of (N, D), (1, D) and (D,) it takes is tried on two first observations."""
+    """Return the policy of `act`; two first observations show whether it takes (N, D), (1, D) or (D,)."""
 
     def first(seed: int) -> NDArray:
         biped.reset(np.array([0]), [seed])

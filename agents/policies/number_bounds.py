@@ -1,4 +1,4 @@
-"""How large the numbers of a network, of Adam's moments and of running statistics may be in a file that is read."""
+"""Bound the numbers in files: weights of a network, Adam's moments, running statistics."""
 
 from collections.abc import Mapping
 
@@ -11,12 +11,12 @@ LARGEST_WEIGHT = 1e6
 LARGEST_MOMENT = 1e12
 """Largest magnitude of Adam's moments [-]; chosen. Gradients are clipped to 0.5 before."""
 LARGEST_STATISTIC = 1e30
-"""Largest magnitude of a mean, variance or count; chosen: its root and its square are numbers, too."""
+"""Largest magnitude of a mean, variance or count; chosen, so that its root and its square are finite."""
 _MOMENTS = frozenset({"step", "exp_avg", "exp_avg_sq"})
 
 
 def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
-    """Raise `SpringfootError` for a tensor that no training makes, by its name; others are not looked at."""
+    """Raise `SpringfootError` for a tensor, known by its name, with numbers that no training makes."""
     for name, values in tensors.items():
         bounds = _bounds(name)
         if bounds is not None and values.size:
@@ -41,7 +41,7 @@ def _bounds(name: str) -> tuple[float, float] | None:
 
 
 def require_moments(path: object, names: Mapping[str, object], parameters: int) -> None:
-    """Raise `SpringfootError` unless Adam's moments are there for each of so many parameters, or for none at all."""
+    """Raise `SpringfootError` unless Adam's moments exist for all `parameters`, or for none."""
     found = {name for name in names if name.startswith("adam.")}
     wanted = {f"adam.{index}.{item}" for index in range(parameters) for item in _MOMENTS}
     if found and (missing := sorted(wanted - found)):

@@ -1,4 +1,4 @@
-"""ONNX files: onnxruntime runs them here once it did so in a process of its own, within bounds on memory and time."""
+"""Open ONNX files: onnxruntime runs a file here only after it ran it in a process with bounds on memory and time."""
 
 import json
 import os
@@ -12,17 +12,17 @@ from springfoot.errors import SpringfootError
 from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, in_process
 
 MOST_ONNX_BYTES = 2**26
-"""Largest ONNX file that is read; chosen, ten times the largest network that is trained here."""
+"""Largest ONNX file to read; chosen, ten times the largest network that is trained here."""
 INPUT_TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
-"""What an input may be of."""
+"""Allowed types of the input."""
 
 _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
 
 def onnx_session(path: Path, width: int) -> tuple[Any, str]:
-    """Return the session that runs a file, and why it runs for no observations of `width` entries, nothing if it does.
+    """Return onnxruntime's session of a file, and the reason why it takes no observations of `width` entries, else "".
 
-    Raises `SpringfootError` for a file that onnxruntime does not take, or not within the bounds.
+    Raises `SpringfootError` for a file that onnxruntime does not open, or not within the bounds.
     """
     if (size := path.stat().st_size) > MOST_ONNX_BYTES:
         raise SpringfootError(f"{path} must have at most {MOST_ONNX_BYTES:,} bytes, has {size:,}")
@@ -47,7 +47,7 @@ def _session(path: Path) -> Any:
 
 
 def main() -> None:
-    """Run the child: open the file that the command line names, run it once, say on standard output if it failed."""
+    """Run the child: open the file that the command line names, run it once, print the reason if it failed."""
     import onnxruntime  # noqa: F401  # before the bounds
 
     out = os.dup(1)
@@ -64,7 +64,7 @@ def main() -> None:
 
 
 def _fails(session: Any, width: int) -> str:
-    """Why it takes neither two observations nor one, nothing if it does."""
+    """Return the reason why a session takes neither two observations nor one; "" if it does."""
     inputs = session.get_inputs()
     failed = ""
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:

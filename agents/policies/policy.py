@@ -1,8 +1,7 @@
-"""A policy as one .safetensors file: weights, observation statistics, settings, a fingerprint; no code.
+"""Define a policy as one .safetensors file: weights, observation statistics, settings, a fingerprint; no code.
 
-The file's header has one entry, `springfoot`, whose JSON says what the tensors mean and holds a digest
-(`tensor_file`); nothing in it tells where or when it was made. `Policy` needs NumPy only, so a policy runs where no
-learner is installed.
+The file's header has one entry, `springfoot`, JSON that describes the tensors and holds a digest (`tensor_file`); the
+file does not tell where or when it was made. `Policy` needs NumPy only, so a policy runs without a learner.
 """
 
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from .number_bounds import LARGEST_WEIGHT, require_bounded
 FORMAT_VERSION = 1
 """Version of the file layout; a reader refuses any other."""
 ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
-"""What the header of a policy says."""
+"""Entries of a policy's header."""
 
 
 VARIANCE_FLOOR = 1e-8
@@ -39,9 +38,9 @@ ACTIVATIONS = {
     "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
     "silu": lambda x: 0.5 * x * (1.0 + np.tanh(0.5 * x)),
 }
-"""What stands between the layers of a network, by name."""
+"""Name -> activation function between the layers of a network."""
 Output = Literal["clip", "tanh"]
-"""What makes an action in [-1, 1] of the last layer's output, as PPO does (clip) or SAC (tanh)."""
+"""Function that bounds the last layer's output to [-1, 1], as PPO (clip) or SAC (tanh) does."""
 
 
 BEST, LAST = "best.safetensors", "last.safetensors"
@@ -50,7 +49,7 @@ SHIPPED = {"pretrained": "walk.safetensors", "predicted": "predicted.safetensors
 """Name of a policy of this package -> its file in `pretrained/`: of `PRETRAINED_BY`, and of preset
 `predict`."""
 PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
-"""The command that made `pretrained` from nothing."""
+"""Command that made `pretrained` from nothing."""
 RUN = "run.json"
 """Name of a run folder's record: configuration, evaluations, status."""
 
@@ -65,34 +64,34 @@ class Policy:
     """
 
     settings: BipedSettings
-    """The task the policy was trained on."""
+    """Settings of the training's environment."""
     fingerprint: dict[str, str]
-    """What it was trained on, as `fingerprint` gives it."""
+    """Fingerprint of that environment, from `fingerprint`."""
     weights: tuple[np.ndarray, ...]
-    """Of each layer, shape (outputs, inputs)."""
+    """Weights of each layer, (outputs, inputs)."""
     biases: tuple[np.ndarray, ...]
-    """Of each layer, shape (outputs,)."""
+    """Biases of each layer, (outputs,)."""
     observation_mean: np.ndarray
-    """Of the observations in training, shape (D,)."""
+    """(D,) mean of the observations in training."""
     observation_variance: np.ndarray
-    """Of the observations in training, shape (D,)."""
+    """(D,) variance of the observations in training."""
     observation_clip: float | None = 10.0
     """Largest magnitude of a normalised observation; None for no limit."""
     variance_floor: float = VARIANCE_FLOOR
     """Added to each variance before the root."""
     activation: str = "tanh"
-    """Name of what stands between the layers, one of `ACTIVATIONS`."""
+    """Activation between the layers, one of `ACTIVATIONS`."""
     output: Output = "clip"
-    """What makes actions of the last layer's output."""
+    """Function that bounds the last layer's output."""
 
     @property
     def layer_sizes(self) -> list[int]:
-        """Observation, hidden layers, actions."""
+        """Return the widths of observation, hidden layers and actions."""
         return [self.weights[0].shape[1], *(len(bias) for bias in self.biases)]
 
     @property
     def header(self) -> dict[str, Any]:
-        """What the file's header says, as plain JSON values."""
+        """Return the file's header, as plain JSON values."""
         return {
             "format_version": FORMAT_VERSION,
             "network": {
@@ -108,11 +107,11 @@ class Policy:
 
     @property
     def observation_deviation(self) -> np.ndarray:
-        """(D,) what the distance of an observation from its mean is divided by."""
+        """Return (D,) the divisor of an observation's distance from its mean."""
         return np.sqrt(self.observation_variance + self.variance_floor)
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Mean actions (N, 4) in [-1, 1] for observations (N, D)."""
+        """Return mean actions (N, 4) in [-1, 1] for observations (N, D)."""
         rows = observation_rows(observation, len(self.observation_mean))
         rows = (rows - self.observation_mean) / self.observation_deviation
         if self.observation_clip is not None:
@@ -138,9 +137,9 @@ def save_policy(path: str | Path, policy: Policy) -> None:
 
 
 def find_policy(name: str | Path) -> Path:
-    """Return the file that a path, a run folder (its best) or one of `SHIPPED` means.
+    """Return the file of a policy from its path, its run folder (the best policy) or one of `SHIPPED`.
 
-    `SpringfootError` if there is none.
+    Raises `SpringfootError` if there is none.
     """
     path = Path(name)
     if str(name) in SHIPPED:
@@ -162,11 +161,10 @@ _NUMBERS = ("observation_clip", "variance_floor")
 
 
 def load_policy(name: str | Path) -> Policy | ForeignPolicy:
-    """Return the policy in a file, a run folder (its best), one of `SHIPPED`, or the function that `module:function`
-    names.
+    """Return the policy in a file, a run folder (its best), one of `SHIPPED`, or the function `module:function`.
 
     A .safetensors file is read by `read_policy`, an .onnx file by `onnx_policy`; neither executes anything. Only a
-    `name` that is a text of the form `module:function` runs code: `function_policy` imports that module.
+    `name` of the form `module:function` runs code: `function_policy` imports that module.
     """
     if isinstance(name, str) and is_function(name):
         return function_policy(name)
@@ -175,12 +173,10 @@ def load_policy(name: str | Path) -> Policy | ForeignPolicy:
 
 
 def read_policy(name: str | Path) -> Policy:
-    """Return the policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, checked against this
-    springfoot.
+    """Return the policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, after all checks.
 
-    Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of
-    another format version, incomplete or not finite, or made for other spaces, another model or other legs than
-    this version has.
+    Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of another
+    format version, incomplete or not finite, or made for other spaces, another model or other legs than this version's.
     """
     path = find_policy(name)
     header, tensors = read_tensors(path, "springfoot", "policy", ENTRIES)
@@ -227,7 +223,7 @@ def read_policy(name: str | Path) -> Policy:
 
 
 def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list[int]) -> None:
-    """Raise `SpringfootError` for tensors that are not those of the layer sizes."""
+    """Raise `SpringfootError` for tensors that do not fit the layer sizes."""
     expected = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
         expected |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}

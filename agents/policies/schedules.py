@@ -1,7 +1,7 @@
-"""Schedules in files as policies: K over the stride (CSV), or the springs of a few finite states (JSON).
+"""Read schedules in files as policies: K over the stride (CSV), or the springs of a few finite states (JSON).
 
-An evaluation writes both of its walk (`springfoot.evaluation.report.schedule_tables`); docs/how-to/policies.md says
-what may stand in them. K scales with the body; a file that names none is of 1.70 m and 63 kg.
+An evaluation writes both of its walk (`springfoot.evaluation.report.schedule_tables`); docs/how-to/policies.md
+describes their columns and entries. K scales with the body; a file without a body is of 1.70 m and 63 kg.
 """
 
 from collections.abc import Callable
@@ -26,19 +26,19 @@ from springfoot.gait.springs.stiffness import SPRINGS, STIFFNESS_RANGE, Segment,
 from .baselines import PolicyFunction, follow, schedule
 
 SPRING_KEYS = ("stiffness_Nm_per_rad", "damping_time_s", "equilibrium_deg")
-"""What a state says of each spring."""
+"""Entries of each spring in a state."""
 STATES_FILE = "table of finite states"
 SAME_BETA = 1e-4
-"""Difference of damping times that is rounding [s]."""
+"""Difference of damping times that counts as rounding [s]."""
 
 
 def schedule_file(
     name: str, conditions: BipedSettings
 ) -> tuple[dict[str, Any], Callable[[BipedSettings], PolicyFunction]]:
-    """Return the settings that a schedule file asks for.
+    """Return the settings that a schedule file needs, and a function that makes its policy.
 
-    Returns: the settings it needs, for the body of `conditions` (absolute actions, and the equilibrium that goes with
-    it), and what makes its policy in an environment of that body. Raises `SpringfootError` for another file.
+    The settings are for the body of `conditions`: absolute actions, and the file's equilibrium. The function takes the
+    settings of an environment of that body. Raises `SpringfootError` for another file.
     """
     path = Path(name)
     if path.suffix.lower() == ".json":
@@ -65,7 +65,8 @@ def _cell(table: Table, column: str) -> float | None:
 
 
 def _columns(table: Table, what: str) -> list[list[str]]:
-    """[side][joint] names of the columns with `what` of each spring: one a side, or one for both."""
+    """Return [side][joint] the names of the columns with quantity `what` of each spring: one a side, or one for
+    both."""
     names = [
         [
             next((c for c in (f"{joint}_{side}_{what}", f"{joint}_{what}") if c in table.columns), "")
@@ -82,7 +83,7 @@ def _columns(table: Table, what: str) -> list[list[str]]:
 
 
 def _curves(table: Table, what: str) -> NDArray:
-    """Return (SAMPLES, side, joint) of the columns with `what`, on `GRID`; linear and periodic between the rows."""
+    """Return (SAMPLES, side, joint) quantity `what` on `GRID`; linear and periodic between the rows."""
     if not table.has("percent"):
         raise SpringfootError(f"{table.name}, line 1: needs a column percent, of the leg's stride")
     percent = table.ascending("percent")
@@ -111,8 +112,10 @@ def _stiffness(table: Table) -> NDArray:
 
 
 def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
-    """Return the setting that the file's column `equilibrium` names, `planned` without one; with `phase` also the
-    schedule of its rest angles, constant over each percent and the same for both legs."""
+    """Return the setting in the file's column `equilibrium`, `planned` without that column.
+
+    With `phase` also the schedule of the rest angles, constant over each percent and the same for both legs.
+    """
     kinds = get_args(Equilibrium)
     kind = "planned"
     if table.has("equilibrium"):

@@ -1,4 +1,4 @@
-"""Others who look on at a training, and may end it: stable-baselines3's callbacks, and functions of evaluations."""
+"""Let callbacks watch a training, and end it: stable-baselines3's callbacks, and functions of evaluations."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -6,12 +6,12 @@ from typing import Any
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
 Onlooker = BaseCallback | Callable[[dict[str, Any]], object]
-"""A callback of stable-baselines3, or a function of each periodic evaluation as it stands in run.json; either ends the
-training in good order by returning False."""
+"""A callback of stable-baselines3, or a function of each periodic evaluation as in run.json. Either ends the training
+in good order by returning False."""
 
 
 class Onlookers(CallbackList):
-    """The training's own callback and others after it; `stop` is called when one of those returns False."""
+    """The training's own callback, then the onlookers; `stop` is called when an onlooker returns False."""
 
     def __init__(self, own: BaseCallback, others: Sequence[Onlooker], stop: Callable[[], object]) -> None:
         super().__init__([own, *(each for each in others if isinstance(each, BaseCallback))])
@@ -27,7 +27,7 @@ class Onlookers(CallbackList):
 
 
 def tell(onlookers: Sequence[Onlooker], evaluation: dict[str, Any]) -> bool:
-    """Tell the functions among the onlookers of an evaluation; False if one of them wants the training to end."""
+    """Call the functions among the onlookers with an evaluation; return False if one of them ends the training."""
     functions = [each for each in onlookers if not isinstance(each, BaseCallback)]
     answers = [each(dict(evaluation)) for each in functions]
     return all(answer is not False for answer in answers)

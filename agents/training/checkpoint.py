@@ -1,4 +1,4 @@
-"""Checkpoints of a run: the newest few, each a file that is whole; one that is damaged is passed over."""
+"""Keep the newest few checkpoints of a run, each a whole file; a damaged one is passed over."""
 
 import json
 import re
@@ -18,16 +18,16 @@ from .learning_state import Learning
 from .run_record import require_past
 
 Checkpoint = tuple[dict[str, Any], dict[str, np.ndarray]]
-"""Header, as `Header` says, and arrays by name."""
+"""Header, as in `Header`, and arrays by name."""
 STATE_KEY = "springfoot-training"
-"""Name of the entry of a checkpoint's header."""
+"""Entry of a checkpoint file's header."""
 KEPT_CHECKPOINTS = 3
 """Checkpoints that a run keeps; chosen."""
 _NAME = re.compile(r"state-(\d{1,15})\.safetensors")
 
 
 class Header(TypedDict):
-    """What the header of a checkpoint holds: see `session`."""
+    """Content of a checkpoint's header; see `session`."""
 
     timesteps: int
     config: dict[str, Any]
@@ -39,7 +39,7 @@ class Header(TypedDict):
 
 
 def checkpoints(out: Path) -> list[Path]:
-    """Return the checkpoints in a folder, the newest, that of the most timesteps, first."""
+    """Return the checkpoints in a folder, the one of the most timesteps first."""
     found = {path: _NAME.fullmatch(path.name) for path in out.iterdir()}
     return sorted((path for path, match in found.items() if match), key=_timesteps, reverse=True)
 
@@ -54,7 +54,7 @@ def write_checkpoint(
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Header and arrays of a checkpoint; raises `SpringfootError` for a file that is none or is damaged."""
+    """Return header and arrays of a checkpoint; raise `SpringfootError` for a damaged file and for any other."""
     names = Header.__annotations__
     header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, sealed=True)
     if missing := [name for name in names if name not in header]:
@@ -68,7 +68,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 
 def _require_header(header: dict[str, Any]) -> None:
-    """Raise `SpringfootError`, KeyError, TypeError or ValueError where a header is not as a training writes it."""
+    """Raise `SpringfootError`, KeyError, TypeError or ValueError for a header that no training writes."""
     json.dumps(header, allow_nan=False)  # raises for what is not finite
     try:
         check_type(header, Header, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
@@ -85,10 +85,10 @@ def _require_header(header: dict[str, Any]) -> None:
 
 
 def newest_checkpoint(out: Path) -> Checkpoint | None:
-    """Header and arrays of the newest checkpoint that is whole, None where there is none at all.
+    """Return header and arrays of the newest whole checkpoint, None if there are no checkpoints.
 
-    Those passed over get the ending `.damaged`, with a warning on standard error. Raises `SpringfootError`, with
-    nothing changed, where none is whole.
+    Damaged ones are renamed to end in `.damaged`, with a warning on standard error. Raises `SpringfootError`, with
+    nothing changed, if all are damaged.
     """
     passed: list[tuple[Path, SpringfootError]] = []
     for path in checkpoints(out):

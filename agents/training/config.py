@@ -1,4 +1,4 @@
-"""The configuration of a training, and presets of it."""
+"""Define the configuration of a training, and presets."""
 
 import dataclasses
 import os
@@ -12,13 +12,13 @@ from springfoot.envs.settings.settings import BipedSettings, settings_from, sett
 from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, quoted, require_count, require_number
 
 WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
-"""Units of the widest hidden layer, most of those layers, and most weights between them; chosen: a training state is
-then at most of half the size that is read."""
+"""Units of the widest hidden layer, number of hidden layers, and number of weights between them at most; chosen: a
+training state is then at most half as large as the largest file that is read."""
 _LARGEST = 1e3  # rate of learning or clip range; chosen
 _SIDE_BY_SIDE = ("num_envs", "eval_episodes")
 
 TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
-"""The default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range where it is 0."""
+"""Default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range at 0."""
 
 
 @refusing_unknown
@@ -43,7 +43,7 @@ class TrainingConfig:
     learning_rate: float = 3e-4
     """Step size of Adam at the start [-]."""
     learning_rate_end: float = 0.1
-    """Step size at the end as a share of the start, linear in between [0..1]."""
+    """Step size at the end as a fraction of the start, linear in between [0..1]."""
     gamma: float = 0.98
     """Discount of reward per 20 ms (0..1)."""
     gae_lambda: float = 0.95
@@ -59,7 +59,7 @@ class TrainingConfig:
     eval_episodes: int = 16
     """Episodes of each periodic evaluation, on the same fixed seeds every time."""
     environment: BipedSettings = field(default_factory=lambda: TRAINED_ON)
-    """Settings of the walking task that is trained on."""
+    """Settings of the training's environment."""
 
     def __post_init__(self) -> None:
         for name in ("timesteps", "num_envs", "minibatches", "epochs", "eval_interval", "eval_episodes"):
@@ -93,8 +93,8 @@ PREDICTED = replace(
     action_mode="residual",
     reward_weights={"pose": 0.0, "grf": 0.0, "effort": -2.0},
 )
-"""The task of a body that follows its own plan: its action is a factor on the schedule found with its leg constants;
-it is paid for CoM, speed and ZMP of the plan and pays for effort; angles and forces count nothing."""
+"""Task of a body that follows its own plan: the action is a factor on the schedule found with its leg constants. The
+reward pays for CoM, speed and ZMP of the plan and charges effort; angles and forces do not count."""
 
 PRESETS: dict[str, TrainingConfig] = {
     "walk": TrainingConfig(),
@@ -114,7 +114,7 @@ PRESETS: dict[str, TrainingConfig] = {
     ),
     "predict": TrainingConfig(timesteps=500_000, environment=PREDICTED),
 }
-"""Trainings that are known to work, by name."""
+"""Name -> training that is known to work."""
 
 
 def config_to_json(config: TrainingConfig) -> dict[str, Any]:

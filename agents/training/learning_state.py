@@ -1,6 +1,7 @@
-"""The exact state of a learning, between two updates: what goes on from it does so with the same bits.
+"""Save and restore the exact state of a training between two updates, so that it continues with the same bits.
 
-Learner, environments with their simulations, every random generator, and what the logger has yet to write.
+The state has the learner, environments with their simulations, every random generator, and unwritten values of the
+logger.
 """
 
 import random
@@ -22,33 +23,33 @@ _SIMULATION = "simulation."
 
 
 class Episode(TypedDict):
-    """An episode that ended: its return and its length in steps, by the names of stable-baselines3."""
+    """A finished episode: its return and its length in steps, by the names of stable-baselines3."""
 
     r: float
     l: int  # noqa: E741
 
 
 class Learning(TypedDict):
-    """What JSON holds of a learning."""
+    """JSON part of the state."""
 
     generators: list[dict[str, Any]]
-    """Of each environment."""
+    """Generator of each environment."""
     actions: dict[str, Any]
     """Generator of the action space."""
     numpy: list[float]
-    """Position, whether a normal number is kept, and that number."""
+    """NumPy's generator: position, whether it holds a normal number, and that number."""
     python_gauss: float | None
     updates: int
     episodes: list[Episode]
-    """The latest, from which rollout/ep_rew_mean is."""
+    """Latest episodes, whose mean return is rollout/ep_rew_mean."""
     logged: dict[str, list[Any]]
-    """Value and excluded formats of what is yet to be logged."""
+    """Value and excluded formats of each unwritten entry of the logger."""
 
 
 def learning_state(
     learner: Learner, environments: SegmentedFootBipedVecEnv
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Return all that learning changes, copies: JSON values, and arrays by name."""
+    """Return a copy of everything that training changes: JSON values, and arrays by name."""
     ppo = learner.ppo
     normalized = learner.normalized
     assert ppo._last_obs is not None and ppo._last_episode_starts is not None and ppo.ep_info_buffer is not None
@@ -87,9 +88,10 @@ def restore_learning(
     values: Mapping[str, Any],
     arrays: Mapping[str, np.ndarray],
 ) -> None:
-    """Go on from what `learning_state` gave, but for `logged`; to be called last, as nothing may draw from then on.
+    """Continue from the values of `learning_state`, except `logged`, which is checked and left to the caller.
 
-    Raises `SpringfootError` if it does not fit this learner. `logged` is checked, and left to the caller.
+    Call it last, as nothing may draw random numbers afterwards. Raises `SpringfootError` if the state does not fit this
+    learner.
     """
     ppo = learner.ppo
     normalized = learner.normalized

@@ -1,6 +1,7 @@
-"""The same training from several seeds at once: one process a processor, one thread each, and the spread of results.
+"""Run the same training from several seeds at once: one process for each processor, one thread each.
 
-Seed k is trained in the folder `seed-k`, by the same bits as `train.py --seed k` alone; `seeds.json` holds the spread.
+Seed k is trained in the folder `seed-k`, with the bits of `train.py --seed k` alone; `seeds.json` holds the spread of
+the results.
 """
 
 import json
@@ -30,15 +31,15 @@ from .run_record import read_record
 SEEDS = "seeds.json"
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
-"""Results whose mean and standard deviation (n - 1) over the seeds stand in `seeds.json`."""
+"""Results in `seeds.json` with mean and standard deviation (n - 1) over the seeds."""
 
 
 def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str, Any]:
     """Train from the seeds `config.seed`, `config.seed` + 1, …, each into a new folder in `out`; return `seeds.json`.
 
-    As many processes run at a time as there are processors, each on one thread. The first SIGINT or SIGTERM lets the
-    running ones save a usable policy and stop, and no more are started. Raises `SpringfootError`, with nothing
-    written, if `out` exists and is not an empty folder.
+    As many processes run at a time as there are processors, each on one thread. At the first SIGINT or SIGTERM the
+    running ones save a usable policy and stop, and no more are started. Raises `SpringfootError`, with nothing written,
+    if `out` exists and is not an empty folder.
     """
     from springfoot.envs import Biped  # not above: help needs no simulator
 
@@ -59,9 +60,9 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
 def train_all(
     jobs: Sequence[tuple[TrainingConfig, Path, str]],
 ) -> tuple[list[dict[str, Any]], signal.Signals | None]:
-    """Train each configuration into its folder, as `train_seeds` does; its messages begin with its name.
+    """Train each configuration in its folder, as `train_seeds` does; its messages begin with its name.
 
-    A folder that holds a run is gone on with. Returns a row of results for each, and the signal that stopped them.
+    A folder with an unfinished run is continued. Returns a row of results for each, and the signal that stopped them.
     """
     at_once = min(max(len(jobs), 1), processors())
     with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
@@ -71,16 +72,16 @@ def train_all(
 
 
 def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) -> str:
-    """`finished`, `failed` or `interrupted`, for all together."""
+    """Return `finished`, `failed` or `interrupted`, for all together."""
     status = "interrupted" if signalled else "finished"
     return "failed" if any(row["status"] == "failed" for row in rows) else status
 
 
 def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
-    """Train the configurations whose folders hold no finished run, as `train_all` does.
+    """Train the configurations without a finished run in their folders, as `train_all` does.
 
-    A run that was started and not finished is gone on with. Returns `finished`, `failed` or `interrupted`. Raises
-    `SpringfootError`, with nothing changed, for a run of another configuration.
+    Continues unfinished runs. Returns `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing
+    changed, for a run of another configuration.
     """
     for config, folder, _ in jobs:
         if (folder / RUN).is_file():
@@ -92,18 +93,18 @@ def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
 
 
 def is_finished(folder: Path) -> bool:
-    """Return whether the folder holds a training that ran to its end."""
+    """Tell whether the folder holds a training that ran to its end."""
     return (folder / RUN).is_file() and read_record(folder).get("status") == "finished"
 
 
 def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
-    """Mean and standard deviation (n - 1) of each of `SPREAD` over the seeds that finished; None where unknown."""
+    """Return mean and standard deviation (n - 1) of each of `SPREAD` over the finished seeds; None for unknown ones."""
     finished = [row for row in rows if row["status"] == "finished"]
     return {name: mean_sd([row[name] for row in finished]) for name in SPREAD}
 
 
 def training_table(record: dict[str, Any]) -> str:
-    """Markdown: one row a seed, and the mean ± SD over those that finished."""
+    """Return the Markdown table of the seeds, and the mean ± SD over the finished ones."""
     head = ["seed", "status", "steps", "seconds", "best return", "falls", "after steps"]
     lines = []
     for row in record["seeds"]:
@@ -117,7 +118,7 @@ def training_table(record: dict[str, Any]) -> str:
 
 
 class _Trainings:
-    """Training processes, and the signals that end them; a context manager."""
+    """Training processes, and the handling of signals that end them; a context manager."""
 
     def __init__(self) -> None:
         self.stopping: signal.Signals | None = None
@@ -187,10 +188,8 @@ def _block(blocked: bool) -> None:
 
 
 def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
-    """Return the row of results of one seed, from its run.json.
-
-    Its status is `without` where that file is not complete.
-    """
+    """Return the row of results of one seed, from its run.json; its status is `without` if that file is not
+    complete."""
     row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
     record = read_record(folder) if (folder / RUN).is_file() else {}
     best = record.get("best") or {}

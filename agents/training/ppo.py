@@ -1,6 +1,6 @@
-"""The learner: stable-baselines3's PPO on normalised observations, and its whole state as named arrays.
+"""Define the learner: stable-baselines3's PPO on normalised observations, and its whole state as named arrays.
 
-PPO: proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347). The state goes through .safetensors only;
+PPO: proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347). The state is kept as .safetensors only;
 `PPO.save`, `PPO.load` and VecNormalize's own files are pickles, which run code when read, and are never used.
 """
 
@@ -60,7 +60,7 @@ class Learner:
             )
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
-        """Return the actor's mean actions as they are now, with the observation statistics as they are now."""
+        """Return the actor's mean actions with the present weights and observation statistics."""
         layers, _, _ = actor_of(self.ppo.policy)
         # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         seen = self._statistics()["observation"]
@@ -77,7 +77,7 @@ class Learner:
         )
 
     def state(self) -> dict[str, np.ndarray]:
-        """Everything that learning changes: network, Adam's moments, running statistics."""
+        """Return everything that learning changes: network, Adam's moments, running statistics."""
         tensors = {f"network.{name}": value for name, value in self.ppo.policy.state_dict().items()}
         for index, moments in self.ppo.policy.optimizer.state_dict()["state"].items():
             tensors |= {f"adam.{index}.{name}": value for name, value in moments.items()}
@@ -88,7 +88,7 @@ class Learner:
         return arrays
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Continue from what `state` returned; raise `SpringfootError` if it does not fit this learner."""
+        """Continue from a `state`; raise `SpringfootError` if it does not fit this learner."""
         what = "the training state"
         require_bounded(what, arrays)
         require_moments(what, arrays, len(list(self.ppo.policy.parameters())))

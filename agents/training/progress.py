@@ -1,4 +1,4 @@
-"""How far a training is, for a person who waits: a bar with the time left, or plain lines without a terminal."""
+"""Show the progress of a training: a bar with the time left, or plain lines without a terminal."""
 
 import sys
 from time import monotonic
@@ -11,7 +11,7 @@ LINE_SECONDS = 20.0
 
 
 class Progress:
-    """Progress of `total` environment steps, of which `done` were done earlier; a context manager."""
+    """Progress of `total` environment steps, `done` of them in earlier sessions; a context manager."""
 
     def __init__(self, total: int, done: int = 0) -> None:
         self._bar = tqdm(

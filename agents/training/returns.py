@@ -1,4 +1,4 @@
-"""Returns of a policy on fixed seeds, as training evaluates it from time to time."""
+"""Measure the returns of a policy on fixed seeds, for the periodic evaluations of a training."""
 
 from collections.abc import Callable
 

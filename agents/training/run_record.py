@@ -1,4 +1,4 @@
-"""What is known of a run besides its learning: its record `run.json`, and its TensorBoard events."""
+"""Read and write the parts of a run besides its learning: the record `run.json`, and TensorBoard's events."""
 
 import os
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ EVENTS = "events.out.tfevents.*"
 
 
 def read_record(out: Path) -> dict[str, Any]:
-    """Return the record in a run's folder; raise `SpringfootError` where it is none."""
+    """Return the record in a run's folder; raise `SpringfootError` if there is none."""
     record = read_object(out / RUN, "record of a run")
     try:
         if not isinstance(record["config"], dict):
@@ -34,7 +34,7 @@ def read_record(out: Path) -> dict[str, Any]:
 
 
 def require_past(record: Mapping[str, Any]) -> None:
-    """Raise KeyError or ValueError where `sessions` or `evaluations` of a record are none."""
+    """Raise KeyError or ValueError if `sessions` or `evaluations` of a record are malformed."""
     for name in ("sessions", "evaluations"):
         if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
             raise ValueError(f"{name} must be a list of objects")
@@ -49,7 +49,7 @@ def require_past(record: Mapping[str, Any]) -> None:
 
 
 def runs_within(out: Path) -> list[Path]:
-    """Folders of the runs in a folder of several seeds, in the order of the seeds."""
+    """Return the folders of the runs in a folder of several seeds, in the order of the seeds."""
     return sorted((path.parent for path in out.glob(f"seed-*/{RUN}")), key=lambda path: (len(path.name), path.name))
 
 
@@ -59,9 +59,9 @@ def write_record(out: Path, record: Mapping[str, Any]) -> None:
 
 
 def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the best evaluation, the first of several; None before the first.
+    """Return the best evaluation, the first of equal ones; None before the first.
 
-    A session that measured the best anew, as its task was another, compares it with what came after only.
+    A session with another task measured the best policy anew; from then on only later evaluations are compared with it.
     """
     entries: list[dict[str, Any]] = record["evaluations"]
     for session in reversed(record["sessions"]):
@@ -72,17 +72,17 @@ def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def same_source(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Return whether two sessions ran the same code, of the same versions."""
+    """Tell whether two sessions ran the same code, with the same versions."""
     return all(one.get(name) == other.get(name) for name in ("commit", "modified", "versions"))
 
 
 def event_sizes(out: Path) -> dict[str, int]:
-    """Size of each of the events' files [bytes], by name."""
+    """Return name -> size of each event file [bytes]."""
     return {path.name: path.stat().st_size for path in sorted(out.glob(EVENTS))}
 
 
 def cut_events(out: Path, sizes: Mapping[str, int]) -> None:
-    """Have the events' files as they were when they had `sizes`: what came after is lost, and would be told twice."""
+    """Cut the event files to `sizes`: a resumed run writes the later events again."""
     for path in out.glob(EVENTS):
         size = sizes.get(path.name, 0)
         if size == 0:

@@ -1,4 +1,4 @@
-"""The batched environment for stable-baselines3: the same bits as the Gymnasium VectorEnv under it."""
+"""Adapt the batched environment to stable-baselines3, with the bits of the Gymnasium VectorEnv under it."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,10 +17,10 @@ from springfoot.errors import SpringfootError
 class SegmentedFootBipedVecEnv(VecEnv):
     """`SegmentedFootBipedVector` with SAME_STEP autoreset as a stable-baselines3 `VecEnv`.
 
-    Takes the same keyword arguments, `num_envs`, `num_threads` and every field of `BipedSettings`. Info
-    dictionaries are empty except where an episode ended: there `terminal_observation`,
-    `TimeLimit.truncated`, `episode` (`r` return, `l` steps; no VecMonitor is needed) and the values of that
-    last step. What each step reported for the whole batch is in `step_info`, arrays (N,) by name.
+    Takes the same keyword arguments, `num_envs`, `num_threads` and every field of `BipedSettings`. Info dictionaries
+    are empty except where an episode ended: there they have `terminal_observation`, `TimeLimit.truncated`, `episode`
+    (`r` return, `l` steps; no VecMonitor is needed) and the values of that last step. `step_info` has the values of the
+    last step for the whole batch, arrays (N,) by name.
     """
 
     def __init__(self, num_envs: int = 1, *, num_threads: int = 1, **settings: Any) -> None:
@@ -34,7 +34,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         self._lengths = np.zeros(num_envs, int)
 
     def reset(self) -> np.ndarray:
-        """First observations (N, D) of new episodes, with the seeds given to `seed` since the last reset."""
+        """Return the first observations (N, D) of new episodes, from the seeds given to `seed` since the last reset."""
         options = _merged(self._options)
         observation, _ = self.env.reset(seed=self._seeds, options=options or None)
         self._reset_seeds()
@@ -48,7 +48,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Observations (N, D), rewards (N,), dones (N,) and infos; an episode that ended is followed by a new one."""
+        """Return observations (N, D), rewards (N,), dones (N,) and infos; a new episode follows each ended one."""
         observation, reward, terminated, truncated, info = self.env.step(self._actions)
         done = terminated | truncated
         self._returns += reward
@@ -74,7 +74,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return self.env.biped.state() | episodes
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `state` gave; raises `SpringfootError` for that of other settings."""
+        """Continue from a `state`; raise `SpringfootError` for a state of other settings."""
         for name, own in (("episode.return", self._returns), ("episode.length", self._lengths)):
             if np.shape(state.get(name, ())) != own.shape:
                 raise SpringfootError(f"the state does not fit: {name!r} must be {own.shape}")
@@ -118,10 +118,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
 
 def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the options of one reset, from those of each environment.
-
-    Only bodies and speeds may differ between them.
-    """
+    """Return the options of one reset from those of each environment; only bodies and speeds may differ."""
     options, *others = ({name: value for name, value in own.items() if name not in DRAWN} for own in each)
     if any(other != options for other in others):
         raise SpringfootError(f"reset options other than {', '.join(DRAWN)} must be the same for all environments")

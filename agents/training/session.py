@@ -1,4 +1,4 @@
-"""One session of a run: PPO's callback, which logs, evaluates and saves between the updates."""
+"""Run one session of a training: PPO's callback, which logs, evaluates and saves between the updates."""
 
 import json
 import sys
@@ -33,17 +33,17 @@ from .stopping import Stopping
 from .training_log import log_configuration, no_word_of_writers
 
 EVALUATION_SEED = 2**30
-"""Seed of the first episode of every periodic evaluation, the next ones following."""
+"""Seed of the first episode of every periodic evaluation; the following episodes count on."""
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
 """Packages whose versions decide the result of a training."""
 SHARE = 0.02
-"""Most of the time that checkpoints between two evaluations may take; chosen."""
+"""Largest fraction of the time between two evaluations that checkpoints may take; chosen."""
 BEST_FILE = "file.best"
-"""Name of the array of a checkpoint that holds the bytes of the best policy's file."""
+"""Array of a checkpoint with the bytes of the best policy's file."""
 
 
 class Session(BaseCallback):
-    """Trains the run in the folder `out`, from the beginning or from a checkpoint `found` there."""
+    """Train the run in the folder `out`, from the beginning or from the checkpoint `found`."""
 
     def __init__(
         self,
@@ -116,9 +116,9 @@ class Session(BaseCallback):
             self.learner.normalized.close()
 
     def _go_on(self, session: dict[str, Any]) -> dict[str, Any]:
-        """Put a new session into the state of the checkpoint, if there is one; returns what was yet to be logged.
+        """Restore the checkpoint, if there is one, into a new session; return the unwritten values of the logger.
 
-        What learning draws from comes last, so that nothing draws in between.
+        Random generators come last, so that nothing draws in between.
         """
         if self._found is None:
             self._record["sessions"].append(session)
@@ -151,7 +151,7 @@ class Session(BaseCallback):
 
     @property
     def _finished(self) -> bool:
-        """Whether all timesteps are done, and evaluated."""
+        """Return True if all timesteps are done, and evaluated."""
         past = self._record["evaluations"]
         return bool(past) and past[-1]["timesteps"] == self._trained >= self._config.timesteps
 
@@ -194,7 +194,7 @@ class Session(BaseCallback):
             self._evaluate()
 
     def _keep(self) -> None:
-        """Keep the exact state as it is now, between two updates, for the next checkpoint."""
+        """Keep the exact present state, between two updates, for the next checkpoint."""
         self._trained = self.learner.ppo.num_timesteps
         for form in self.logger.output_formats:
             if isinstance(form, TensorBoardOutputFormat):
@@ -248,7 +248,7 @@ class Session(BaseCallback):
         return self._seconds_before + monotonic() - self._began
 
     def _save(self, status: str) -> None:
-        """Write the checkpoint that is kept, the newest policy and the record."""
+        """Write the kept checkpoint, the newest policy and the record."""
         self._write_checkpoint(1 if status == "finished" else KEPT_CHECKPOINTS)
         if self._policy is not None:
             save_policy(self._out / LAST, self._policy)

@@ -1,9 +1,9 @@
-"""A training run, new or resumed: a folder that holds its policies, its state and its results.
+"""Run a training, new or resumed, in a folder that holds its policies, its state and its results.
 
-`best.safetensors` and `last.safetensors` are policies, `state-N.safetensors` the checkpoint after N timesteps,
-`run.json` holds what is needed to repeat the run, and its results; beside them are TensorBoard's event files. Each file
-is written whole or not at all. A checkpoint has all that decides what comes after it, and all other files are made
-again from it when the run is resumed.
+`best.safetensors` and `last.safetensors` are policies, `state-N.safetensors` the checkpoint after N timesteps;
+`run.json` holds the configuration that repeats the run, and its results; TensorBoard's event files stand beside them.
+Each file is written whole or not at all. A checkpoint decides everything after it; a resumed run makes all other files
+again from it.
 """
 
 import dataclasses
@@ -25,13 +25,13 @@ from .session import BEST_FILE, Session
 
 
 def train(config: TrainingConfig, out: str | Path, callbacks: Sequence[Onlooker] = ()) -> dict[str, Any]:
-    """Train a new policy into the new folder `out`; return what `run.json` holds.
+    """Train a new policy in the new folder `out`; return the content of `run.json`.
 
-    `callbacks` look on: stable-baselines3's, and functions of each periodic evaluation, a dictionary as in `run.json`.
-    One that returns False ends the training, with status `interrupted`.
-    The training ends early, with status `interrupted` and usable policies, at the first SIGINT or SIGTERM, and at the
-    second at once. Raises `SpringfootError`, with nothing written, if `out` exists and is not an empty folder, or if
-    another process writes into it.
+    `callbacks` watch: stable-baselines3's, and functions of each periodic evaluation, a dictionary as in `run.json`. A
+    callback that returns False ends the training, with status `interrupted`. The training ends early, with status
+    `interrupted` and usable policies, at the first SIGINT or SIGTERM, and at the second at once. Raises
+    `SpringfootError`, with nothing written, if `out` exists and is not an empty folder, or if another process writes
+    into it.
     """
     out = require_new(out)
     with owned(out):
@@ -46,21 +46,21 @@ def resume(
     callbacks: Sequence[Onlooker] = (),
     reward_weights: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """Continue the run in `out` with its saved settings; return what `run.json` holds.
+    """Continue the run in `out` with its saved settings; return the content of `run.json`.
 
     Args:
         out: the run's folder.
         timesteps: how many more to train after those already done, the step size falling linearly to the new end;
             None finishes an interrupted run.
         threads: of the physics in place of the saved ones; results are the same with any number.
-        callbacks: as for `train`; their own state is theirs to keep.
-        reward_weights: of the reward from here on, the setting of that name in place of the saved one. The best policy
-            is measured anew by it, and the session in `run.json` keeps what was saved as `changed_from`.
+        callbacks: as for `train`; they keep their own state.
+        reward_weights: of the reward from here on, in place of the saved ones. The best policy is measured anew by
+            them, and the session in `run.json` keeps the saved ones as `changed_from`.
 
-    It goes on from the newest checkpoint that is whole, and ends with the bits of a run that nothing interrupted, on
-    the same versions and a processor of the same instructions. Whatever an earlier end left undone in the folder is
-    made good. Raises `SpringfootError` for a folder without a run, for a run that is finished, that another process
-    writes, or that this version cannot continue.
+    Starts from the newest whole checkpoint, and ends with the bits of an uninterrupted run, on the same versions and a
+    processor of the same instructions. Completes whatever an earlier end left unfinished in the folder. Raises
+    `SpringfootError` for a folder without a run, and for a run that is finished, that another process writes, or that
+    this version cannot continue.
     """
     out = Path(out)
     if not (out / RUN).is_file():
@@ -88,14 +88,14 @@ def resume(
 
 
 def _require_shape(out: Path, trained: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
-    """Raise `SpringfootError` where what a state has the shape of was changed in the record."""
+    """Raise `SpringfootError` if the record has other settings of the shape of a state than the trained ones."""
     for name in ("num_envs", "hidden"):
         if trained[name] != asked[name]:
             raise SpringfootError(f"{out} was trained with {name} {trained[name]}; its {RUN} says {asked[name]}")
 
 
 def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:
-    """Return whether a run that has done its timesteps has all that its last checkpoint says, in its other files."""
+    """Tell whether the files of a run that has done its timesteps agree with its last checkpoint."""
     header, arrays = found
     told = all(record.get(name) == value for name, value in header["record"].items())
     evaluated = [entry["timesteps"] for entry in record["evaluations"]][-1:] == [header["timesteps"]]

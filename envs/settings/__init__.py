@@ -1,4 +1,4 @@
-"""The settings of the walking task, and the feet that they name."""
+"""Define the settings of the walking task, and the feet that they name."""
 
 from typing import TYPE_CHECKING
 

@@ -15,15 +15,15 @@ from springfoot.errors import SpringfootError, as_float, quoted, require_within
 from springfoot.gait.plan.plan import PLAN_SPEED_RANGE
 
 ADAPTED = "adapted"
-"""Key of a foot's dictionary."""
+"""Key of the adapted person in a foot's dictionary."""
 LEGS = ("sound", "other")
-"""The leg with the sound foot, and that with the foot to which the person has adapted."""
+"""The leg with the sound foot, and the leg with the foot to which the person has adapted."""
 
 
 def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[str, dict[str, Any]]]:
-    """`adapted` of a foot of a kind in its plain form; raises `SpringfootError` for what is none.
+    """Return `adapted` of a foot of this kind in its plain form; raise `SpringfootError` for any other value.
 
-    Who is named has adapted to a foot of that kind; its numbers may be others.
+    A named person has adapted to a foot of that kind; the foot's numbers may be others.
     """
     if isinstance(value, str):
         if value not in (known := committed_feet()):

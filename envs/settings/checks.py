@@ -1,4 +1,4 @@
-"""Checks that more than one setting needs; each raises `SpringfootError`, naming the setting and what is allowed."""
+"""Check settings; each check raises `SpringfootError`, which names the setting and the allowed values."""
 
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
@@ -23,7 +23,7 @@ from ..physics.timing import CONTROL_WINDOW
 Settings = TypeVar("Settings")
 
 STIFFNESS_BOUNDS = (1e-3, STIFFNESS_RANGE[1])
-"""Softest and stiffest spring of an action [N m/rad]; chosen: beyond, products of stiffnesses leave the numbers."""
+"""Softest and stiffest spring of an action [N m/rad]; chosen: beyond, products of stiffnesses overflow."""
 MOST_WEIGHT = 1e6
 """Largest magnitude of a reward's weight [-]; chosen."""
 LONGEST_EPISODE = 1e9
@@ -31,12 +31,12 @@ LONGEST_EPISODE = 1e9
 MOST_PUSH = 1e5
 """Hardest push [N]; chosen."""
 SHORTEST_PUSH_INTERVAL = 0.01
-"""Shortest time for one push [s]: a control window, in which the force is held."""
+"""Shortest interval of pushes [s]: a control window, in which the force is held."""
 _NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}  # NumPy's kinds
 MOST_ENVIRONMENTS = 1_000_000
 """Largest batch; chosen."""
 CONSTRUCTOR_ARGUMENTS = ("render_mode", "num_envs", "num_threads", "autoreset_mode")
-"""Of the environments, beside the settings: what a misspelled name may have meant."""
+"""Arguments of the environments besides the settings, to suggest for a misspelled name."""
 
 
 class UnknownSettingError(SpringfootError, TypeError):
@@ -44,7 +44,7 @@ class UnknownSettingError(SpringfootError, TypeError):
 
 
 def check_people_file(name: object) -> None:
-    """Refuse what is no file of people's data."""
+    """Refuse a value that is not the name of a file of people's data."""
     if name is not None:
         if not isinstance(name, str):
             raise SpringfootError(f"people_file must be the name of a file, got {quoted(name)}")
@@ -52,7 +52,7 @@ def check_people_file(name: object) -> None:
 
 
 def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
-    """Refuse somebody's walk where the plan is the guide, and a file of plans where it is not."""
+    """Refuse a person's walk with guide `plan`, and a file of plans with guide `people`."""
     if follows_plan and human is not None:
         raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
     if plan_file is not None:
@@ -64,7 +64,7 @@ def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
 
 
 def check_names(given: Iterable[str], names: Sequence[str]) -> None:
-    """Refuse what is none of `names`, the settings, as Python refuses an unknown keyword argument."""
+    """Refuse a name that is not in `names`, the settings, as Python refuses an unknown keyword argument."""
     for name in given:
         if name not in names:
             likely = get_close_matches(name, [*names, *CONSTRUCTOR_ARGUMENTS], n=3, cutoff=0.5)
@@ -87,37 +87,37 @@ def refusing_unknown(settings: type[Settings]) -> type[Settings]:
 
 
 def check_start(start: Any) -> None:
-    """Refuse what is neither "random" nor "standing" nor a stride phase in [0, 1)."""
+    """Refuse other values than "random", "standing" and a stride phase in [0, 1)."""
     known = start in ("random", "standing") if isinstance(start, str) else is_number(start) and 0 <= start < 1
     if not known:
         raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {quoted(start)}")
 
 
 def check_seed(seed: Any) -> int | None:
-    """Return a seed as a whole number, or None; refuse all else."""
+    """Return a seed as a whole number, or None; refuse any other value."""
     return None if seed is None else require_count("seed", seed, 0, 2**63 - 1)
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is a finite number."""
+    """Tell whether a value is a finite number."""
     return isfinite(as_float(value))
 
 
 def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
-    """Refuse a value that is none of `choices`."""
+    """Refuse a value that is not in `choices`."""
     if not isinstance(value, str) or value not in choices:
         raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {quoted(value)}")
 
 
 def check_range(name: str, value: Any, unit: str) -> None:
-    """Refuse what is not a pair 0 < low < high."""
+    """Refuse other values than a pair 0 < low < high."""
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
     if not numbers or not 0 < value[0] < value[1]:
         raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {quoted(value)}")
 
 
 def check_bounds(settings: Any) -> None:
-    """Refuse settings, each possible by itself, beyond which an observation or a reward might be no finite number."""
+    """Refuse combinations of settings with which an observation or a reward might not be finite."""
     low, high = STIFFNESS_BOUNDS
     for name in ("ankle_stiffness_range", "toe_stiffness_range"):
         softest, stiffest = getattr(settings, name)
@@ -133,7 +133,7 @@ def check_bounds(settings: Any) -> None:
 
 
 def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -> None:
-    """Refuse what is neither None nor a pair low < high within `allowed`."""
+    """Refuse other values than None and a pair low < high within `allowed`."""
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
     if value is not None and not (numbers and allowed[0] <= value[0] < value[1] <= allowed[1]):
         raise SpringfootError(
@@ -143,14 +143,14 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
 
 
 def check_windows(name: str, delay: float | tuple[float, ...] | None) -> None:
-    """Refuse a delay, or ends of a range of delays [s], that is not whole control windows."""
+    """Refuse a delay, or ends of a range of delays [s], that is not a multiple of the control window."""
     ends = delay if isinstance(delay, tuple) else () if delay is None else (delay,)
     if any(abs(end / CONTROL_WINDOW - round(end / CONTROL_WINDOW)) > 1e-9 for end in ends):
         raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {delay!r}")
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:
-    """Refuse unknown reward terms, and weights whose sign is not that of the term's in `defaults` (0: a cost)."""
+    """Refuse unknown reward terms, and weights with another sign than in `defaults` (0 there: a cost)."""
     if not isinstance(weights, dict):
         raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {quoted(weights)}")
     for name, weight in weights.items():
@@ -163,7 +163,8 @@ def check_weights(weights: Any, defaults: dict[str, float]) -> None:
 
 
 def real_numbers(name: str, value: Any) -> NDArray:
-    """`value` as a new array of float64; refuse text, dates, complex numbers, records and rows of unequal length."""
+    """Return `value` as a new array of float64; refuse text, dates, complex numbers, records and rows of unequal
+    length."""
     try:
         array = np.asarray(value)
         if array.dtype.kind in _NO_NUMBERS or array.dtype.names is not None:
@@ -181,7 +182,7 @@ def real_numbers(name: str, value: Any) -> NDArray:
 
 
 def plain(value: Any) -> Any:
-    """Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
+    """Return Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return as_float(value)
     if isinstance(value, (list, tuple)):

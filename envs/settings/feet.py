@@ -1,4 +1,4 @@
-"""The settings `left_foot` and `right_foot`: kinds of feet and their numbers, read once into a `FootSetting`.
+"""Read the settings `left_foot` and `right_foot`: kinds of feet and their numbers, once, into a `FootSetting`.
 
 In plain JSON values a foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind;
 `adapted` says that the person has adapted to it (`envs.settings.adapted`).
@@ -18,17 +18,17 @@ from ..physics.foot import LOCK, Feet, Foot, FootJoint, Spring
 from .adapted import ADAPTED, adapted_setting
 
 FOOT_SETTINGS = ("left_foot", "right_foot")
-"""Names of the settings that are feet."""
+"""Settings that are feet."""
 RIGID_TOE_STIFFNESS = 110.0
-"""Stiffness of the toe of a rigid foot [N m/rad]: the bend of a forefoot; chosen, for a foot as that of the thesis's
-Figure 1-b, of which it says how little ankle and toe move, not how stiff they are."""
+"""Stiffness of the toe of a rigid foot [N m/rad]: the bend of a forefoot; chosen, for a foot like the thesis's Figure
+1-b, which gives small motions of ankle and toe, and no stiffness."""
 
 
 class Number(NamedTuple):
-    """A number that can be said of a foot."""
+    """Allowed number of a foot."""
 
     usual: float | None
-    """Its value where it is not given; None leaves it to the body."""
+    """Default value; None leaves it to the body."""
     low: float
     high: float
     unit: str
@@ -37,9 +37,9 @@ class Number(NamedTuple):
 TABLE_ANGLE, TABLE_TORQUE = Number(None, -60.0, 90.0, "deg"), Number(None, -1000.0, 1000.0, "N m")
 """Angle and torque of a point of a torque-angle line."""
 TABLE_SLOPE = Number(None, 1.0, 3000.0, "N m/rad")
-"""By how much the torque of such a line falls with the angle."""
+"""Fall of a torque-angle line's torque with the angle."""
 MOST_POINTS = 1000
-"""Points of such a line at most; chosen."""
+"""Most points of a torque-angle line; chosen."""
 TABLES = ("ankle_table", "toe_table")
 """Torque-angle lines of a passive foot, lists of [deg, N m], in place of stiffness and rest angle of that joint."""
 SPRING_NUMBERS = {
@@ -49,14 +49,14 @@ SPRING_NUMBERS = {
     "toe_deg": Number(0.0, -30.0, 45.0, "deg"),
     "damping_time": Number(None, 0.0, 0.1, "s"),
 }
-"""What a spring at ankle and toe has: stiffness, angle without torque (dorsiflexion, toe-up positive), and damping over
-stiffness. The usual ones are of a foot on which the committed controller walks unchanged."""
+"""Numbers of a spring at ankle and toe: stiffness, angle without torque (dorsiflexion, toe-up positive), and damping
+over stiffness. The defaults are of a foot on which the committed controller walks unchanged."""
 ORTHOSIS_NUMBERS = SPRING_NUMBERS | {
     "ankle_stiffness": Number(0.0, 0.0, 1000.0, "N m/rad"),
     "ankle_deg": Number(0.0, -30.0, 30.0, "deg"),
     "toe_stiffness": Number(0.0, 0.0, 1000.0, "N m/rad"),
 }
-"""The same of an orthosis, a spring beside the joint; 0.9 to 8.7 N m/deg at the ankle (Waterval et al. 2019) are 52 to
+"""Numbers of an orthosis, a spring beside the joint; 0.9 to 8.7 N m/deg at the ankle (Waterval et al. 2019) are 52 to
 498 N m/rad."""
 SEGMENT_RATIOS = {
     f"{part}_ratio": Number(1.0, 0.1, 3.0, "(of the intact one)")
@@ -109,18 +109,18 @@ class FootSetting:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The given numbers, lines, schedule and orthosis by name; the usual ones hold for all others."""
+        """Return the given numbers, lines, schedule and orthosis by name; all others have their defaults."""
         given = {} if isinstance(self.plain, str) else self.plain
         return {name: value for name, value in given.items() if name not in ("kind", ADAPTED)}
 
     @property
     def adapted(self) -> str | dict[str, Any] | None:
-        """The person who has adapted to the foot: a name, or leg constants by speed; None for nobody."""
+        """Return the person who has adapted to the foot: a name, or leg constants by speed; None for nobody."""
         return None if isinstance(self.plain, str) else self.plain.get(ADAPTED)
 
     @cached_property
     def foot(self) -> Foot:
-        """The foot as physics."""
+        """Return the foot for the physics."""
         return _physical(self.kind, self.numbers)
 
 
@@ -129,9 +129,9 @@ INTACT_FOOT = FootSetting("intact")
 
 
 def foot_setting(name: str, value: Any) -> FootSetting:
-    """Return the foot of a setting, which may be one already or plain JSON values.
+    """Return the foot of a setting from a `FootSetting` or plain JSON values.
 
-    Raises `SpringfootError` for anything else; `name` is that of the setting.
+    Raises `SpringfootError` for any other value; `name` is that of the setting.
     """
     return value if isinstance(value, FootSetting) else FootSetting(_plain(name, value))
 
@@ -209,7 +209,7 @@ def _listed(value: Any) -> Sequence[Any]:
 def _numbers(
     name: str, owner: str, given: Mapping[Any, Any], known: Mapping[str, Number], more: tuple[str, ...] = ()
 ) -> dict[str, float]:
-    """Return the numbers that are given, as floats, in the order in which they are known."""
+    """Return the given numbers as floats, in the order of `known`."""
     for key in given:
         if key not in known:
             raise SpringfootError(f"{name}: {owner} has no {key!r:.40}; valid: {', '.join([*known, *more])}")
@@ -249,7 +249,7 @@ def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
 
 
 def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
-    """Return settings of which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
+    """Return settings in which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
 
     Returns the settings with the first foot of each list, and the feet of each environment; None without lists.
     """
@@ -274,7 +274,7 @@ def _usual(numbers: Mapping[str, Number]) -> dict[str, float | None]:
 
 
 def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
-    """Springs at ankle and toe from the values of `SPRING_NUMBERS`."""
+    """Return springs at ankle and toe from the values of `SPRING_NUMBERS`."""
 
     def spring(joint: str) -> Spring:
         rest = radians(value[f"{joint}_deg"])

@@ -1,8 +1,8 @@
-"""Everything that can be set about the walking task: read from plain JSON values once, validated in one place.
+"""Define every setting of the walking task: read from plain JSON values once, validated in one place.
 
-Flat, as `gym.make` takes them. Feet, `schedule` and `human` are held as objects; `settings_to_json` writes them plain.
-Each setting also names its theme, once: of it are made the groups of `--help`, the table of the environment and what an
-evaluation sets anew.
+Settings are flat, as `gym.make` takes them. Feet, `schedule` and `human` are held as objects; `settings_to_json` writes
+them plain. Each setting also names its theme, for the groups of `--help`, the environment's table, and the standard
+conditions of an evaluation.
 """
 
 import json
@@ -54,9 +54,9 @@ THEMES = {
     "disturbance": "What disturbs it: pushes, noise of the sensors, delay of the actuators.",
     "reward": "What it is rewarded for.",
 }
-"""Themes of the settings, the groups of `--help` and of the table of `SegmentedFootBiped`, each with its sentence."""
+"""Theme of settings -> its sentence, for the groups of `--help` and of the table of `SegmentedFootBiped`."""
 CONDITION_THEMES = ("body", "speed", "episode", "ground", "disturbance")
-"""Themes that say who walks where, whatever the policy was trained on."""
+"""Themes of an evaluation's conditions, which replace the settings of a policy's training."""
 
 FRICTION_RANGE = (0.4, 1.2)
 """Allowed coefficients of friction, from a wet floor to rough rubber [-]; chosen."""
@@ -127,8 +127,8 @@ class BipedSettings:
     cadence: Cadence = field(default="people", metadata=_REFERENCE)
     """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
     guide: Guide = field(default="people", metadata=_REFERENCE)
-    """What the controller follows, what is fed forward, what starts an episode and what the reward holds against:
-    people's walk; or the plan's own (plan), of people the step length and time alone (`docs/results/prediction.md`)."""
+    """Target of controller, feed-forward, start and reward: people's walk (people); or the plan's own (plan), with
+    people's step length and time alone (`docs/results/prediction.md`)."""
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     plan_file: str | None = field(default=None, metadata=_REFERENCE)
@@ -138,11 +138,11 @@ class BipedSettings:
     that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     feedforward: Feedforward = field(default="people", metadata=_SPRINGS)
     """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
-    that inverse dynamics give for the plan. Either way the constants they go with were tuned on people's walk."""
+    that inverse dynamics give for the plan. The constants of both were tuned on people's walk."""
     action_mode: ActionMode = field(default="absolute", metadata=_SPRINGS)
     """Action to stiffness: log scale over the range, or a factor exp(action) on `schedule` (residual)."""
     decisions: Decisions = field(default="50hz", metadata=_SPRINGS)
-    """When stiffness is decided: in every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
+    """Times of decisions on stiffness: every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
     strike and at the foot flat, heel-off and toe-off of the guide, the action being held between them (event)."""
     stiffness_joints: StiffnessJoints = field(default="both", metadata=_SPRINGS)
     """Joints whose stiffness the action decides; the other has the fixed schedule, and its actions are read as 0."""
@@ -154,8 +154,9 @@ class BipedSettings:
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
     human: OwnGait | None = field(default=None, metadata=_REFERENCE)
-    """Someone's own walk in place of people's, JSON form of `springfoot.gait.people.own_data.OwnGait` (on the command
-    line a CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time follow it."""
+    """One person's own walk in place of people's, JSON form of `springfoot.gait.people.own_data.OwnGait` (on the
+    command line a CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time
+    follow it."""
     episode_seconds: float = field(default=20.0, metadata=_EPISODE | _KEPT)
     """Time after which an episode is truncated [s]."""
     start: Literal["random", "standing"] | float = field(default="random", metadata=_EPISODE)
@@ -179,13 +180,13 @@ class BipedSettings:
     slope_range_deg: tuple[float, float] | None = field(default=None, metadata=_GROUND | _DRAWN)
     """Slopes drawn at each reset in place of `slope_deg` [deg], evenly."""
     unevenness_m: float = field(default=0.0, metadata=_GROUND)
-    """The ground of each footfall is up to this much higher or lower than the mean ground [0..0.03 m], evenly; a
-    swinging foot gets that of its next footfall in mid-swing."""
+    """Largest height of a footfall's ground above or below the mean ground [0..0.03 m], drawn evenly; a swinging foot
+    gets the ground of its next footfall in mid-swing."""
     sensor_noise: float = field(default=0.0, metadata=_DISTURBANCE)
-    """Standard deviation of Gaussian noise, new at every step, on all that is measured of the observation, in its own
+    """Standard deviation of Gaussian noise, new at every step, on all measured entries of the observation, in their
     dimensionless units [0..0.1]: 0.01 is 0.6 deg, 9 mm of hip height, 2 deg/s, and 1 % of body weight."""
     stiffness_delay_s: float = field(default=0.0, metadata=_DISTURBANCE)
-    """A new ankle or toe stiffness acts this much later (pure delay) [0..0.04 s, in steps of 0.01 s]."""
+    """Delay with which a new ankle or toe stiffness acts [0..0.04 s, in steps of 0.01 s]."""
     stiffness_delay_range_s: tuple[float, float] | None = field(default=None, metadata=_DISTURBANCE | _DRAWN)
     """Delays drawn at each reset in place of `stiffness_delay_s`, evenly from the steps of 0.01 s [s]."""
     reward_weights: dict[str, float] = field(default_factory=dict, metadata=_REWARD)
@@ -233,7 +234,7 @@ class BipedSettings:
 
     @property
     def follows_plan(self) -> bool:
-        """Whether the guide is the plan: the target is then the plan's own gait, else that of people."""
+        """Return True with guide `plan`: the target is then the plan's own gait, else that of people."""
         return self.guide == "plan"
 
     @property
@@ -243,7 +244,7 @@ class BipedSettings:
 
     @property
     def max_episode_steps(self) -> int:
-        """Steps after which an episode is truncated: `episode_seconds`, to the nearest step."""
+        """Return the steps after which an episode is truncated: `episode_seconds`, to the nearest step."""
         return ceil(self.episode_seconds / self.step_seconds - 0.5)
 
     def _check_draws(self) -> None:
@@ -268,7 +269,7 @@ class BipedSettings:
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
 
     def _check_world(self) -> None:
-        """Ground, noise and delays."""
+        """Check ground, noise and delays."""
         require_number("friction", self.friction, *FRICTION_RANGE)
         require_number("slope_deg", self.slope_deg, *SLOPE_RANGE_DEG, unit="deg")
         check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
@@ -283,13 +284,13 @@ class BipedSettings:
 THEME_OF: dict[str, str] = {item.name: item.metadata["theme"] for item in fields(BipedSettings)}
 """Theme of each setting, by its name."""
 DRAWN_SETTINGS = tuple(item.name for item in fields(BipedSettings) if item.metadata.get("drawn"))
-"""Names of the settings that make something differ between episodes, or change within one, by chance."""
+"""Settings by which something differs between episodes, or changes within one, by chance."""
 CONDITION_SETTINGS = tuple(
     item.name
     for item in fields(BipedSettings)
     if item.metadata["theme"] in CONDITION_THEMES and not item.metadata.get("kept")
 )
-"""Names of the settings that every evaluation sets anew; the other ones a trained policy brings with it."""
+"""Settings that every evaluation replaces; a trained policy brings the others with it."""
 
 
 def settings_from(**values: Any) -> BipedSettings:
@@ -312,7 +313,7 @@ def body_of(settings: BipedSettings) -> Body:
 
 
 def plan_file_of(settings: BipedSettings) -> Path | None:
-    """Return the file of the plan's style and leg constants, if it is not the package's."""
+    """Return the file of the plan's style and leg constants; None for the package's."""
     return None if settings.plan_file is None else Path(settings.plan_file)
 
 

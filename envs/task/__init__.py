@@ -1,4 +1,4 @@
-"""The task: observation, reward, ground, pushes, start and end of an episode."""
+"""Define the task: observation, reward, ground, pushes, start and end of an episode."""
 
 from typing import TYPE_CHECKING
 

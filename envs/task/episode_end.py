@@ -1,4 +1,4 @@
-"""How an episode ends: by a fall, by a simulation that diverges, or by its time."""
+"""End episodes: by a fall, by a simulation that diverges, or by their time."""
 
 import mujoco
 
@@ -17,9 +17,9 @@ TERMINATIONS = (
     "diverged: BADQACC",
     "diverged: BADCTRL",
 )
-"""Why an episode was terminated, by its code; 0 while it is not. A divergence has the name of MuJoCo's warning."""
+"""Reason of a termination, by its code; 0 for none. A divergence has the name of MuJoCo's warning."""
 TOO_LOW, TOO_TILTED = 1, 2
-"""The codes of falls."""
+"""Codes of falls."""
 
 
 @part
@@ -45,6 +45,6 @@ def average(rows, window_forces, running) -> None:
 
 
 def divergence(m: Measurement, index: int) -> int:
-    """Why a simulation that diverged did, a code of `TERMINATIONS`."""
+    """Return the code in `TERMINATIONS` of a simulation that diverged."""
     warning = mujoco.mjtWarning(int(m.diverged[index]))
     return TERMINATIONS.index(f"diverged: {warning.name.removeprefix('mjWARN_')}")

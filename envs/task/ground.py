@@ -1,4 +1,4 @@
-"""The ground below each foot: its slope, and the height of each footfall above or below the mean ground."""
+"""Lay the ground below each foot: its slope, and the height of each footfall above or below the mean ground."""
 
 from collections.abc import Sequence
 from math import radians
@@ -14,15 +14,15 @@ from ..settings.settings import BipedSettings
 
 NEXT_FOOTFALL_PHASE = 0.75
 """Stride phase at which a swinging foot gets the ground of its next footfall; chosen: the foot is then in mid-swing, at
-least 35 mm above the ground it left."""
+least 35 mm above the ground that it left."""
 
 
 class Ground:
-    """The ground of N bodies, sampled from the generators of their environments.
+    """Ground of N bodies, drawn from the generators of their environments.
 
     Args:
-        settings: slope and unevenness; friction is that of the simulation's models.
-        simulation: the simulation whose ground this is.
+        settings: slope and unevenness; the simulation's models have the friction.
+        simulation: to lay the ground in.
         subjects: the bodies, which own the slope.
         rows: (N,) of `TASK_ROW`.
     """
@@ -44,9 +44,9 @@ class Ground:
         self._simulation.lay(ids, self.slope[ids], self.height[ids])
 
     def advance(self, m: Measurement, leg_phase: NDArray, randoms: Sequence[np.random.Generator | None]) -> None:
-        """After a control window, give every foot that came to mid-swing in it the ground of its next footfall.
+        """Give every foot that reached mid-swing in the last control window the ground of its next footfall.
 
-        That ground stays below the foot. `leg_phase` (N, side) are the stride phases after the window.
+        The new ground stays below the foot. `leg_phase` (N, side) are the stride phases after the window.
         """
         if self._settings.unevenness_m == 0.0:
             return

@@ -1,4 +1,4 @@
-"""How an episode starts: in the target's posture in single support, or standing, with the lowest point on the floor."""
+"""Start episodes: in the target's posture in single support, or standing, with the lowest point on the floor."""
 
 from collections.abc import Iterable
 
@@ -15,25 +15,25 @@ from ..physics.model import ANKLE, HIP
 from ..physics.simulation import Simulation
 
 START_PHASES = (0.08, 0.38)
-"""A random start lies between these stride phases of either leg; chosen: near double support bodies fall."""
+"""Range of stride phases of both legs at a random start; chosen: near double support bodies fall."""
 START_DEPTH = 0.001
-"""How deep the lowest contact point starts in the floor [m at 1.70 m]; chosen, about as deep as under body weight."""
+"""Initial depth of the lowest contact point in the floor [m at 1.70 m]; chosen, about the depth under body weight."""
 
 
 def start_table(rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> PhaseTable:
-    """People's posture over the stride, for each row of the tables (`envs.control.reference_walk.rows`)."""
+    """Return the target's posture over the stride, for each row of the tables (`envs.control.reference_walk.rows`)."""
     return PhaseTable(np.stack([_start_curves(walk) for _, walk in rows]))
 
 
 def random_phase(random: np.random.Generator) -> float:
-    """Sample a stride phase of the left leg that lies in the single support of either leg."""
+    """Draw a stride phase of the left leg in the single support of either leg."""
     return (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
 
 
 def walking_posture(
     table: PhaseTable, subjects: Subjects, ids: NDArray, left_phase: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """People's posture at `left_phase` (K,) of `table`, and the commanded speed, of environments `ids` (K,).
+    """Return the posture of `table` at `left_phase` (K,), and the commanded speed, of environments `ids` (K,).
 
     Returns joint angles, the hips' to the vertical, and rates (K, side, joint) [rad, rad/s]; trunk pitch (K,) [rad];
     speed (K,) [m/s].
@@ -50,9 +50,9 @@ def place(
     posture: tuple[NDArray, NDArray, NDArray, NDArray],
     noise: NDArray,
 ) -> None:
-    """Put simulations `ids` (K,) into a `posture` as `walking_posture` returns it.
+    """Put simulations `ids` (K,) into a `posture` of `walking_posture`.
 
-    `noise` (K, 2, side, joint) is the relative error of its angles and rates. Locked joints start locked.
+    `noise` (K, 2, side, joint) is the relative error of angles and rates. Locked joints start locked.
     """
     (angle, velocity, pitch, speed), scale = posture, subjects.scale[ids]
     angle = angle * (1.0 + noise[:, 0])
@@ -72,11 +72,9 @@ def place(
 
 
 def _start_curves(walk: ReferenceWalk) -> NDArray:
-    """Return (SAMPLES, 9): the target's joint angles, the thigh's to the vertical, and their rates; the trunk's pitch.
+    """Return (SAMPLES, 9): the target's joint angles, the thigh's to the vertical, their rates, and the trunk's pitch.
 
-    Angles in rad, rates in rad/s.
-
-    All variants of the leg constants start like the first one.
+    Angles in rad, rates in rad/s. All variants of the leg constants start like the first one.
     """
     first = walk.constants[0]
     period = first.period_factor * walk.plan.stride_time

@@ -1,4 +1,4 @@
-"""What a policy sees: the entries of the observation, dimensionless and bounded."""
+"""Make the observation of a policy: dimensionless and bounded entries."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -94,7 +94,7 @@ def observe(rows, controls, bodies, table, observation) -> None:
 
 
 class SensorNoise:
-    """Gaussian noise on the measured entries of N observations, new at every step.
+    """Gaussian noise on the measured entries of N observations, drawn anew at every step.
 
     Args:
         standard_deviation: of the noise, in the dimensionless units of the observation.

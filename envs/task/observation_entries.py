@@ -1,4 +1,4 @@
-"""The entries of the observation: names, units, bounds and meanings."""
+"""List the entries of the observation: names, units, bounds and meanings."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,14 @@ from ..physics.contact import CONTACTS
 from ..physics.model import ACTIONS, JOINTS, SIDES
 
 UNITS = ("1", "rad", "leg length", "sqrt(g l)", "sqrt(g/l)", "body weight")
-"""What divides the entries."""
+"""Units of the entries; each entry is its SI value over its unit."""
 
 
 class Entry(NamedTuple):
-    """One entry of the observation: its name, the unit that divides it, the bounds that clip it, its meaning, and
-    whether it is measured. What is not measured needs no sensor: the controller has set it itself."""
+    """One entry of the observation: its name, unit, bounds that clip it, meaning, and whether a sensor measures it.
+
+    Entries that are not measured are values of the controller itself.
+    """
 
     name: str
     unit: str

@@ -1,4 +1,4 @@
-"""Pushes on the trunk. Their force is in proportion to the mass of the body, as its weight is."""
+"""Push the trunk, with forces in proportion to the body's mass."""
 
 from collections.abc import Sequence
 
@@ -12,11 +12,11 @@ from ..settings.settings import BipedSettings
 
 
 class Pushes:
-    """Pushes each environment once in each interval, at a random time, forward or backward at random.
+    """Push each environment once in each interval, at a random time, forward or backward at random.
 
     Args:
         settings: size, duration and interval of pushes.
-        subjects: whose mass counts.
+        subjects: bodies, for their masses.
         rows: (N,) of `TASK_ROW`.
     """
 
@@ -35,7 +35,8 @@ class Pushes:
         self._draw(index, random)
 
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
-        """Return (N,) push [N] after `steps` (N,); only environments that are `running` (N,) sample their next push."""
+        """Return (N,) the push [N] after `steps` (N,); only environments that are `running` (N,) draw their next
+        push."""
         time = steps * self._step
         for index in np.flatnonzero(running & (time >= self._ends)).tolist():
             generator = random[index]

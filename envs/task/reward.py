@@ -1,7 +1,7 @@
-"""The walking task: observation, named reward terms and falls, on arrays over N environments.
+"""Compute the named reward terms, over N environments.
 
-Row i of every result depends on row i of the arguments alone, by the same operations for any N: a batch of N
-gives the same bits as N batches of one.
+Row i of every result depends on row i of the arguments alone, by the same operations for any N: a batch of N gives the
+same bits as N batches of one.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,14 +32,16 @@ if TYPE_CHECKING:
     from ..physics.measurement import Measurement
 
 MAX_PITCH = 0.8
-"""A trunk tilted further than this, forward or backward, is a fall [rad]; chosen: walking stays within 0.04 rad."""
+"""Largest tilt of the trunk, forward or backward, before it counts as a fall [rad]; chosen: walking stays within 0.04
+rad."""
 
 POSE_TOLERANCE = 0.02
 """Pose error E at which its reward is 1/e [rad^2]; chosen: 2.8 deg at every joint."""
 MAX_FORCE = 1.2
 """Vertical force of one foot beyond which it costs more [body weights]; chosen: people's peaks are 1.05 and 1.13."""
 EXCESS_SHARE = 4.0
-"""Weight of that excess against the distance from the target's range [-]; chosen high, as a peak is short."""
+"""Weight of force beyond `MAX_FORCE` against the distance from the target's range [-]; chosen high, as a peak is
+short."""
 FORCE_TOLERANCE = 0.4
 """Force outside the target's range, both feet together, at which its reward is 1/e [body weights]; chosen: at 0.15 a
 push-off far too strong costs hardly more than one a little too strong."""
@@ -49,7 +51,7 @@ TERMS: tuple[str, ...] = (
     *("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf"),
     *("stiffness_rate", "stiffness", "effort"),
 )
-"""The reward's terms, in the order in which they are summed: rewards, then costs."""
+"""Reward terms in the order of their sum: rewards, then costs."""
 ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, EFFORT = range(len(TERMS))
 TASK_OPTIONS = np.dtype(
     [
@@ -59,12 +61,12 @@ TASK_OPTIONS = np.dtype(
         ("most_steps", float),  # beyond which an episode is truncated
     ]
 )
-"""How settings make rewards."""
+"""Numbers of the settings that rewards need."""
 
 
 @part
 def _near_zmp(scale, control, targets, m, forces, i):
-    """exp(-(distance / tolerance)^2) of the CoP of both feet, mean over the windows of a step, from the planned ZMP."""
+    """Return exp(-(d / tolerance)^2), d the distance of both feet's mean CoP in the step from the planned ZMP."""
     load = moment = 0.0
     for window in range(len(forces)):
         for side in range(2):
@@ -82,7 +84,8 @@ def _near_zmp(scale, control, targets, m, forces, i):
 
 @part
 def _pose_error(scale, pitch, angle, target):
-    """Weighted squared distance [rad^2] of a leg's `angle` (4,) [rad] under a trunk at `pitch` [rad] from `target`."""
+    """Return the weighted squared distance [rad^2] of a leg's `angle` (4,) [rad] under a trunk at `pitch` [rad] from
+    `target`."""
     error = 0.0
     for joint in range(4):
         lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
@@ -92,7 +95,7 @@ def _pose_error(scale, pitch, angle, target):
 
 @part
 def _force_distance(scale, forces, i, side, target):
-    """Body weights by which one foot's forces in the windows of a step leave the target's range."""
+    """Return the body weights by which one foot's forces in the windows of a step leave the target's range."""
     count = len(forces)
     forward = up = excess = 0.0
     for window in range(count):
@@ -108,7 +111,7 @@ def _force_distance(scale, forces, i, side, target):
 
 @part
 def _positive_power(m):
-    """Power [W] of the joints of `m`, of `MEASURED`, that do positive work."""
+    """Return the positive power of all joints [W]; `m` is of `MEASURED`."""
     power = 0.0
     for side in range(2):
         for joint in range(4):
