@@ -1,4 +1,4 @@
-"""The batched walk: N bodies stepped at once, the kernels of a step, its result and its exact state."""
+"""Step N bodies at once: the kernels of a step, its result and its exact state."""
 
 from typing import TYPE_CHECKING
 

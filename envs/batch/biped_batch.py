@@ -1,8 +1,9 @@
-"""The batched core: N walking bodies whose actions are ankle and toe stiffness. The Gymnasium faces stand on it.
+"""Step N walking bodies whose actions are ankle and toe stiffness; the Gymnasium environments stand on this batch.
 
-One step lasts 20 ms, or what the setting `decisions` says. The action sets the stiffness, which is held for all control
-windows of 10 ms in it; in each window the springs' equilibrium, the hips and the knees follow the phase. Row i of every
-array depends on environment i alone, by the same operations for any N: a batch of N gives the bits of N batches of one.
+One step lasts 20 ms, or as the setting `decisions` says. The action sets the stiffness, which is held for all control
+windows of 10 ms in the step; in each window the springs' rest angles, the hips and the knees follow the phase. Row i of
+every array depends on environment i alone, by the same operations for any N: a batch of N gives the bits of N batches
+of one.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -47,12 +48,12 @@ class Biped(ExactState):
         num_envs: number N of bodies.
         num_threads: threads of the physics; any number gives the same bits.
         legs: V sets of leg constants in place of the committed one.
-        variant: (N,) index into `legs` of the set that each body has.
-        rest: (V, SAMPLES, 2) equilibrium of the foot springs in place of the settings' [rad], one for each of `legs`.
+        variant: (N,) index into `legs` of each body's set.
+        rest: (V, SAMPLES, 2) rest angles of the foot springs in place of the settings' [rad], one for each of `legs`.
         model: a custom model, as for `Simulation`.
         slope: constants for slopes in place of the committed ones.
         feet: N pairs, the feet of each body in place of the settings'.
-        right_legs: V sets for the right legs, where they have their own; phase, trunk and speed are held by `legs`.
+        right_legs: V sets of constants for the right legs; phase, trunk and speed still follow `legs`.
     """
 
     tick_dt = CONTROL_WINDOW
@@ -152,7 +153,7 @@ class Biped(ExactState):
 
     @property
     def controlled(self) -> NDArray:
-        """(N, side, 2) whether actions set the stiffness of ankle and toe; others are read as 0. A copy."""
+        """Return (N, side, 2) True where actions set the stiffness of ankle and toe; others are read as 0. A copy."""
         return self.subjects.rows["feet"]["controlled"].astype(bool)
 
     @property
@@ -186,12 +187,12 @@ class Biped(ExactState):
         """Begin a new episode in environments `ids`, walking in single support as people do, or standing.
 
         Args:
-            ids: (K,) which.
-            seeds: K seeds, or generators to draw from; for None the environment goes on with its own generator.
+            ids: (K,) indices.
+            seeds: K seeds, or generators; with None the environment keeps its own generator.
             start: stride phase of the left leg [0, 1), "random" or "standing", in place of the setting.
-            given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of what is set or drawn.
+            given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of set or drawn ones.
 
-        Raises `SpringfootError` for an impossible body, or a standing start where the settings have none.
+        Raises `SpringfootError` for an impossible body, or a standing start that the settings do not allow.
         """
         if len(ids) == 0:
             return
@@ -239,7 +240,7 @@ class Biped(ExactState):
         self._fit(self.subjects.embody(ids, height, mass))
 
     def observe(self) -> NDArray:
-        """Return (N, D) float32 observation at this moment."""
+        """Return the present observation (N, D), float32."""
         return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
@@ -257,7 +258,7 @@ class Biped(ExactState):
         return self._judge(step)
 
     def _decode(self, actions: NDArray, active: NDArray | None) -> "_Step":
-        """Begin a step: the environments that run, and the factors that their actions make of the stiffness."""
+        """Begin a step: return the environments that run, and the factors of their actions on the stiffness."""
         running = self._everyone
         ids = None
         if active is not None and not active.all():
@@ -337,17 +338,17 @@ class Biped(ExactState):
 
 @dataclass(slots=True)
 class _Step:
-    """One step of the batch on its way."""
+    """State of a step that the batch is taking."""
 
     running: NDArray
     """(N,) environments that take the step."""
     ids: NDArray | None
-    """Their indices, None for all."""
+    """Indices of the running environments; None for all."""
     factor: NDArray
     """(N, 4) factors of the actions on the stiffness [-]."""
     walking: NDArray
-    """(N,) environments whose springs and phase move; the others stand or do not run."""
+    """(N,) environments with moving springs and phase; the others stand or do not run."""
     fixed: NDArray
-    """(N,) those of them that take the fixed stiffness."""
+    """(N,) walking environments with the fixed stiffness."""
     window_start: dict[str, NDArray] | None = None
-    """The fields of a `Tick` that are known as a window begins, where someone listens."""
+    """Fields of a `Tick` known at the beginning of a window, if someone listens."""

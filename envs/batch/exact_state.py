@@ -1,4 +1,4 @@
-"""The exact state of a batch, plain arrays and JSON values: to go on later, elsewhere or twice, with the same bits."""
+"""Save and restore the exact state of a batch, as plain arrays and JSON values, to continue with the same bits."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -11,15 +11,15 @@ from springfoot.errors import SpringfootError
 
 
 class ExactState(ABC):
-    """Gives and takes the state of N environments; pickle and deepcopy make the batch anew and stand on the two.
+    """Save and restore the state of N environments; pickle and deepcopy make the batch anew and use both.
 
-    A copy has the arguments and the state of the original, and generators of its own; nobody listens to its ticks.
+    A copy has the arguments and the state of the original, and generators of its own; nothing listens to its ticks.
     """
 
     _arguments: dict[str, Any]
-    """What the batch was made from."""
+    """Arguments that made the batch."""
     _kept: Mapping[str, NDArray]
-    """All that changes, by name: arrays with N rows, of numbers or of records."""
+    """Name -> array with N rows, of numbers or of records, of everything that changes."""
     _random: list[np.random.Generator | None]
     """(N,) the generator of each environment."""
 
@@ -29,7 +29,8 @@ class ExactState(ABC):
 
     @property
     def generators(self) -> list[np.random.Generator | None]:
-        """The generator of each environment, None before its first reset; the list itself, to be changed in place."""
+        """Return the generator of each environment, None before its first reset; the list itself, which may be
+        changed."""
         return self._random
 
     def state(self, ids: NDArray | None = None) -> dict[str, Any]:
@@ -45,9 +46,9 @@ class ExactState(ABC):
     def restore(self, state: Mapping[str, Any], ids: NDArray | None = None) -> None:
         """Put environments `ids` (K,), all if None, into the state of K environments of a batch of the same settings.
 
-        From then on they behave bit for bit like the environments that the state came from. Generators change in place.
-        Raises `SpringfootError`, leaving all state unchanged, for a state of other names, shapes or generators; it
-        holds no settings, and they are not compared.
+        From then on they behave bit for bit like the environments of that state. Generators change in place. Raises
+        `SpringfootError`, leaving all state unchanged, for a state of other names, shapes or generators; a state has no
+        settings, and they are not compared.
         """
         chosen = np.arange(len(self._random)) if ids is None else ids
         numbers = dict(self._numbers())
@@ -81,7 +82,7 @@ class ExactState(ABC):
 
 
 def _fields(name: str, rows: NDArray) -> Iterator[tuple[str, NDArray]]:
-    """Return the numbers in an array of records, to the last level; `name` leads to them."""
+    """Yield the numbers in an array of records, to the last level, by names that begin with `name`."""
     if rows.dtype.names is None:
         yield name, rows
     for field in rows.dtype.names or ():

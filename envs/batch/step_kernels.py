@@ -1,10 +1,10 @@
-"""The compiled calls of a step between two calls of the physics.
+"""Compose the compiled calls of a step between two calls of the physics.
 
     begin_step -> physics -> (next_window -> physics ->) end_step
 
 `begin_step` sets the stiffness and begins the first control window; `next_window` measures one window and begins the
-next; `end_step` measures, judges and observes. Each part stands in the file of its idea. Where a listener wants each
-window, `end_window` and `begin_window` are two calls.
+next; `end_step` measures, judges and observes. Each part stands in the file of its idea. For a listener to each window,
+`end_window` and `begin_window` are two calls.
 
 Arrays travel as plain tuples and get their names inside: numba looks up a plain tuple's type in C, a named one's in
 Python, which costs more than the kernels of one body (`python -m benchmarks.named_tuples`).
@@ -28,7 +28,7 @@ from .step_result import Outcome, report
 
 
 class EnvironmentRows(NamedTuple):
-    """The arrays that are kept of each environment."""
+    """Arrays with the state of each environment."""
 
     controls: NDArray
     """(N,) of `CONTROL_ROW`."""
@@ -94,8 +94,8 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
         tables: `Tables`, as a plain tuple.
         springs: (1,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
-        walking: (N,) bool, environments whose springs and phase move.
-        fixed: (N,) bool, those of them that take the fixed stiffness.
+        walking: (N,) bool, environments with moving springs and phase.
+        fixed: (N,) bool, walking environments with the fixed stiffness.
     """
     stiffen(
         EnvironmentRows(*rows).controls,
@@ -123,7 +123,7 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     Args:
         rows, physics, tables: as of `begin_step`.
         task: (1,) of `TASK_OPTIONS`.
-        walking: (N,) bool, environments whose phase moves.
+        walking: (N,) bool, environments with moving phase.
         running: (N,) bool, environments that took the step; the others get no reward.
         outcome: `Outcome`, as a plain tuple, which is filled.
 

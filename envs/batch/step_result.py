@@ -1,4 +1,4 @@
-"""What one step of the batch returns, and what an evaluation records of each of its control windows."""
+"""Define the result of one step of the batch, and the record of each of its control windows for evaluations."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -42,12 +42,12 @@ INFO = (
     "time",
     "speed",
 )
-"""The names of the numbers of `REPORT`, in order.
+"""Names of the numbers of `REPORT`, in order.
 
-Of each action: `stiffness/` [N m/rad], muscles and a device in their place together, `torque/` [N m] and
-`equilibrium/` [rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J] of the step; `controlled/`, 1
-where the action counts and 0 where it is read as 0. Of each reward term: `reward/`, unweighted. Of each leg: `phase/`
-[0, 1). `time` [s], `speed` [m/s].
+Of each action: `stiffness/` [N m/rad], muscles and a device in their place together, `torque/` [N m] and `equilibrium/`
+[rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J] of the step; `controlled/`, 1 where the action
+counts and 0 where it is read as 0. Of each reward term: `reward/`, unweighted. Of each leg: `phase/` [0, 1). `time`
+[s], `speed` [m/s].
 """
 
 
@@ -86,7 +86,7 @@ def report(rows, controls, bodies, terms, options, values) -> None:
 
 @dataclass(kw_only=True, eq=False)
 class StepResult:
-    """What one step returns; every array has N rows."""
+    """Result of one step; every array has N rows."""
 
     observation: NDArray
     """(N, D) float32."""
@@ -99,7 +99,7 @@ class StepResult:
     values: NDArray
     """(N, len(INFO)) in the order of `INFO`."""
     termination: NDArray
-    """(N,) int, why the episode was terminated, a code of `TERMINATIONS`, 0 where it was not; do not write to it."""
+    """(N,) int reason of a termination, a code of `TERMINATIONS`, 0 for none; do not write to it."""
 
     @property
     def info(self) -> dict[str, NDArray]:
@@ -114,7 +114,7 @@ class StepResult:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tick:
-    """One control window as an evaluation records it; arrays over N, axes as in `Measurement`."""
+    """Record of one control window for an evaluation; arrays over N, axes as in `Measurement`."""
 
     measurement: Measurement
     phase: NDArray
@@ -134,7 +134,7 @@ class Tick:
 def held_control(control: NDArray) -> dict[str, NDArray]:
     """Return `stiffness` and `equilibrium` of a `Tick` from `control` (N, side, joint, 2), K and K theta_eq.
 
-    The rest angle is 0 where there is no K.
+    The rest angle is 0 if K is 0.
     """
     stiffness, drive = np.moveaxis(control, -1, 0)
     rest = np.divide(drive, stiffness, out=np.zeros_like(drive), where=stiffness > 0.0)
@@ -163,13 +163,12 @@ def empty_outcome(num: int) -> Outcome:
 
 
 def report_start(m: Measurement, leg_phase: NDArray, controlled: NDArray) -> NDArray:
-    """`StepResult.values` before an episode's first step: what is `controlled`, the phases and the speed, all else 0,
-    as nothing acts yet.
+    """Return `StepResult.values` before an episode's first step: `controlled`, phases and speed; all else is 0.
 
     Args:
         m: the measurement right after the reset.
         leg_phase: (N, side) stride phase of each leg [0, 1).
-        controlled: (N, side, 2) whether actions set the stiffness of ankle and toe.
+        controlled: (N, side, 2) True where actions set the stiffness of ankle and toe.
     """
     values = np.zeros((len(leg_phase), len(INFO)))
     rows = values.view(REPORT)[:, 0]

@@ -1,4 +1,6 @@
-"""The loop over a walk that recordings, searches, training's evaluations and the live page share."""
+"""Walk a batch to the end of its episodes: the loop of recordings, searches, training's evaluations and the live
+page.
+"""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple

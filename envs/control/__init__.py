@@ -1,4 +1,4 @@
-"""The control of the body: stiffness of ankles and toes, rest angles, hips and knees, standing."""
+"""Control the body: stiffness of ankles and toes, rest angles, hips and knees, standing."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Tuned constants of the leg controller (`envs.control.legs`): committed sets, interpolated over speed."""
+"""Read the tuned constants of the leg controller (`envs.control.legs`): committed sets, interpolated over speed."""
 
 import json
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from springfoot.files.json_file import MOST_JSON_BYTES
 from springfoot.files.text_table import read_bytes
 
 TUNED_SPEED = 1.2
-"""Speed [m/s] at 1.70 m of the constants whose name gives no speed."""
+"""Speed [m/s] at 1.70 m of the constants without a speed in their name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,15 +29,15 @@ class LegConstants:
     ankle_knots_deg: tuple[float, ...]
     """Added to the target's ankle angle at `envs.control.legs.KNOTS` in the planned equilibrium [deg]."""
     hip_stiffness: tuple[float, float]
-    """Stance, swing [N m/rad]."""
+    """Stiffness of the hip in stance, in swing [N m/rad]."""
     knee_stiffness: tuple[float, float]
-    """Stance, swing [N m/rad]."""
+    """Stiffness of the knee in stance, in swing [N m/rad]."""
     feedforward: tuple[float, float, float]
-    """Share of the target's hip, knee, ankle moment that is fed forward."""
+    """Fraction of the target's hip, knee and ankle moment that is fed forward."""
     period_factor: float
-    """Period of the phase against the plan's stride time."""
+    """Period of the phase over the plan's stride time."""
     period_speed_gain: float
-    """The phase runs faster by this share for each m/s that the body is too fast [s/m]."""
+    """Relative increase of the phase's rate for each m/s that the body is too fast [s/m]."""
     trunk_pitch_deg: float
     """Held trunk pitch [deg]."""
     trunk_stiffness: float
@@ -59,13 +59,13 @@ class LegConstants:
     toe_schedule: float
     """Fixed toe stiffness [N m/rad]."""
     swing_place_gain: float = 0.0
-    """Shift of the swing hip's target for each m that the CoM is farther ahead of the stance ankle than planned; only a
-    body that follows its plan has it [rad/m]."""
+    """Shift of the swing hip's target for each m that the CoM is farther ahead of the stance ankle than planned; 0
+    unless the body follows its plan [rad/m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SlopeConstants:
-    """What a slope adds to targets of the leg controller, per radian of slope; the same for every body and speed.
+    """Change of the leg controller's targets on a slope, per radian of slope; the same for every body and speed.
 
     A joint has three coefficients: of 1, and of cosine and sine of 2 pi x stride phase.
     """
@@ -75,7 +75,7 @@ class SlopeConstants:
     knee: tuple[float, float, float]
     """Added to the knee's target."""
     ankle: tuple[float, float, float]
-    """Added to the ankle's rest angle where that follows the stride."""
+    """Added to the ankle's rest angle if that follows the stride."""
     trunk: float
     """Added to the held trunk pitch."""
 
@@ -105,7 +105,7 @@ def leg_constants(
 ) -> LegConstants:
     """Return the constants for a setting at `speed` [m/s at 1.70 m], the committed ones or those of `file`.
 
-    They are linear between the speeds of the sets there; beyond those speeds the nearest set holds. Raises
+    Constants are linear in speed between the sets of the file; outside their speeds the nearest set holds. Raises
     `SpringfootError` for a setting without a set.
     """
     name = constants_name(equilibrium, cadence, feedforward=feedforward, follows_plan=follows_plan)
@@ -125,7 +125,7 @@ def leg_constants(
 
 
 def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
-    """Constants at `speed` [m/s], linear between the `sets` by speed; beyond them, those of the nearest set."""
+    """Return the constants at `speed` [m/s], linear between the `sets` by speed; outside, those of the nearest set."""
     speeds = sorted(sets)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
     lower = sets[speeds[int(place)]]
@@ -141,7 +141,7 @@ def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstan
 
 
 def constants_from(values: dict[str, Any]) -> LegConstants:
-    """`LegConstants` from its JSON form (lists for tuples)."""
+    """Return `LegConstants` from its JSON form (lists for tuples)."""
     return LegConstants(**_tupled(values))
 
 
@@ -151,7 +151,7 @@ def slope_constants() -> SlopeConstants:
 
 
 def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
-    """`SlopeConstants` from its JSON form (lists for tuples)."""
+    """Return `SlopeConstants` from its JSON form (lists for tuples)."""
     return SlopeConstants(**_tupled(values))
 
 

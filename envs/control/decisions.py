@@ -1,4 +1,4 @@
-"""Which actions take effect, and when: in every step or at gait events only; those of the ankle, the toe or both."""
+"""Decide the actions that take effect: in every step or at gait events only; of the ankle, the toe or both."""
 
 from math import isfinite
 
@@ -22,7 +22,7 @@ def gait_events(target: HumanGait) -> NDArray:
 
 @kernel
 def _take(actions, running, events, rows):
-    """Decide what takes effect.
+    """Decide the actions that take effect.
 
     Args:
         actions: (N, 4) as given.
@@ -58,15 +58,15 @@ def _take(actions, running, events, rows):
 
 
 class DecisionTimes:
-    """Decides which actions of N bodies take effect in a step.
+    """Decide the actions of N bodies that take effect in a step.
 
-    With `decisions="event"` events are read from the leg's phase. A touchdown sets the phase to 0, so the heel strike
-    is that of the foot itself, and a foot that bounces does not decide again. Other events lie at the target's phases.
+    With `decisions="event"` the leg's phase tells the events. A touchdown sets the phase to 0, so the heel strike is
+    that of the foot itself, and a foot that bounces does not decide again. Other events lie at the target's phases.
 
     Args:
-        settings: when stiffness is decided.
-        target: the gait whose events count.
-        rows: (N,) of `CONTROL_ROW`, which tell whose stiffness.
+        settings: times and joints of decisions.
+        target: gait with the events.
+        rows: (N,) of `CONTROL_ROW`, with the joints that actions set.
     """
 
     def __init__(self, settings: BipedSettings, target: HumanGait, rows: NDArray):
@@ -77,11 +77,14 @@ class DecisionTimes:
         """(N, 4) the actions that take effect, in [-1, 1]."""
 
     def reset(self, ids: NDArray) -> None:
-        """Let the next actions of bodies `ids` (K,) take effect whatever the phase."""
+        """Let the next actions of bodies `ids` (K,) take effect at any phase."""
         self._own["stage"][ids] = -1
         self._own["last_action"][ids] = 0.0
 
     def take(self, actions: NDArray, running: NDArray) -> NDArray | None:
-        """Return the actions that take effect, (N, 4): those given, clipped to [-1, 1]; legs at no event and bodies not
-        `running` (N,) keep their last ones. None, leaving all state unchanged, for a number that is not finite."""
+        """Return the actions that take effect, (N, 4): `actions` clipped to [-1, 1].
+
+        Legs at no event, and bodies that are not `running` (N,), keep their last actions. Returns None, leaving all
+        state unchanged, for a number that is not finite.
+        """
         return self.action if _take(actions, running, self._events, self._rows) else None

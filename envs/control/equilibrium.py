@@ -1,4 +1,4 @@
-"""Equilibrium angles of ankle and toe springs, and their stiffness where no action sets it: curves over the stride."""
+"""Compute rest angles of ankle and toe springs, and their stiffness without an action: curves over the stride."""
 
 from collections.abc import Iterable
 
@@ -17,8 +17,8 @@ from .reference_walk import ReferenceWalk
 
 _PEOPLES = foot_habits()
 PLATEAUS = _PEOPLES.plateaus
-"""Stride phases at which loading, early stance, late stance, push-off and swing start and end. On them `plateau_curve`
-is constant, between them linear; chosen near people's."""
+"""Stride phases at which loading, early stance, late stance, push-off and swing start and end. `plateau_curve` is
+constant on them and linear between them; chosen near people's."""
 REFERENCE_STIFFNESS = _PEOPLES.ankle_quasi_stiffness or ()
 """K_ref [N m/rad] on the plateaus, for 1.70 m and 63 kg: people's ankle quasi-stiffness by phase, of the package's own
 file (`springfoot.gait.people.human`)."""
@@ -49,8 +49,11 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
 
 
 def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> tuple[NDArray, NDArray]:
-    """Return (R, SAMPLES, 2 or 4) equilibrium and, where fed, torques behind it (`foot_feed`), and (R, SAMPLES, 2)
-    scheduled stiffness, for each row of the tables."""
+    """Return rest angles and scheduled stiffness for each row of the tables.
+
+    Rest angles are (R, SAMPLES, 2), with torques beside the springs (`foot_feed`) (R, SAMPLES, 4); stiffness is (R,
+    SAMPLES, 2).
+    """
     rests = []
     stiffnesses = []
     for constants, walk in rows:
@@ -62,19 +65,17 @@ def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, Refe
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
-    """Return (SAMPLES, 2) ankle and toe stiffness [N m/rad] of the fixed schedule, which was tuned together with the
-    legs."""
+    """Return ankle and toe stiffness (SAMPLES, 2) [N m/rad] of the fixed schedule, which was tuned with the legs."""
     toe = np.full(len(GRID), constants.toe_schedule)
     return np.stack([plateau_curve(constants.ankle_schedule, plateaus), toe], axis=-1) * body.stiffness_scale
 
 
 def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """Return (SAMPLES, 2) equilibrium [rad] that follows the target's ankle and feeds a moment forward through its
-    K_ref.
+    """Return rest angles (SAMPLES, 2) [rad] that follow the target's ankle and feed a moment forward through its K_ref.
 
     theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
-    times the moment M of the walk (plantarflexion positive). The toe's equilibrium is the tuned angle from foot flat to
-    toe-off, and that in swing otherwise. A plan has no K_ref: theta_eq is its ankle and toe alone, each ahead by beta,
+    times the moment M of the walk (plantarflexion positive). The toe's rest angle is the tuned one from foot flat to
+    toe-off, and that of swing otherwise. A plan has no K_ref: theta_eq is its ankle and toe alone, each ahead by beta,
     and its moments are fed forward beside the spring (`foot_feed`).
     """
     body = walk.body
@@ -95,8 +96,10 @@ def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
 
 
 def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> NDArray | None:
-    """Return (SAMPLES, 2) torque [N m], dorsiflexion positive, that acts beside the springs of ankle and toe whatever
-    their K; None where none is asked for."""
+    """Return the torque (SAMPLES, 2) [N m], dorsiflexion positive, beside the springs of ankle and toe at any K.
+
+    None unless the settings feed the plan's moments forward.
+    """
     if settings.equilibrium != "planned" or walk.target.foot.ankle_quasi_stiffness is not None:
         return None
     unit = walk.body.total_mass * walk.body.length_scale
@@ -105,12 +108,12 @@ def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceW
 
 
 def angle(target: HumanGait) -> NDArray:
-    """Return (SAMPLES, 2) equilibrium [rad]: the target's ankle angle alone, and the planned toe."""
+    """Return rest angles (SAMPLES, 2) [rad]: the target's ankle angle alone, and the planned toe."""
     return np.stack([target.mean("ankle", GRID), _toe(target.foot, 0.0)], axis=-1)
 
 
 def neutral(constants: LegConstants) -> NDArray:
-    """Return (SAMPLES, 2) equilibrium [rad]: constant."""
+    """Return constant rest angles (SAMPLES, 2) [rad]."""
     return np.tile(np.deg2rad(constants.neutral_deg), (len(GRID), 1))
 
 

@@ -1,4 +1,4 @@
-"""What the control keeps of the feet: muscles or a device at each ankle and toe, in rows and tables for kernels."""
+"""Tabulate the feet for the control's kernels: muscles or a device at each ankle and toe."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -16,20 +16,20 @@ from .state import FOOT, PLACE
 
 
 class FootLines(NamedTuple):
-    """What devices do that no constant stiffness says, for all feet of a batch; none for feet of other kinds."""
+    """Tables of devices without a constant stiffness, for all feet of a batch; empty for feet of other kinds."""
 
     lines: NDArray
-    """(L, points, 3) torque-angle lines: angle [rad], torque [N m], and how it falls from there on [N m/rad]. Points
-    that a line has not lie at infinity."""
+    """(L, points, 3) torque-angle lines: angle [rad], torque [N m], and its fall from there on [N m/rad]. Missing
+    points of shorter lines lie at infinity."""
     curves: NDArray
-    """(S, SAMPLES, 2, 4) K [N m/rad] and theta_eq [rad] over the stride, ankle and toe of each, of a `PhaseTable`."""
+    """(S, SAMPLES, 2, 4) K [N m/rad] and theta_eq [rad] of ankle and toe over the stride, of a `PhaseTable`."""
 
 
 @part
 def device(row, feet, theta, side, joint) -> Any:
-    """K and K theta_eq of what is in place of muscles: by its line at the angle `theta`, its schedule, or its numbers.
+    """Return K and K theta_eq of a device: by its line at the angle `theta`, its schedule, or its numbers.
 
-    A line goes on straight beyond its ends. `row` is of `CONTROL_ROW`, `feet` are `FootLines` as a plain tuple.
+    A line continues straight beyond its ends. `row` is of `CONTROL_ROW`, `feet` are `FootLines` as a plain tuple.
     """
     (lines, curves), foot = feet, row.feet
     if foot.line[side, joint] >= 0:
@@ -96,5 +96,5 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
 
 
 def controlled_joints(settings: BipedSettings) -> NDArray:
-    """Return (side, 2) whether actions set the stiffness of ankle and toe; others are read as 0."""
+    """Return (side, 2) True where actions set the stiffness of ankle and toe; other actions are read as 0."""
     return foot_rows(settings, [settings.feet])["controlled"][0].astype(bool)

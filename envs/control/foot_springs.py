@@ -1,8 +1,8 @@
-"""From actions to stiffness to control of the ankle and toe springs: tau = K (theta_eq - theta - beta dtheta/dt).
+"""Turn actions into stiffness, and stiffness into control of ankle and toe: tau = K (theta_eq - theta - beta
+dtheta/dt).
 
-The springs of muscles have the K of the actions or of the schedule; a device in their place has its own, always.
-
-What each ankle and toe has is (side, 2), the last axis being ankle and toe; flattened, it is in the order of `ACTIONS`.
+The springs of muscles have the K of the actions or of the schedule; a device in their place has its own, always. Arrays
+(side, 2) have ankle and toe along the last axis; flattened, they are in the order of `ACTIONS`.
 """
 
 from collections.abc import Sequence
@@ -24,39 +24,36 @@ from .state import PLACE
 from .subjects import Subjects
 
 FEET = slice(ANKLE, None)
-"""Ankle and toe along the joint axis: the joints whose stiffness an action sets."""
+"""Ankle and toe along the joint axis: the joints with stiffness set by an action."""
 
 
 def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
-    """Lowest and highest stiffness of this body [N m/rad], each (2,) for ankle and toe."""
+    """Return lowest and highest stiffness of this body [N m/rad], each (2,) for ankle and toe."""
     low, high = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
     return low * body.stiffness_scale, high * body.stiffness_scale
 
 
 def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArray:
-    """Stiffness (..., 2) of ankle and toe [N m/rad] for actions in [-1, 1] in absolute mode, on a log scale."""
+    """Return stiffness (..., 2) of ankle and toe [N m/rad] for actions in [-1, 1] in absolute mode, on a log scale."""
     middle, factor = _log_scale(settings, body)
     return middle * factor**action
 
 
 def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
-    """Stiffness at action 0 [N m/rad], and the factor between it and the stiffness at action 1."""
+    """Return stiffness at action 0 [N m/rad], and the factor from there to the stiffness at action 1."""
     low, high = stiffness_ranges(settings, body)
     return np.sqrt(low * high), np.sqrt(high / low)
 
 
 def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDArray:
-    """Return the action in [-1, 1] that gives a stiffness (..., 2) [N m/rad].
-
-    Beyond the range, that of the nearer end.
-    """
+    """Return the action in [-1, 1] that gives a stiffness (..., 2) [N m/rad]; outside the range, the nearer end."""
     low, high = stiffness_ranges(settings, body)
     value = np.clip(np.asarray(stiffness, float), low, high)
     return 2.0 * np.log(value / low) / np.log(high / low) - 1.0
 
 
 def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
-    """Control windows from the request of a stiffness until it acts, in one episode; drawn if the settings say so."""
+    """Return the control windows from the request of a stiffness until it acts, in one episode; drawn if so set."""
     if settings.stiffness_delay_range_s is None:
         return round(settings.stiffness_delay_s / CONTROL_WINDOW)
     shortest, longest = (round(delay / CONTROL_WINDOW) for delay in settings.stiffness_delay_range_s)
@@ -71,7 +68,7 @@ SPRING_OPTIONS = np.dtype(
         ("held", np.int64),  # 1 if the rest angles are those of the phases at which K was set
     ]
 )
-"""How settings and body of the tables make springs."""
+"""Numbers of the settings, and of the tables' body, that springs need."""
 
 
 @part
@@ -85,8 +82,8 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
         bodies: (N,) of `BODY_ROW`, as measured now.
         schedule: (R, SAMPLES, 2, 2) fixed stiffness of ankle and toe [N m/rad], of a `PhaseTable`.
         options: (1,) of `SPRING_OPTIONS`.
-        factor: (N, 4) what the actions make of the stiffness [-].
-        walking: (N,) bool; the springs of the others do not change.
+        factor: (N, 4) factors of the actions on the stiffness [-].
+        walking: (N,) bool; the springs of other bodies do not change.
         fixed: (N,) bool, the bodies that take the schedule in place of the action's stiffness.
     """
     scheduled = np.empty(2)
@@ -134,14 +131,14 @@ def _arrive(own, angle):
 
 @part
 def _swings(row, force, side):
-    """Return whether a leg swings: past mid-stride and unloaded."""
+    """Tell whether a leg swings: past mid-stride and unloaded."""
     load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]
     return row.legs.phase[side] > 0.5 and load < row.legs.gains.touchdown
 
 
 @part
 def muscle_stiffness(springs, side, joint) -> float:
-    """Return K of the muscles at one joint as it acts [N m/rad], 0 while they are slack or a device is in their place.
+    """Return the acting K of the muscles at one joint [N m/rad], 0 while they are slack or a device replaces them.
 
     `springs` is of `SPRING_STATE`. The reward charges this K alone; the control and `info` hold the muscles' and the
     device's together.
@@ -164,11 +161,11 @@ def _control(row, control, feet, theta, side, joint):
 
 @part
 def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
-    """Begin a control window: K and K theta_eq of ankles and toes go into the control.
+    """Begin a control window: put K and K theta_eq of ankles and toes into the control.
 
-    K is the stiffness whose delay is over, theta_eq the rest angle of the legs' phases or the foot's own. Moving the
-    rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack
-    as the leg begins to swing lose what they held. A device has its own K and theta_eq.
+    K is the requested stiffness of `delay` windows ago, theta_eq the rest angle at the legs' phases or the foot's own.
+    Moving the rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles
+    that go slack as the leg begins to swing lose their stored energy. A device has its own K and theta_eq.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
@@ -176,10 +173,10 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
         rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; with 4, the last two are
             torques [N m] that act beside the springs: each shifts the rest angle by torque / K.
-        incline: (1, SAMPLES, 2, 4) what a slope adds to them, per radian (`envs.control.legs.slope_table`).
+        incline: (1, SAMPLES, 2, 4) their change on a slope, per radian (`envs.control.legs.slope_table`).
         feet: `envs.control.foot_rows.FootLines`, as a plain tuple.
         options: (1,) of `SPRING_OPTIONS`.
-        walking: (N,) bool; the springs of the others do not change.
+        walking: (N,) bool; the springs of other bodies do not change.
     """
     wanted = np.empty(rest.shape[-1])
     inclined = np.empty(4)
@@ -258,11 +255,11 @@ def _hold(rows, bodies, control, feet, held):
 
 
 class FootSprings:
-    """The ankle and toe springs of N bodies, and the work that is done by changing them.
+    """The ankle and toe springs of N bodies, and the work of changing them.
 
     Args:
         settings: ranges of stiffness and action mode.
-        body: the body that the tables are for.
+        body: the body of the tables.
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables; or (R, SAMPLES,
             4), torques beside the springs [N m] behind them.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.

@@ -1,10 +1,9 @@
-"""The phase of the gait, and the hips and knees, which no action sets.
+"""Control the phase of the gait, and the hips and knees, which no action sets.
 
 Each hip and knee is a spring like the ankle (variable impedance) around the target's curves at the walking speed, with
-its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The
-constants of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by
-`springfoot study slope-tuning` (command and seed stand in that file).
-Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
+its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The constants
+of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by `springfoot study slope-tuning` (command
+and seed stand in that file). Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
 """
 
 from collections.abc import Sequence
@@ -34,15 +33,15 @@ TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
 TOUCHDOWN_PHASE = 0.80
 """A touchdown before this stride phase of the leg is a scuff, not a step; chosen."""
 SLOWEST = -0.1
-"""Error of the speed below which gains see no more of it [m/s]; chosen: a body that sets off, or that its springs keep
-slow, is far slower than the plan for many steps, and with all of its error the legs would trip it."""
+"""Error of the speed [m/s] at which the gains' input is clipped; chosen: a body that sets off, or that its springs keep
+slow, is far slower than the plan for many steps, and its full error would make the legs trip it."""
 FARTHEST = 0.1
-"""Error of the CoM's place over the stance foot beyond which gains see no more of it [m at 1.70 m]; chosen, as
+"""Error of the CoM's position over the stance foot [m at 1.70 m] at which the gains' input is clipped; chosen, as
 `SLOWEST`."""
 PLANNED_SPEED, PLANNED_PLACE = 5, 6
 """Columns of `leg_curves`."""
 HOLD = 0.001
-"""A leg's phase waits at 1 minus this until its foot touches down; chosen, small against a window's 0.009."""
+"""Distance below 1 at which a leg's phase waits until its foot touches down; chosen, small against a window's 0.009."""
 
 
 def knot_curve(knots_deg: Sequence[float]) -> NDArray:
@@ -51,7 +50,8 @@ def knot_curve(knots_deg: Sequence[float]) -> NDArray:
 
 
 def slope_table(constants: SlopeConstants) -> PhaseTable:
-    """Return the slope's share in hip, knee, ankle and held trunk pitch over the stride, per radian: (SAMPLES, 4)."""
+    """Return the change of hip, knee, ankle and held trunk pitch on a slope, over the stride, per radian: (SAMPLES,
+    4)."""
     cosine = np.cos(2 * np.pi * GRID)
     sine = np.sin(2 * np.pi * GRID)
     joints = [a + b * cosine + c * sine for a, b, c in (constants.hip, constants.knee, constants.ankle)]
@@ -89,13 +89,13 @@ def _follow(constants, rows):
 
 @part
 def _too_fast(m, row):
-    """Error of the CoM's forward speed against the plan [m/s], as the gains see it."""
+    """Return the error of the CoM's forward speed against the plan [m/s], clipped for the gains."""
     return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
 
 
 @part
 def drive(rows, bodies, control, table, incline) -> None:
-    """Begin a control window: stiffness [N m/rad] and drive torque [N m] of hips and knees go into the control.
+    """Begin a control window: put stiffness [N m/rad] and drive torque [N m] of hips and knees into the control.
 
     Args:
         rows: (N,) of `CONTROL_ROW`.
@@ -139,20 +139,20 @@ def drive(rows, bodies, control, table, incline) -> None:
 
 @part
 def _load(force):
-    """Vertical force [N] on a foot whose contacts carry `force` (3, 2), forward and up."""
+    """Return the vertical force [N] on a foot from its contacts' forces (3, 2), forward and up."""
     return force[0, 1] + force[1, 1] + force[2, 1]
 
 
 @part
 def advance(rows, bodies, walking) -> None:
-    """Let one window pass.
+    """Advance the phase by one window.
 
     The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; the phase of the legs is changed.
         bodies: (N,) of `BODY_ROW`, as measured at the window's end.
-        walking: (N,) bool; the phase of the others waits.
+        walking: (N,) bool; the phase of other bodies waits.
     """
     for i in range(len(rows)):
         if not walking[i]:
@@ -226,8 +226,11 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """Return (SAMPLES, 7) stance weight, hip and knee stiffness [N m/rad], hip and knee drive torque [N m], the planned
-    CoM's forward speed over its mean, and how far it is ahead of the other leg's ankle [m]."""
+    """Return the leg's curves (SAMPLES, 7) over the stride.
+
+    Stance weight; hip and knee stiffness [N m/rad]; hip and knee drive torque [N m]; the planned CoM's forward speed
+    over its mean; the planned distance of the CoM ahead of the other leg's ankle [m].
+    """
     body = walk.body
     target = walk.target
     fall_from, fall_to = STANCE_FALL

@@ -1,7 +1,7 @@
-"""The leg constants of each side: the committed ones, or those of a person who has adapted to a foot of the settings.
+"""Return the leg constants of each side: the committed ones, or those of a person who has adapted to a foot.
 
-An adapted person differs from the committed constants by what was found at one speed or more: that difference is linear
-between those speeds and the same beyond them.
+The search for an adapted person gives a difference from the committed constants at one speed or more; the difference is
+linear between those speeds and constant outside them.
 """
 
 from collections.abc import Mapping
@@ -21,14 +21,14 @@ HELD_BY_SOUND = (
     *("period_factor", "period_speed_gain", "trunk_pitch_deg", "trunk_stiffness", "trunk_damping", "speed_torque"),
     *("swing_speed_gain", "swing_place_gain"),
 )
-"""Constants of phase, trunk and speed, which both legs share: the sound leg's."""
+"""Constants of phase, trunk and speed, which both legs take from the sound leg."""
 _LEAST = dict.fromkeys(("hip_stiffness", "knee_stiffness", "ankle_schedule", "toe_schedule"), 1.0)
 
 
 def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
-    """Side of the foot to which the person has adapted, and its `adapted`; None for a person who has not.
+    """Return the side of the foot to which the person has adapted, and its `adapted`; None without such a foot.
 
-    Raises `SpringfootError` where both feet have it, and for settings other than those the legs were found in.
+    Raises `SpringfootError` if both feet have one, and for settings other than those of the search.
     """
     feet = settings.left_foot, settings.right_foot
     found = [(side, foot.adapted) for side, foot in enumerate(feet) if foot.adapted is not None]

@@ -1,4 +1,4 @@
-"""Stride phases, and curves over the stride that are tabulated once and read at many phases."""
+"""Tabulate curves over the stride once, and read them at many phases."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ GRID = np.arange(SAMPLES) / SAMPLES
 
 
 def leg_phases(left: NDArray) -> NDArray:
-    """Return (N,) stride phase of the left leg -> (N, side) of both, half a stride apart, in [0, 1)."""
+    """Return (N, side) stride phases of both legs, half a stride apart, in [0, 1), from those of the left leg (N,)."""
     return np.stack([left, (left + 0.5) % 1.0], axis=-1)
 
 
@@ -73,7 +73,7 @@ class PhaseTable:
         """(R, SAMPLES, value and rise, C); do not write to it."""
 
     def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
-        """Curves (..., C) at phases (...) in [0, 1); with `place` (N,) of dtype `PLACE`, phases are (N, ...)."""
+        """Return curves (..., C) at phases (...) in [0, 1); with `place` (N,) of dtype `PLACE`, phases are (N, ...)."""
         phase = np.asarray(phase, float, order="C")
         curves = np.empty((*phase.shape, self.table.shape[-1]))
         _read_all(self.table, place, phase.reshape(-1), curves.reshape(-1, curves.shape[-1]))

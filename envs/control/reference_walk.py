@@ -1,4 +1,4 @@
-"""What a body is asked to do: target, plan and leg constants, tabulated at a few speeds of one body.
+"""Tabulate the reference of a body at a few speeds: target, plan and leg constants.
 
 The body is that of the settings. Between two tabulated speeds everything is linear in speed. Since mechanics scale
 exactly (`envs.physics.model`), another body at a Froude-equal speed does the same in its own units
@@ -30,26 +30,26 @@ from .phase_table import GRID
 from .standing import SLOW_SPEED
 
 SPACING = 0.1
-"""Distance of tabulated speeds [m/s at 1.70 m, scaled with the square root of height]; chosen: half-way between them,
-the interpolated CoM is within 1.4 mm of the one planned for that speed, and farthest where people's data meet."""
+"""Distance of tabulated speeds [m/s at 1.70 m, scaled with the square root of height]; chosen: half-way between them
+the interpolated CoM is within 1.4 mm of the planned one, and farthest where people's data meet."""
 
 
 FED = ("hip", "knee", "ankle")
-"""Joints to which a moment is fed forward."""
+"""Joints with a moment that is fed forward."""
 FED_HARMONICS = 8
 """Fourier terms of the plan's moments that are fed forward; chosen: as its contacts are stiff, its moments jump."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReferenceWalk:
-    """One speed of the settings' body."""
+    """Reference of the settings' body at one speed."""
 
     body: Body
     """The settings' body."""
     speed: float
     """Walking speed [m/s]."""
     target: HumanGait
-    """The gait that the body follows: people's, or the plan's own where the guide is the plan."""
+    """Gait that the body follows: people's, or the plan's own with guide `plan`."""
     plan: ComPlan
     """The planned motion of the CoM, over people's ZMP where the body follows people, and the time of a stride."""
     constants: tuple[LegConstants, ...]
@@ -61,7 +61,7 @@ class ReferenceWalk:
 def walks_of_legs(
     settings: BipedSettings, left: Sequence[LegConstants] | None = None, right: Sequence[LegConstants] | None = None
 ) -> tuple[tuple[ReferenceWalk, ...], tuple[ReferenceWalk, ...]]:
-    """Return the walks of both legs, and those of the right leg where it has constants of its own, else none.
+    """Return the walks of both legs, and those of the right leg if it has constants of its own, else none.
 
     `left` and `right` are leg constants in place of the committed ones, as in `reference_walks`.
     """
@@ -72,10 +72,9 @@ def walks_of_legs(
 def reference_walks(
     settings: BipedSettings, legs: Sequence[LegConstants] | None = None, side: int = LEFT
 ) -> tuple[ReferenceWalk, ...]:
-    """Return the walks of the settings' body at the speeds of `tabulated_speeds`, slowest first, with the leg of
-    `side`.
+    """Return the walks of the settings' body at `tabulated_speeds`, slowest first, with the leg of `side`.
 
-    `legs` are leg constants in place of the committed ones, and the same at every speed. Raises `SpringfootError` for a
+    `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
     """
     return tuple(reference_walk_at(settings, float(speed), legs, side) for speed in tabulated_speeds(settings))
@@ -111,7 +110,7 @@ def reference_walk_at(
 
 
 def _moments_of(gait: HumanGait, body: Body) -> NDArray:
-    """Return (SAMPLES, 3) `ReferenceWalk.moments` as they are in a gait."""
+    """Return (SAMPLES, 3) `ReferenceWalk.moments` of a gait."""
     moments = [gait.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
@@ -132,10 +131,9 @@ def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, Referen
 
 
 def tabulated_speeds(settings: BipedSettings) -> NDArray:
-    """Return (G,) ascending speeds [m/s] of the settings' body, up to the Froude equals of all that the settings can
-    ask for.
+    """Return (G,) ascending speeds [m/s] of the settings' body that cover all Froude speeds of the settings.
 
-    Without ranges that is the settings' speed alone. With ranges it is the multiples of `SPACING` that enclose them,
+    Without ranges this is the settings' speed alone. With ranges it is the multiples of `SPACING` that enclose them,
     and the settings' speed.
     """
     height = settings.height

@@ -1,15 +1,16 @@
-"""Standing, setting off and stopping: the springs that hold a body while it does not walk.
+"""Stand, set off and stop: springs hold a body while it does not walk.
 
-Before a walk both feet stand side by side, and every joint is a stiff spring. The ankles' rest angle keeps the CoM at
-its place over the feet; the hips keep the trunk upright. To set off, that place moves ahead until the body falls
-forward at `OFF_SPEED`; then the body walks, slowly at first. To stop, the commanded speed goes down to `SLOW_SPEED`;
-soon after the next touchdown the same springs hold the body as it is, one foot ahead of the other. Ankle and toe
-stiffness are those of these springs while the body stands, and those of the fixed schedule while it sets off and slows
-down. A policy acts in the steady walk between, which is all it has learnt.
+Before a walk both feet stand side by side, and every joint is a stiff spring. The ankles' rest angle keeps the CoM in
+place over the feet; the hips keep the trunk upright. To set off, that place moves ahead until the body falls forward at
+`OFF_SPEED`; then the body walks, slowly at first. To stop, the commanded speed goes down to `SLOW_SPEED`; soon after
+the next touchdown the same springs hold the body as it is, one foot ahead of the other. Ankle and toe stiffness are
+those of these springs while the body stands, and those of the fixed schedule while it sets off and slows down. A policy
+acts in the steady walk between, the only part of an episode that it has learnt.
 
 Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`). Unless a
 source is given they were chosen by trial: bodies set off, walk and come to rest with them
-(`tests/envs/control/test_standing.py`)."""
+(`tests/envs/control/test_standing.py`).
+"""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -36,46 +37,47 @@ BALANCE = 2.0
 TRUNK_STIFFNESS, TRUNK_DAMPING = 750.0, 140.0
 """Torque of each hip against the pitch of the trunk [N m/rad] and against its rate [N m s/rad]."""
 TRUNK_FREE = 0.8
-"""Share of the trunk's pitch that the hips' rest angle follows [-]: 0 holds thighs to the trunk, 1 to the vertical."""
+"""Fraction of the trunk's pitch that the hips' rest angle follows [-]: 0 holds thighs to the trunk, 1 to the
+vertical."""
 
 STAND_SECONDS = (0.8, 1.2)
 """Time of standing before the body sets off, drawn from this range [s]."""
 STAND_KNEE = (0.05, 0.12)
-"""Flexion of both knees while it stands, drawn from this range [rad]."""
+"""Flexion of both knees in standing, drawn from this range [rad]."""
 STAND_COM = 0.04
 """Place of the CoM ahead of the ankles [m]: people's, about the middle of the foot."""
 LEAN, LEAN_SECONDS = 0.30, 0.5
-"""How far the place of the CoM moves ahead to set off [m], and within what time [s]."""
+"""Distance by which the place of the CoM moves ahead to set off [m], and the time of that move [s]."""
 OFF_SPEED, OFF_PHASE = 0.30, 0.16
 """Forward speed of the CoM at which the body begins to walk [m/s], and the stride phase of its stance leg then [-]."""
 OFF_SECONDS, EARLY_SECONDS = 1.0, 2.0
 """Longest time from the start of the lean to the start of the walk [s]; least time of walking with the fixed stiffness,
 which lasts until the commanded speed is reached [s]."""
 SLOW_SPEED = 0.9
-"""Commanded speed as the body sets off, and that to which it slows down before it stops [m/s]."""
+"""Commanded speed at setting off, and at the end of slowing down before a stop [m/s]."""
 LANDED = (0.015, 0.06)
-"""Stride phases of the leg that has landed between which a body stops [-], some 20 ms after touchdown."""
+"""Stride phases of the landed leg between which a body stops [-], some 20 ms after touchdown."""
 STOP_COM, STOP_PITCH = -0.05, 0.05
-"""Place of the CoM ahead of mid-way between the ankles [m], and trunk pitch [rad], of a stopped body."""
+"""Place of the CoM ahead of the middle between the ankles [m], and trunk pitch [rad], of a stopped body."""
 STOP_KNEE = 0.12
-"""How far both knees give way when a body stops [rad]: on stiff legs it would tip over its front foot."""
+"""Flexion by which both knees give way when a body stops [rad]: on stiff legs it would tip over its front foot."""
 HIP_HEIGHT, DRAW_SECONDS = 0.8, 0.5
-"""Height of the hips of a stopped body [m], and the time constant [s] with which they take over what pushes its feet
-apart; without that the feet creep, as friction alone holds them."""
+"""Height of the hips of a stopped body [m], and the time constant [s] with which they take over the force that pushes
+its feet apart; otherwise the feet creep, as friction alone holds them."""
 
 WALKING, STANDING, STARTING, STOPPING, STOPPED = range(5)
 
-"""What a body does: see `Standing.mode`."""
+"""Modes of a body: see `Standing.mode`."""
 
 
 @kernel
 def _switch(rows, bodies, running, time, stop_at):
-    """Change modes whose time has come, and move the CoM's place of bodies that lean.
+    """Change modes at their time, and move the CoM's place of bodies that lean.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `held` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        running: (N,) bool; the others stay as they are.
+        running: (N,) bool; other bodies stay as they are.
         time: (N,) in the episode [s].
         stop_at: time in the episode from which a body stops [s].
 
@@ -123,7 +125,7 @@ def _draw(body, m):
 
 @kernel
 def _drive(rows, bodies, control, standing):
-    """Stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) go into the control.
+    """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into the control.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `held` is changed.
@@ -154,11 +156,11 @@ def _drive(rows, bodies, control, standing):
 
 
 class Standing:
-    """Which of N bodies stand, and the springs that hold them.
+    """Modes of N bodies, and the springs that hold those that stand.
 
     Args:
-        settings: when the bodies stop.
-        subjects: bodies and commanded speeds; it is told the speeds of setting off and stopping.
+        settings: time of the stop.
+        subjects: bodies and commanded speeds; setting off and stopping change these speeds.
     """
 
     def __init__(self, settings: BipedSettings, subjects: Subjects):
@@ -168,7 +170,8 @@ class Standing:
 
     @property
     def mode(self) -> NDArray:
-        """(N,) what each body does: `STANDING`, `STARTING`, `WALKING` steadily, `STOPPING`, `STOPPED`, in this order.
+        """Return (N,) the mode of each body: `STANDING`, `STARTING`, `WALKING` steadily, `STOPPING`, `STOPPED`, in this
+        order.
 
         A body walks in the middle three.
         """
@@ -201,7 +204,7 @@ class Standing:
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
     def switch(self, physics: Physics, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
-        """Before a step at `time` (N,) [s], let those `running` (N,) set off or stop whose time has come.
+        """Let those `running` (N,) set off or stop that are due before a step at `time` (N,) [s].
 
         Returns (N,) the bodies that run and walk, and (N,) those of them that walk with the fixed schedule.
         """
@@ -213,7 +216,7 @@ class Standing:
         return scheduled | (running & (mode == WALKING)), scheduled
 
     def _told(self, before: NDArray, m: Measurement) -> None:
-        """Do what follows from a change of mode since `before` (N,)."""
+        """Command the speeds that follow from changes of mode since `before` (N,)."""
         held = self._held
         subjects = self._subjects
         new = [np.flatnonzero((before != held["mode"]) & (held["mode"] == mode)) for mode in range(5)]
@@ -249,13 +252,13 @@ def steady_walk(settings: BipedSettings) -> tuple[float, float]:
 
 
 def off_phase(drawn: float) -> float:
-    """Stride phase of the left leg with which a body sets off; the stance leg is the one of the `drawn` phase."""
+    """Return the stride phase of the left leg at which a body sets off; the `drawn` phase decides the stance leg."""
     return OFF_PHASE + (0.0 if drawn < 0.5 else 0.5)
 
 
 @lru_cache(maxsize=1024)
 def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
-    """Angles of thigh (to the vertical), knee, ankle and toe [rad] of a standing body with knees bent by `knee` [rad].
+    """Return angles of thigh (to the vertical), knee, ankle and toe [rad] of a standing body with `knee` flexion [rad].
 
     The feet are flat, and the CoM is `STAND_COM` ahead of the ankles.
     """

@@ -1,4 +1,4 @@
-"""What the control keeps of each environment: one row of `CONTROL_ROW`, which its kernels read and write."""
+"""Define the control's row of each environment, `CONTROL_ROW`, which its kernels read and write."""
 
 import numpy as np
 
@@ -7,13 +7,14 @@ from ..physics.timing import CONTROL_WINDOW
 from ..settings.settings import LONGEST_DELAY
 
 FEET = (len(SIDES), 2)
-"""Shape of what each ankle and toe has; flattened, it is in the order of `ACTIONS`."""
+"""Shape of values of each ankle and toe; flattened, they are in the order of `ACTIONS`."""
 
 PLACE = np.dtype([("row", np.int64), ("weight", float)])
-"""Where an environment reads a table of several rows: between `row` and the next one, which has `weight` in [0, 1)."""
+"""Position of an environment in a table of several rows: between `row` and the next one, which has `weight` in [0,
+1)."""
 SCALE = np.dtype([("length", float), ("time", float), ("mass", float), ("torque", float)])
-"""Ratios of a body to that of the settings: of heights; its square root, that of times and speeds; of masses; and of
-mass x height, that of torque and stiffness."""
+"""Ratios of a body to the settings' body: of heights; its square root, that of times and speeds; of masses; and of mass
+x height, that of torque and stiffness."""
 SUBJECT = np.dtype(
     [
         ("height", float),  # of the body [m]
@@ -48,7 +49,7 @@ FOOT = np.dtype(
         ("locked", np.int64, FEET),  # 1 where a device lets the joint not move
     ]
 )
-"""The ankles and toes of one environment: what sets their springs (`envs.control.foot_springs`)."""
+"""The ankles and toes of one environment: muscles and devices (`envs.control.foot_springs`)."""
 SPRING_STATE = np.dtype(
     [
         ("stiffness", float, FEET),  # K of the muscles [N m/rad]
@@ -101,7 +102,7 @@ HELD = np.dtype(
         ("torque", float),  # ratio of mass x height to that of 63 kg and 1.70 m
     ]
 )
-"""How one body is held while it stands (`envs.control.standing`)."""
+"""Springs of one body that hold it while it stands (`envs.control.standing`)."""
 CONTROL_ROW = np.dtype(
     [
         ("subject", SUBJECT),

@@ -1,8 +1,8 @@
-"""Subjects: the body and the commanded speed of each environment of a batch.
+"""Hold the body and the commanded speed of each environment of a batch.
 
 Mechanics scale exactly (`envs.physics.model`). So curves are tabulated for one body, that of the settings, at a few
 speeds (`envs.control.reference_walk`). Each environment has the ratios of its body to that one, and a place in the
-tables between the two speeds that are nearest to being Froude-equal to its own.
+tables between the two speeds nearest to its own Froude speed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from ..settings.settings import BipedSettings, body_of
 from .state import CONTROL_ROW
 
 DRAWN: tuple[str, ...] = ("height", "mass", "speed")
-"""What may be drawn for each environment: settings `<name>_range`, and options of a reset."""
+"""Quantities that can be drawn for each environment: settings `<name>_range`, and options of a reset."""
 MOST_DRAWS = 1000
 """Bodies drawn for one reset before it fails; chosen, as few pairs from wide ranges of height and mass make a body."""
 
@@ -28,7 +28,10 @@ MOST_DRAWS = 1000
 @kernel
 def _approach(most, running, subjects):
     """Change the speeds of those `running` (N,) by at most `most` [m/s] towards the targets; `subjects` (N,) of
-    `SUBJECT`. Returns whether any speed is still on its way."""
+    `SUBJECT`.
+
+    Returns whether any speed is still on its way.
+    """
     under_way = False
     for i in range(len(subjects)):
         subject = subjects[i]
@@ -44,9 +47,9 @@ def _approach(most, running, subjects):
 
 @kernel
 def _locate(ids, speeds, first, subjects):
-    """Find the places of environments `ids` (K,) among `speeds` (G,) [m/s], at the speed Froude-equal to theirs.
+    """Find the places of environments `ids` (K,) among `speeds` (G,) [m/s], at their Froude speeds.
 
-    `first` (N,) is the first row of the variant that each environment reads; `subjects` (N,) of `SUBJECT`.
+    `first` (N,) is the first row of each environment's variant; `subjects` (N,) of `SUBJECT`.
     """
     last = len(speeds) - 1
     for i in ids:
@@ -68,10 +71,10 @@ class Subjects:
     """Bodies and commanded speeds of N environments; arrays are changed in place.
 
     Args:
-        settings: the body that the tables are for, and the ranges to draw from.
+        settings: the body of the tables, and the ranges to draw from.
         speeds: (G,) tabulated speeds [m/s], ascending (`envs.control.reference_walk.tabulated_speeds`).
         num: number N of environments.
-        variant: (N,) index of the table that each environment reads, if there are several.
+        variant: (N,) index of each environment's table, if there are several.
     """
 
     def __init__(self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None):
@@ -104,15 +107,15 @@ class Subjects:
     def reset(
         self, ids: NDArray, randoms: Sequence[np.random.Generator], given: Mapping[str, NDArray] | None = None
     ) -> list[int]:
-        """Sample a body and a commanded speed for each environment in `ids` (K,).
+        """Draw a body and a commanded speed for each environment in `ids` (K,).
 
         Args:
-            ids: (K,) which.
-            randoms: K generators to sample from.
-            given: values (K,) to take in place of sampled ones, by the names of `DRAWN`.
+            ids: (K,) indices.
+            randoms: K generators.
+            given: values (K,) in place of drawn ones, by the names of `DRAWN`.
 
-        Returns: indices whose body changed and whose model must be rebuilt.
-        Raises `SpringfootError`, leaving all state unchanged, for an impossible body or a speed beyond the tables.
+        Returns the indices of environments with a changed body, whose model must be rebuilt. Raises `SpringfootError`,
+        leaving all state unchanged, for an impossible body or a speed outside the tables.
         """
         drawn = [
             self._draw(random, {name: float(values[row]) for name, values in (given or {}).items()})
@@ -179,7 +182,7 @@ class Subjects:
         return True
 
     def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, float]:
-        """Sample a speed, then bodies until one is possible."""
+        """Draw a speed, then bodies until one is possible."""
         settings = self._settings
         ranges = {name: getattr(settings, f"{name}_range") for name in DRAWN}
         values = {name: getattr(settings, name) for name in DRAWN}
@@ -199,7 +202,7 @@ class Subjects:
         return body, values["speed"]
 
     def _wait(self, time: float, random: np.random.Generator) -> float:
-        """Time at which the next speed is sampled after `time` [s]."""
+        """Return the time of the next drawn speed after `time` [s]."""
         interval = self._settings.speed_interval
         return np.inf if interval is None else time + interval * random.uniform(0.5, 1.5)
 

@@ -1,4 +1,4 @@
-"""Torque, work and energy of N bodies over every physics step of a window; recorded only where someone reads it.
+"""Compute torque, work and energy of N bodies over the physics steps of a window, only while something reads them.
 
 MuJoCo computes each force at the beginning of a physics step. The work of a force in a step is that force times the
 mean of the velocities before and after it, times the step. With this rule the energies of `pretrained` close to 0.003
@@ -38,9 +38,9 @@ LEDGER = np.dtype(
 others are work.
 
 mechanical rises by actuators + passive_damping + contact + pushes. Every joint is a spring whose K and theta_eq change
-between windows (not before an episode's first), so what the actuators do comes from stiffness_changes +
-equilibrium_changes + spring_damping and from what the springs held. That sum agrees to 3 % of what was put in: MuJoCo
-moves a joint by the velocity after a step.
+between windows (not before an episode's first), so the actuators' work comes from stiffness_changes +
+equilibrium_changes + spring_damping and from the energy stored in the springs. That sum agrees to 3 % of the energy put
+in: MuJoCo moves a joint by the velocity after a step.
 """
 
 
@@ -49,7 +49,8 @@ RECORDED = ("qvel", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
 
 
 def ledger_entries() -> tuple[str, ...]:
-    """Return names of the numbers of `LEDGER` in order, `stiffness_changes/ankle` for one of an array over joints."""
+    """Return the names of the numbers of `LEDGER` in order, such as `stiffness_changes/ankle` for one of an array over
+    joints."""
     arrays = {name for name in LEDGER.names or () if LEDGER[name].shape}
     return tuple(
         entry
@@ -59,20 +60,20 @@ def ledger_entries() -> tuple[str, ...]:
 
 
 class StepRecord(NamedTuple):
-    """What MuJoCo reports of each of a window's S physics steps; D degrees of freedom, in the order of qvel."""
+    """MuJoCo's record of the S physics steps of a window; D degrees of freedom, in the order of qvel."""
 
     before: NDArray
-    """(N, D) velocity when the window began [m/s, rad/s]."""
+    """(N, D) velocity at the beginning of the window [m/s, rad/s]."""
     pitch: NDArray
-    """(N,) of the trunk, then [rad]."""
+    """(N,) pitch of the trunk at the beginning of the window [rad]."""
     velocity: NDArray
-    """(N, S, D) after each step."""
+    """(N, S, D) velocity after each step [m/s, rad/s]."""
     actuator: NDArray
-    """(N, S, D) generalised forces [N, N m] in each step, of the actuators,"""
+    """(N, S, D) generalised forces of the actuators in each step [N, N m]."""
     passive: NDArray
-    """(N, S, D) of the joint damping,"""
+    """(N, S, D) generalised forces of the joint damping."""
     constraint: NDArray
-    """(N, S, D) of contacts and joint stops."""
+    """(N, S, D) generalised forces of contacts and joint stops."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,7 +104,7 @@ PARTS = np.dtype(
         ("table", np.int64, _LEGS),  # 1 for a device with a torque-angle line: of its own, so that nothing changes it
     ]
 )
-"""A body as its energy needs it."""
+"""Numbers of a body that its energy needs."""
 
 
 def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
@@ -168,7 +169,7 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
 
 @kernel
 def _sum_changes(parts, control, held, angle, energy):
-    """Add to `energy` (N,) what springs gained as K and theta_eq changed under load [J].
+    """Add to `energy` (N,) the energy that springs gain by changes of K and theta_eq under load [J].
 
     `parts` (N,) of `PARTS`; `control` and `held` (N, 2, 4, 2), K and K theta_eq now and before [N m/rad, N m]; `angle`
     (N, 2, 4) [rad].
@@ -192,7 +193,7 @@ def _sum_changes(parts, control, held, angle, energy):
 
 @part
 def _part_energy(part, x, z, x_rate, z_rate, turn, spin):
-    """Kinetic and potential energy [J] of one part whose joint is at (x, z), turned up-forward by `turn`."""
+    """Return kinetic and potential energy [J] of a part with its joint at (x, z), turned up-forward by `turn` [rad]."""
     forward = part.com[0]
     up = part.com[1]
     along = forward * cos(turn) - up * sin(turn)
@@ -248,14 +249,14 @@ def window_work(
     state: tuple[NDArray, NDArray],
     timestep: float,
 ) -> WindowWork:
-    """Torque, work and energy of one window.
+    """Compute torque, work and energy of one window.
 
     Args:
         parts: (N,) of `PARTS`.
-        steps: what MuJoCo reported.
+        steps: MuJoCo's record.
         control: (N, side, joint, 2) K [N m/rad] and K theta_eq [N m] held in the window.
         held: as `control`, in the window before; NaN where there was none.
-        angle: (N, side, joint) when the window began [rad].
+        angle: (N, side, joint) at the beginning of the window [rad].
         push: (N,) horizontal force on the trunk's CoM [N].
         state: MuJoCo's qpos and qvel at the window's end, (N, D) each.
         timestep: of the physics [s].

@@ -1,7 +1,7 @@
-"""What one foot is, as physics: muscles or a device at ankle and toe, an orthosis beside them, segments of other mass.
+"""Describe one foot as physics: muscles or a device at ankle and toe, an orthosis, segments of other mass.
 
-Angles are those of the joints (dorsiflexion, toe-up positive). A device, and an orthosis, is the same on everybody: its
-numbers do not scale with the body.
+Angles are those of the joints (dorsiflexion, toe-up positive). Numbers of a device, or an orthosis, are the same on
+every body: they do not scale.
 """
 
 from dataclasses import dataclass
@@ -18,16 +18,17 @@ class Spring:
     stiffness: float = 0.0
     """[N m/rad]; 0 for none."""
     rest: float = 0.0
-    """Angle at which it gives no torque [rad]."""
+    """Angle without torque [rad]."""
     damping_time: float | None = None
-    """[s]; None for that of the joint's muscles (`envs.physics.model.damping_times`)."""
+    """Damping over stiffness [s]; None for that of the joint's muscles (`envs.physics.model.damping_times`)."""
     table: tuple[tuple[float, float], ...] = ()
     """Angles [rad], ascending, and torques [N m], falling, in place of stiffness and rest angle; lines between them."""
 
 
 LOCK = Spring(stiffness=50_000.0, damping_time=0.01)
-"""What locks a joint at 0: 100 N m, an ankle's largest moment in walking, move it by 0.1 deg. Chosen: with a damping
-time of five physics steps or more, moments are as with any stiffer or softer lock (5 000 to 100 000 N m/rad)."""
+"""Spring that locks a joint at 0: 100 N m, an ankle's largest moment in walking, move it by 0.1 deg. Chosen: with a
+damping time of five physics steps or more, moments are as with any stiffer or softer lock (5 000 to 100 000 N
+m/rad)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,15 +36,15 @@ class FootJoint:
     """An ankle or a toe joint."""
 
     device: Spring | None = None
-    """What is there in place of muscles; None where muscles set the stiffness, as the policy says."""
+    """Spring in place of muscles; None for muscles, whose stiffness the policy sets."""
     rest: float | None = None
-    """Rest angle of the muscles' spring [rad], if there is no device; None for the one planned over the stride."""
+    """Rest angle of the muscles' spring [rad], if there is no device; None for the planned one over the stride."""
     strength: float = 1.0
     """Largest torque of the muscles downwards (plantarflexion) over that of the sound joint [-]."""
     acts_in_swing: bool = True
-    """Whether the muscles act while the leg swings."""
+    """False for muscles that are slack while the leg swings."""
     orthosis: Spring | None = None
-    """A spring beside the joint, which acts always."""
+    """Spring beside the joint, which always acts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,27 +52,27 @@ class Foot:
     """One foot, and the shank above it."""
 
     kind: str = "intact"
-    """Its name among the kinds of `springfoot.envs.settings.feet`."""
+    """Name of the kind, one of `springfoot.envs.settings.feet`."""
     ankle: FootJoint = FootJoint()
     toe: FootJoint = FootJoint()
     schedule: StiffnessSchedule | None = None
     """Stiffness and rest angle over the stride of the devices at ankle and toe, in place of their own."""
     one_piece: bool = False
-    """Whether it touches the ground with heel and toe tip alone: a plate has no ball to roll over."""
+    """True for a foot without a ball to roll over: it touches the ground with heel and toe tip alone."""
     shank_mass_ratio: float = 1.0
     """Mass of the shank over the intact one's [-]."""
     shank_com_ratio: float = 1.0
-    """Distance of its CoM from the knee over the intact one's [-]."""
+    """Distance of the shank's CoM from the knee over the intact one's [-]."""
     shank_inertia_ratio: float = 1.0
-    """Its inertia about its CoM over the intact one's [-]."""
+    """Inertia of the shank about its CoM over the intact one's [-]."""
     foot_mass_ratio: float = 1.0
     """Mass of foot and toe over the intact ones' [-]."""
     foot_inertia_ratio: float = 1.0
-    """Their inertia about their CoMs over the intact ones' [-]."""
+    """Inertias of foot and toe about their CoMs over the intact ones' [-]."""
 
     @property
     def joints(self) -> tuple[FootJoint, FootJoint]:
-        """Ankle and toe."""
+        """Return ankle and toe."""
         return self.ankle, self.toe
 
 
@@ -88,9 +89,9 @@ class LegSegments:
 
     mass: tuple[float, float, float, float]
     com: tuple[tuple[float, float], ...]
-    """Forward and up from the segment's joint, in its own frame."""
+    """CoM of each segment, forward and up from its joint, in the segment's frame."""
     inertia: tuple[float, float, float, float]
-    """About the segment's CoM."""
+    """Inertia of each segment about its CoM."""
 
 
 def leg_segments(body: Body, foot: Foot) -> LegSegments:
@@ -119,11 +120,12 @@ def leg_segments(body: Body, foot: Foot) -> LegSegments:
 
 
 def total_mass(body: Body, feet: Feet) -> float:
-    """Mass of body and load with these feet [kg]."""
+    """Return the mass of body and load with these feet [kg]."""
     legs = [(leg_segments(body, foot).mass, leg_segments(body, INTACT).mass) for foot in feet if foot != INTACT]
     return body.total_mass + sum(sum(own) - sum(intact) for own, intact in legs)
 
 
 def torque_range(limit: float, joint: FootJoint) -> tuple[float, float]:
-    """Lowest and highest torque [N m] of what sets a joint's stiffness; `limit` is that of a sound joint's muscles."""
+    """Return lowest and highest torque [N m] of a joint's muscles or device; `limit` is that of a sound joint's
+    muscles."""
     return (-inf, inf) if joint.device else (-joint.strength * limit, limit)

@@ -1,13 +1,14 @@
-"""Kernels: what a step does besides its physics, as compiled loops over bodies in scalar equations.
+"""Compile kernels: the loops over bodies of a step besides its physics, in scalar equations.
 
 For so few numbers a call of NumPy costs more than its arithmetic, and Python more still. A kernel takes records, one
-row an environment, and fills those it is given. Row i of what it writes depends on row i of what it reads, by the same
-operations in the same order for any N (no fast-math, no threads), so a batch of N gives the bits of N batches of one.
+row an environment, and fills those it is given. Row i of its results depends on row i of its arguments alone, by the
+same operations in the same order for any N (no fast-math, no threads), so a batch of N gives the bits of N batches of
+one.
 
-numba compiles a kernel at its first call and keeps the code beside the source. It watches no more than the source file
-of the kernel that is called; so a kernel carries in its name, under which numba keeps the code, a fingerprint of its
-own code and of all that it uses: the kernels it calls, in whatever file, and constants. Therefore a kernel stands below
-what it uses.
+numba compiles a kernel at its first call and keeps the code beside the source. It checks only the source file of the
+called kernel for changes. So the name of a kernel, under which numba keeps the code, carries a fingerprint of its own
+code and of everything that it uses: constants, and other kernels in whatever file. Therefore a kernel stands below
+everything that it uses.
 """
 
 import pickle
@@ -39,16 +40,16 @@ def kernel(function: Function) -> Function:
 
 
 def part(function: Function) -> Function:
-    """As `kernel`, for what kernels alone call: it is kept with them and not by itself."""
+    """Compile, as `kernel` does, a function that only kernels call; it is kept with them and not by itself."""
     compiled: Any = njit(error_model="numpy")(_named(function))
     return compiled
 
 
 class _KernelCache(FunctionCache):
-    """numba's cache, whose damage costs compiling anew and nothing else.
+    """numba's cache, made robust: damage costs compiling anew and nothing else.
 
-    numba keeps kernels as pickles, beside the code or where NUMBA_CACHE_DIR says: who may write there may write code
-    too, as with Python's own `__pycache__`. Nothing that a user hands over is read this way.
+    numba keeps kernels as pickles, beside the code or where NUMBA_CACHE_DIR says: a user with write access there can
+    write code too, as with Python's own `__pycache__`. No file of a user's is read this way.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -56,7 +57,7 @@ class _KernelCache(FunctionCache):
         self._cache_file: Any = _DigestedFile(self._cache_file)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the kept kernel, or None where there is none or its files are damaged; those begin anew."""
+        """Return the kept kernel; None if there is none or its files are damaged, which are then made anew."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # what is cut short ends in any exception of pickle
@@ -73,7 +74,7 @@ class _KernelCache(FunctionCache):
 
 
 class _DigestedFile:
-    """A file of numba's cache whose kernels have a digest each: machine code that is damaged must not run."""
+    """A file of numba's cache with a digest of each kernel: damaged machine code must not run."""
 
     def __init__(self, file: Any) -> None:
         self.flush = file.flush
@@ -85,7 +86,7 @@ class _DigestedFile:
         self._file.save(key, (sha256(content).digest(), content))
 
     def load(self, key: Any) -> Any:
-        """Return the kept kernel, or None; raise `ValueError` for damage, and what pickle and unpacking raise."""
+        """Return the kept kernel or None; raise `ValueError` for damage, and the errors of unpickling."""
         found = self._file.load(key)
         if found is None:
             return None
@@ -112,7 +113,7 @@ def _named(function: Function) -> Function:
 
 
 def _fingerprint(function: Callable[..., Any]) -> str:
-    """Tells what a function does from all else: by its code, and by the values of all names in it that are known."""
+    """Return a text that tells a function from all others: its code, and the values of all known names in it."""
     code: Any = function.__code__  # type: ignore[attr-defined]
     known: dict[str, Any] = function.__globals__  # type: ignore[attr-defined]
     found = [code.co_code.hex(), repr(code.co_consts), repr(code.co_varnames), repr(code.co_names)]

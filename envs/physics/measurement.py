@@ -1,4 +1,4 @@
-"""What is known of N bodies at the end of a control window, computed from joint positions and contact forces."""
+"""Measure N bodies at the end of a control window, from joint positions and contact forces."""
 
 from dataclasses import dataclass
 from math import cos, sin
@@ -27,7 +27,7 @@ SEGMENTS = np.dtype(
         ("torque", float, (len(SIDES), len(JOINTS), 2)),  # lowest and highest torque of each joint's actuators [N m]
     ]
 )
-"""What kinematics and springs need to know of one body."""
+"""Constants of one body for kinematics and springs."""
 PLANT = np.dtype(
     [
         ("time", float),  # since the episode began [s]
@@ -37,7 +37,7 @@ PLANT = np.dtype(
         ("control", float, (len(SIDES), len(JOINTS), 2)),  # as for `envs.physics.simulation.Simulation.advance`
     ]
 )
-"""How a row of MuJoCo's state begins."""
+"""Beginning of a row of MuJoCo's state."""
 _PLANT_NUMBERS = PLANT.itemsize // 8
 
 
@@ -57,7 +57,7 @@ MEASURED = np.dtype(
         ("diverged", np.int64),
     ]
 )
-"""One body's row of a `Measurement`, which explains it."""
+"""Row of one body in a `Measurement`, which explains it."""
 BODY_ROW = np.dtype(
     [
         ("segments", SEGMENTS),
@@ -65,12 +65,12 @@ BODY_ROW = np.dtype(
         ("measured", MEASURED),
     ]
 )
-"""What the simulation knows of one body."""
+"""Row of one body in the simulation."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measurement:
-    """What is known of N bodies at the end of one control window; SI units, world x forward, z up.
+    """Measurements of N bodies at the end of one control window; SI units, world x forward, z up.
 
     Every height z, and every upward velocity, is relative to the ground straight below the point: for a foot's contacts
     the ground of that foot, for all else the mean ground, a plane through the origin. Angles are relative to the true
@@ -80,7 +80,7 @@ class Measurement:
     """
 
     time: NDArray
-    """(N,) time since the episode began [s]."""
+    """(N,) time since the start of the episode [s]."""
     base: NDArray
     """(N, 3) hip x [m], hip z [m], trunk pitch [rad]."""
     base_velocity: NDArray
@@ -94,7 +94,7 @@ class Measurement:
     com: NDArray
     """(N, 2) centre of mass (x, z) [m]."""
     com_velocity: NDArray
-    """(N, 2) its velocity [m/s]."""
+    """(N, 2) velocity of the centre of mass [m/s]."""
     ankle: NDArray
     """(N, side, 2) ankle axes (x, z) [m]."""
     contact: NDArray
@@ -102,7 +102,7 @@ class Measurement:
     force: NDArray
     """(N, side, contact, 2) ground reaction force (forward, up) on each, mean over the window [N]."""
     diverged: NDArray
-    """(N,) `mjtWarning` with the lowest number among those MuJoCo has raised since the episode began, -1 for none."""
+    """(N,) lowest number of the `mjtWarning`s that MuJoCo has raised since the start of the episode, -1 for none."""
 
     @classmethod
     def of(cls, measured: NDArray) -> "Measurement":
@@ -111,11 +111,11 @@ class Measurement:
 
 
 def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
-    """Constants of one body with these feet, (1,) of dtype `SEGMENTS`.
+    """Return the constants of one body with these feet, (1,) of dtype `SEGMENTS`.
 
     The CoM is the hip plus one offset for each segment, which turns with the segment. The offset is the sum of two
-    products: the segment's share of the mass times its own CoM, and the share of all that hangs from its far end times
-    the position of that end.
+    products: the segment's fraction of the mass times its own CoM, and the fraction of everything below it times the
+    position of its far end.
     """
     toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
     offsets = contact_offsets(body)
@@ -153,11 +153,11 @@ def _turned(offset, c, s):
 
 @part
 def _locate(segments, position, rate, m):
-    """Planar forward kinematics: fill the places and rates [m, m/s, rad, rad/s] of `m`, of `MEASURED`.
+    """Compute planar forward kinematics: fill positions and rates [m, m/s, rad, rad/s] of `m`, of `MEASURED`.
 
-    `segments` of `SEGMENTS`; `position` and `rate` (11,), MuJoCo's coordinates [m, rad] and their rates.
-    A segment is turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its
-    frame is then (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world, and moves at ds/dt (-z, x).
+    `segments` of `SEGMENTS`; `position` and `rate` (11,), MuJoCo's coordinates [m, rad] and their rates. A segment is
+    turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its frame is then
+    (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world, and moves at ds/dt (-z, x).
     """
     hip_x = position[0]
     hip_z = position[1]
@@ -201,7 +201,7 @@ def _locate(segments, position, rate, m):
 
 @part
 def _above(ground, m):
-    """Turn heights and upward velocities in the world into those relative to the ground, in place."""
+    """Make heights and upward velocities in the world relative to the ground, in place."""
     slope = ground[0]
     m.base[1] -= slope * m.base[0]
     m.base_velocity[1] -= slope * m.base_velocity[0]
@@ -235,7 +235,7 @@ def _read_joints(segments, plant, m):
 
 @part
 def _average(sensors, force):
-    """Mean of `sensors` (steps, 2, 3, 3) [N], each contact's force, into `force` (2, 3, 2), forward and up."""
+    """Average `sensors` (steps, 2, 3, 3) [N], each contact's force, into `force` (2, 3, 2), forward and up."""
     steps = len(sensors)
     for side in range(2):
         for contact in range(3):

@@ -1,11 +1,11 @@
-"""The MuJoCo model of a body, and the names of its elements.
+"""Build the MuJoCo model of a body, and name its elements.
 
 The planar body of the thesis (trunk, thighs, shanks, feet, toes), compiled from `Body` with `MjSpec`. World x is
 forward and z up. Joint signs: hip and knee flexion, ankle dorsiflexion, toe-up and trunk-forward pitch positive.
 
-Scaling: a body of height ratio l and mass ratio m (against 1.70 m, 63 kg) has lengths ~ l, stiffness and torque
-~ m*l, joint damping ~ m*l*sqrt(l), armature ~ m*l^2, contact time ~ sqrt(l); its gait at equal Froude speed is then
-the same (Hof 1996, "Scaling gait data to body size").
+Scaling: a body of height ratio l and mass ratio m (against 1.70 m, 63 kg) has lengths ~ l, stiffness and torque ~ m*l,
+joint damping ~ m*l*sqrt(l), armature ~ m*l^2, contact time ~ sqrt(l); its gait at equal Froude speed is then the same
+(Hof 1996, "Scaling gait data to body size").
 """
 
 from math import sqrt
@@ -59,12 +59,12 @@ _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y 
 
 
 def damping_times(body: Body) -> np.ndarray:
-    """Beta [s] of each joint in the order of `JOINTS`, shape (4,)."""
+    """Return beta [s] of each joint in the order of `JOINTS`, shape (4,)."""
     return np.array(DAMPING_TIME) * sqrt(body.length_scale)
 
 
 def torque_limits(body: Body) -> np.ndarray:
-    """Largest actuator torque [N m] of each joint in the order of `JOINTS`, shape (4,)."""
+    """Return the largest actuator torque [N m] of each joint in the order of `JOINTS`, shape (4,)."""
     return np.array(TORQUE_LIMIT) * body.strength_scale
 
 
@@ -74,7 +74,7 @@ def joints_of(foot: Foot) -> tuple[FootJoint, ...]:
 
 
 def damping_times_of(body: Body, feet: Feet) -> NDArray:
-    """Beta [s] of the actuators of both legs, (side, joint)."""
+    """Return beta [s] of the actuators of both legs, (side, joint)."""
     sound = damping_times(body)
     times = []
     for foot in feet:
@@ -84,22 +84,23 @@ def damping_times_of(body: Body, feet: Feet) -> NDArray:
 
 
 def torque_ranges(body: Body, feet: Feet) -> NDArray:
-    """Lowest and highest torque [N m] of the actuators of both legs, (side, joint, 2)."""
+    """Return the lowest and highest torque [N m] of the actuators of both legs, (side, joint, 2)."""
     limits = torque_limits(body).tolist()
     pairs = [(torque_range(*each) for each in zip(limits, joints_of(foot), strict=True)) for foot in feet]
     return np.array([list(leg) for leg in pairs])
 
 
 def passive_damping(body: Body) -> np.ndarray:
-    """Joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
+    """Return joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
     return np.array(PASSIVE_DAMPING) * body.strength_scale * sqrt(body.length_scale)
 
 
 def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray) -> NDArray:
-    """Forward coordinate [m] of the sole's material at the contact points, up to a constant: (T, side, contact).
+    """Return the forward coordinate [m] of the sole's material at the contact points, up to a constant: (T, side,
+    contact).
 
-    It changes when a foot slides and stays when its spheres roll. From lowest points `contact` (T, side, contact, 2)
-    [m], `base` (T, 3) and joint angles (T, side, joint) as in `envs.physics.simulation.Measurement`.
+    The coordinate changes when a foot slides and stays when its spheres roll. From lowest points `contact` (T, side,
+    contact, 2) [m], `base` (T, 3) and joint angles (T, side, joint) as in `envs.physics.simulation.Measurement`.
     """
     foot = angle[..., HIP] - base[..., None, 2] - angle[..., KNEE] + angle[..., ANKLE]  # toes up
     turn = np.stack([foot, foot + angle[..., TOE], foot + angle[..., TOE]], axis=-1)
@@ -230,7 +231,7 @@ def _segment(parent, name, pos, mass, com, inertia):
 
 
 def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
-    """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with the orthosis that is worn there."""
+    """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with the orthosis there, if any."""
     which = SIDES.index(side)
     low, high = torque_ranges(body, feet)[which, index].tolist()
     joint = JOINTS[index]

@@ -1,4 +1,4 @@
-"""A model as MJCF text whose every number has all its digits, so that what is loaded steps the same bits."""
+"""Write a model as MJCF text with all digits of every number, so that the loaded model steps with the same bits."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -24,11 +24,11 @@ ARRAY_OF: Mapping[str, Mapping[str, str]] = {
 }
 """Element -> attribute -> array of the compiled model that holds its value."""
 LIMITS = {"range": "jnt_range", "actuatorfrcrange": "jnt_actfrcrange"}
-"""As `ARRAY_OF`, of joints that have limits; a limit that is written also acts."""
+"""Attribute -> array, as in `ARRAY_OF`, for joints with limits; a limit that is written also acts."""
 
 
 def model_text(spec: mujoco.MjSpec) -> str:
-    """Return the MJCF text of a specification, in which MuJoCo itself would keep six digits of each number."""
+    """Return the MJCF text of a specification with all digits; MuJoCo itself would keep six."""
     model = spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     world = _found(root, "worldbody")
@@ -54,7 +54,7 @@ def model_text(spec: mujoco.MjSpec) -> str:
 
 
 def _in_order(body: ElementTree.Element) -> list[ElementTree.Element]:
-    """Geoms as the compiled model numbers them: a body's own before those of its children."""
+    """Return geoms as the compiled model numbers them: a body's own before those of its children."""
     return body.findall("geom") + [geom for child in body.findall("body") for geom in _in_order(child)]
 
 
@@ -63,7 +63,7 @@ def _found(root: ElementTree.Element, tag: str) -> ElementTree.Element:
 
 
 def _write(element: ElementTree.Element, model: MjModel, index: int, more: Mapping[str, str] = {}) -> None:
-    """Give an element the attributes of `ARRAY_OF` and `more` in full, as element `index` of its kind has them."""
+    """Give an element its attributes of `ARRAY_OF` and `more` in full; it is element `index` of its kind."""
     for attribute, array in {**ARRAY_OF[element.tag], **more}.items():
         value: Any = getattr(model, array)[index]
         element.set(attribute, " ".join(repr(float(number)) for number in _sequence(value)))

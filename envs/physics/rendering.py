@@ -1,4 +1,4 @@
-"""Pictures of one body. No other module needs OpenGL, and this one only when a frame is asked for."""
+"""Draw pictures of one body. No other module needs OpenGL, and this one only when it draws a frame."""
 
 import atexit
 import threading
@@ -31,10 +31,10 @@ ONE_WINDOW = (
 
 
 class Camera:
-    """Draws bodies, one model at a time, in a window ("human") or into arrays ("rgb_array").
+    """Draw bodies, one model at a time, in a window ("human") or into arrays ("rgb_array").
 
-    Raises `SpringfootError` with a hint where there is no OpenGL, or no screen for a window; and for a second window
-    in a process: each draws in a thread of its own, and GLFW is not made for several.
+    Raises `SpringfootError` with a hint without OpenGL, or without a screen for a window; and for a second window in a
+    process: each draws in a thread of its own, and GLFW is not made for several.
     """
 
     _with_window: "weakref.ref[Camera] | None" = None
@@ -108,7 +108,7 @@ def _renderer(model: mujoco.MjModel) -> Any:
 
 
 def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Any, list[threading.Thread]]:
-    """Return a window, and the thread that draws it, where it has one of its own."""
+    """Return a window, and the thread that draws it, if it has one of its own."""
     others = threading.enumerate()
     try:
         import glfw

@@ -1,4 +1,4 @@
-"""What is to be seen of the model and has no mass and no contact: sky, light, bones, a load."""
+"""Add the visible parts of the model that have neither mass nor contact: sky, light, bones, a load."""
 
 import mujoco
 

@@ -1,4 +1,4 @@
-"""N bodies walking side by side on `mujoco.batch.Batch`: the only owner of MuJoCo data and the only reader of sensors.
+"""Simulate N bodies side by side on `mujoco.batch.Batch`: the only owner of MuJoCo data, the only reader of sensors.
 
 One call of `advance` is one control window of 10 ms: it holds the control and runs the physics steps. The kernel
 `measure_bodies` then fills a `Measurement`: kinematics from joint positions at the window's end, as MuJoCo's derived
@@ -25,7 +25,7 @@ from .model import JOINTS, SIDES, build_model
 from .timing import CONTROL_WINDOW
 
 MjModel: TypeAlias = Any
-"""A `mujoco.MjModel`; MuJoCo has no type stubs, and what it leaves unknown would be unknown in our users' files."""
+"""A `mujoco.MjModel`; MuJoCo has no type stubs, and its unknown types would be unknown in our users' files."""
 MjData: TypeAlias = Any
 """A `mujoco.MjData`, likewise."""
 
@@ -123,10 +123,10 @@ class Simulation:
         self._batch.set_models(self.models)
 
     def reset(self, ids: NDArray, base: NDArray, base_velocity: NDArray, angle: NDArray, velocity: NDArray) -> None:
-        """Put simulations `ids` (K,) into the states given, and clear their warnings and time.
+        """Put simulations `ids` (K,) into the given states, and clear their warnings and time.
 
         Args:
-            ids: (K,) which.
+            ids: (K,) indices.
             base: (K, 3) hip x [m], height of the hip above the mean ground [m], trunk pitch [rad].
             base_velocity: (K, 3) its rate [m/s, m/s, rad/s].
             angle: (K, side, joint) joint angles [rad].
@@ -147,9 +147,9 @@ class Simulation:
         """Give simulations `ids` (K,) sloping ground.
 
         Args:
-            ids: (K,) which.
+            ids: (K,) indices.
             slope: (K,) slope of the mean ground, a plane through the origin, uphill positive [rad].
-            height: (K, side) how far the ground of each foot lies above the mean ground [m].
+            height: (K, side) height of the ground below each foot above the mean ground [m].
         """
         for index, angle, heights in zip(ids.tolist(), slope.tolist(), height, strict=True):
             self._ground[index] = tan(angle), *heights
@@ -193,7 +193,8 @@ class Simulation:
         self._held[:] = self._control
 
     def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
-        """Run the physics steps of a window and record what `out` names: for those still, sensors stay, else 0."""
+        """Run the physics steps of a window and record the fields of `out`; simulations that rest keep their sensors,
+        else 0."""
         if ids is None:
             self._batch.rollout(self._substeps, record=list(out), out=out)
             return
@@ -206,7 +207,7 @@ class Simulation:
                 values[ids] = found[name]
 
     def measure(self, ids: NDArray | slice = slice(None)) -> Measurement:
-        """Return the measurement after a reset of `ids`: their state as it stands, no torques or contact forces."""
+        """Return the measurement after a reset of `ids`: their present state, no torques or contact forces."""
         self.arrays.sensors[ids] = 0.0
         measure_bodies(*self.arrays)
         self.now.torque[ids] = 0.0

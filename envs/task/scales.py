@@ -1,4 +1,4 @@
-"""Limits, tolerances and units of the reward for one body."""
+"""Compute limits, tolerances and units of the reward for one body."""
 
 from functools import lru_cache
 from math import sqrt
@@ -11,7 +11,7 @@ from springfoot.gait.body.body import GRAVITY, Body
 from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
 
 MIN_HIP_HEIGHT = 0.65
-"""A hip lower than this is a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
+"""Lowest hip before it counts as a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
 COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.03, 0.015
 """Error of the CoM, forward and up, at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 COP_TOLERANCE = 0.04
@@ -20,10 +20,10 @@ SPEED_TOLERANCE = 0.05
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen: at
 0.10 policies walk too slowly and push off with less than people's moment."""
 POSE_WEIGHTS = {HIP: 3.0, KNEE: 2.5, ANKLE: 3.0, TOE: 0.1}
-"""Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve is of other
-people than those of thigh, knee and ankle."""
+"""Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve comes from
+other people than the curves of thigh, knee and ankle."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
-"""Stiffness whose cost is one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height]; chosen, as of mid-stance."""
+"""Stiffness that costs one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height]; chosen, as in mid-stance."""
 TOE_SHARE = 0.25
 """Weight of the toe against the ankle in the cost of stiffness [-]; chosen."""
 

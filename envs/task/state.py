@@ -1,4 +1,4 @@
-"""What the task keeps of each environment: one row of `TASK_ROW`, which its kernels read and write."""
+"""Define the task's row of each environment, `TASK_ROW`, which its kernels read and write."""
 
 import numpy as np
 
@@ -8,8 +8,8 @@ from .observation_entries import OBSERVATION, UNITS
 from .scales import SCALES
 
 PUSH = np.dtype([("begin", float), ("force", float), ("ends", float)])
-"""A body's next or present push: when it begins [s], its force at the mass of the settings [N], and the end of the
-interval in which it is the one [s]."""
+"""Next or present push of a body: its beginning [s], its force at the mass of the settings [N], and the end of its
+interval [s]."""
 GROUND_STATE = np.dtype(
     [
         ("height", float, len(SIDES)),  # below each foot above the mean ground [m]

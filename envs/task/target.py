@@ -1,7 +1,7 @@
-"""The target: what the body follows at each phase of the stride, and how far the body is from it.
+"""Tabulate the target of the body at each phase of the stride, and measure the body's distance from it.
 
-With the guide `people` the joint angles and forces are people's, and the CoM is that of the plan; with the guide `plan`
-all of it is the plan's.
+With the guide `people` joint angles and forces are people's, and the CoM is the plan's; with the guide `plan` the whole
+target is the plan's.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..physics.kernel import kernel, part
 from ..physics.model import JOINTS, LEFT, RIGHT
 
 FORCE_BAND = 0.5
-"""The range of forces, to either side of their mean [SD]; chosen: at 1 the ankle pushes off with less than
+"""Half width of the target's range of forces about their mean [SD]; chosen: at 1 the ankle pushes off with less than
 people's moment."""
 TARGET = np.dtype(
     [
