@@ -85,13 +85,13 @@ class Subjects:
         self.bodies = [self._home] * num
         """Body of each environment."""
         self.rows = np.zeros(num, CONTROL_ROW)
-        """(N,) all that the control keeps of each environment."""
+        """(N,) row of the control for each environment."""
         own = self.rows["subject"]
         self.place, self.scale = own["place"], own["scale"]
         """(N,) place of the commanded speed in tables of variants x speeds, and ratios of the bodies to that of the
         settings."""
         self.speed, self.target, self._change = own["speed"], own["target"], own["change"]
-        """(N,) speed commanded now, and that to which it goes [m/s]; time of the next target drawn [s]."""
+        """(N,) present commanded speed and its target [m/s]; time of the next drawn target [s]."""
         self.slope = own["slope"]
         """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
         own["height"] = self._home.height

@@ -95,13 +95,13 @@ class Simulation:
         self._ground = bodies["ground"]
         sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
         self.arrays = Physics(bodies, state, sensors, self._batch.warning[:, :, 1])
-        """What kernels read and write."""
+        """Arrays that kernels read and write."""
         self.now = Measurement.of(bodies["measured"])
         """The last measurement; its arrays change in place."""
         self._record = {"sensordata": sensors.reshape(num, self._substeps, self.model.nsensordata)}
         self._held = np.full(self._control.shape, np.nan)  # in the last window that was watched
         self.kept = {"body": bodies, "mujoco": state, "warnings": self._batch.warning, "held": self._held}
-        """All that changes, by name; arrays with N rows."""
+        """Name -> array with N rows, of everything that changes."""
         self.work: WindowWork
         """Torque, work and energy in the last window that was watched."""
 

@@ -1,4 +1,6 @@
-"""How people walk: curves by walking speed or from files of your own, their strides, and scores against them."""
+"""Describe how people walk: curves by walking speed or from files of your own, their strides, and scores against
+them.
+"""
 
 from typing import TYPE_CHECKING
 

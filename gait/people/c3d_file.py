@@ -1,4 +1,4 @@
-"""C3D files of a motion laboratory -> curves in the names, signs and units of `HumanGait`; needs ezc3d, an extra.
+"""Read C3D files of a motion laboratory as curves in the names, signs and units of `HumanGait`; needs ezc3d, an extra.
 
 The x components of Plug-in Gait's angles and moments have our signs; its pelvis is positive forward, so thigh = hip -
 pelvis. If the ankle moment is negative on average, the moments are external ones, and the signs of all are turned.
@@ -20,19 +20,19 @@ from .human import FORCES
 from .motion_files import FILE_SIDES, Series, Trial, not_empty
 
 PLATE_LOAD = 20.0
-"""A force plate bears a foot above this force [N]; chosen, as usual in gait laboratories."""
+"""Force above which a foot stands on a force plate [N]; chosen, as usual in gait laboratories."""
 _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles", "toe": "HXFFA"} | {
     f"{joint}_moment": f"{joint.capitalize()}Moment" for joint in ("hip", "knee", "ankle")
 }
 
 
 def read_c3d(path: Path) -> Trial:
-    """Return a C3D file with Plug-in Gait output, read in this process (`c3d_process` says why to do that in another).
+    """Return the walk in a C3D file with Plug-in Gait output, read in this process (`c3d_process` reads it in another).
 
     It reads the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
     Model's `LHXFFA` (toe) [deg] and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg]; right with R;
-    the events Foot Strike and Foot Off; and the force plates, where the markers LHEE, LTOE, RHEE and RTOE tell which
-    foot stands on them and which way is forward.
+    the events Foot Strike and Foot Off; and the force plates, where the markers LHEE, LTOE, RHEE and RTOE tell the foot
+    on each plate and the forward direction.
     """
     import ezc3d  # an extra: only C3D files need it
 
@@ -123,7 +123,7 @@ def _refuse_broken(path: Path) -> None:
 
 
 def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
-    """Foot strikes and foot offs that the laboratory has marked."""
+    """Return side -> foot strikes and foot offs marked by the laboratory."""
     contexts, labels = (event.get(key, {}).get("value", []) for key in ("CONTEXTS", "LABELS"))
     times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")
     seconds = 60 * times[0] + times[1]
@@ -140,7 +140,8 @@ def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
 
 
 def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int) -> dict[str, tuple[NDArray, NDArray]]:
-    """Side -> force up and forward (T,) [N] of each foot, from the plates and the markers of heels and toes (3, T)."""
+    """Return side -> force up and forward (T,) [N] of each foot, from the plates and the markers of heels and toes (3,
+    T)."""
     if any(marker is None for pair in feet.values() for marker in pair):
         return {}
     total = {side: np.zeros((3, frames)) for side in FILE_SIDES}
@@ -176,7 +177,7 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
 
 
 def _per_frame(samples: NDArray, frames: int) -> NDArray:
-    """Analog samples (3, R x T) as their mean around each frame (3, T)."""
+    """Return analog samples (3, R x T) as their mean around each frame (3, T)."""
     ratio = max(samples.shape[1] // max(frames, 1), 1)
     centred = np.pad(np.nan_to_num(samples), ((0, 0), (ratio // 2, 0)), mode="edge")
     cut = centred[:, : ratio * frames]
@@ -184,7 +185,7 @@ def _per_frame(samples: NDArray, frames: int) -> NDArray:
 
 
 def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
-    """Return the frames between the gaps at the beginning and the end; a gap in between is refused."""
+    """Return the frames between gaps at the beginning and the end; refuse a gap in between."""
     broken = {
         f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()
     }

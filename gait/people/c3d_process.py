@@ -1,4 +1,4 @@
-"""C3D files are read in a process of their own (`bounded_process`); arrays and JSON text come back, no pickles."""
+"""Read C3D files in a process of their own (`bounded_process`); arrays and JSON text come back, no pickles."""
 
 import io
 import json
@@ -21,10 +21,8 @@ _CHILD = "from springfoot.gait.people.c3d_process import main; main()"
 
 
 def c3d_trial(path: Path) -> Trial:
-    """Return the walk in a C3D file, as `c3d_file.read_c3d` reads it.
-
-    Raise `SpringfootError` for what it cannot read.
-    """
+    """Return the walk in a C3D file, as `c3d_file.read_c3d` reads it; raise `SpringfootError` for an unreadable
+    file."""
     if find_spec("ezc3d") is None:
         raise SpringfootError(f"{path.name}: reading C3D needs ezc3d; install springfoot[c3d]")
     said = in_process(_CHILD, str(existing(path).absolute()))

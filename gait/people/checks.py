@@ -1,4 +1,4 @@
-"""Are measured curves those of a person who walks, in the units and signs of `HumanGait`? Seen against people's curves.
+"""Check that measured curves are those of a walking person, in the units and signs of `HumanGait`, by people's curves.
 
 A wrong unit makes a curve many times too large or too small, another zero moves it, a wrong sign turns it, a wrong foot
 shifts it by half a stride, time that runs backward reverses it, noise roughens it. People who walk otherwise, or a body
@@ -25,7 +25,7 @@ _LEVERS = ("hip_moment", "knee_moment", "ankle_moment")
 
 
 class Limits(NamedTuple):
-    """Between what a curve is right."""
+    """Limits of a right curve."""
 
     least: float
     """Least excursion over people's [-]."""
@@ -50,19 +50,19 @@ CURVE_LIMITS = {
     "grf_vertical": Limits(0.2, 3.5, 0.35),  # 0.59 to 2.26, 0.53
     "grf_forward": Limits(0.2, 5.0, 0.0),  # 0.38 to 3.25, 0.23
 }
-"""Chosen. Behind each are the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits drawn as
-in the tests, and what walked here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5 deg,
-on all kinds of feet, of people who have adapted and who have not, by people's curves or a plan of its own."""
+"""Limits of each curve; chosen from the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits
+drawn as in the tests, and walks here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5
+deg, on all kinds of feet, of people who have adapted and of others, by people's curves or a plan."""
 SMALL_MEANS_NOTHING = ("toe", "knee_moment", "hip_power", "knee_power", "ankle_power", "grf_forward")
-"""Curves that some who walk hardly have; a rigid ankle is another, where its power tells so."""
+"""Curves that are small in some walks; with a rigid ankle, which its power tells, the ankle's curves too."""
 ALONE = 1.65
-"""Largest excursion of the ankle's moment over people's in a file without forces [-]; chosen. With them a lever tells
-more (`LEVERS`)."""
+"""Largest excursion of the ankle's moment over people's in a file without forces [-]; chosen. With forces the lever is
+checked instead (`LEVERS`)."""
 ROUGHNESS = {"angle": 0.04, "moment": 0.08, "power": 0.08, "grf": 0.08}
-"""Largest median of second differences from percent to percent, over the excursion or people's if larger [-]; chosen.
-Right ones have 0.013, 0.046, 0.042 and 0.051; noise of a tenth of the excursion 0.05, of a fifth 0.09."""
+"""Largest median of second differences from percent to percent, over the excursion, or people's if larger [-]; chosen.
+Right curves have 0.013, 0.046, 0.042 and 0.051; noise of a tenth of the excursion 0.05, of a fifth 0.09."""
 LARGEST_OFFSET = np.radians(30)
-"""Largest difference of an angle's mean from people's [rad]; chosen. Right ones have 23 deg at the hip, on a slope
+"""Largest difference of an angle's mean from people's [rad]; chosen. Right curves have 23 deg at the hip, on a slope
 downward, and 13 deg elsewhere."""
 MISTAKEN_UNITS = {
     "angle": {"radians": np.pi / 180, "degrees where radians must be": 180 / np.pi},
@@ -75,47 +75,48 @@ MISTAKEN_UNITS = {
     "power": {"W, not per kg": REFERENCE_MASS, "mW/kg": 1e3},
     "grf": {"percent of body weight": 100.0, "N": GRAVITY * REFERENCE_MASS, "N/kg": GRAVITY, "kN": 1e-3},
 }
-"""What may be in place of our units, and by how much larger it makes a curve."""
+"""Mistaken unit -> the factor by which it makes a curve larger."""
 NEAR_UNIT = 2.5
-"""By how much a curve may be larger or smaller than a mistaken unit makes people's, for that unit to be the guess;
-chosen."""
+"""Largest factor between a curve and people's curve in a mistaken unit for that unit to be the guess; chosen."""
 LARGEST_KNEE = np.radians(100)
-"""Largest mean flexion of a knee over the stride [rad]; chosen. More is the angle between thigh and shank."""
+"""Largest mean flexion of a knee over the stride [rad]; chosen. A larger one is the angle between thigh and shank."""
 BORNE = (0.25, 0.8)
-"""Least and largest mean vertical force over the stride [body weights]; chosen. Two feet bear one body weight, so that
-each bears half of it; right ones 0.30 (limping) to 0.66 (with a load)."""
+"""Least and largest mean vertical force over the stride [body weights]; chosen. Two feet bear one body weight, so each
+bears half of it; right curves have 0.30 (limping) to 0.66 (with a load)."""
 LEVERS = (0.03, 0.21)
-"""Least and largest distance of the force from the ankle where its moment peaks, for moments in N m/kg and forces in
-body weights [m]; chosen: it is about the length of the forefoot, 0.14 m. Right ones have 0.077 to 0.169,
-1.9 times people's is 0.217 to 0.236."""
+"""Least and largest distance of the force from the ankle at the peak of its moment, for moments in N m/kg and forces in
+body weights [m]; chosen: it is about the length of the forefoot, 0.14 m. Right curves have 0.077 to 0.169; 1.9 times
+people's is 0.217 to 0.236."""
 LEAST_LOAD = 0.3
-"""Least vertical force where the ankle's moment peaks [body weights]; chosen."""
+"""Least vertical force at the peak of the ankle's moment [body weights]; chosen."""
 TURNED = -0.5
-"""Correlation with people's curve below which a curve counts as turned; chosen."""
+"""Correlation with people's curve below which the sign of a curve counts as wrong; chosen."""
 LEAST_SHIFT, SHIFT_GAIN = 12, 0.15
 """Least shift that counts [percent of the stride], and correlation that every curve must gain by it; chosen."""
 REVERSED_GAIN = 0.5
-"""Correlation that curves must gain by running backward, in the mean, with none that loses; chosen. Right ones, of two
-curves or more, gain 0.34 at most, reversed ones 0.75 at least."""
+"""Mean correlation that curves must gain by running backward, with no curve losing; chosen. Two or more right curves
+gain 0.34 at most, reversed ones 0.75 at least."""
 HALF_A_STRIDE, HALF_GAIN = slice(35, 66), 0.6
 """Shifts that count as half a stride, and correlation that a single curve must gain by one of them; chosen."""
 SHAPED = ("thigh", "hip", "knee", "ankle", "hip_moment", "ankle_moment", "grf_vertical", "grf_forward")
-"""Curves of which that is asked: right ones gain 0.38 at most, people's half a stride late 1.0 at least."""
+"""Curves that are checked for a shift of half a stride: right ones gain 0.38 at most, people's half a stride late 1.0
+at least."""
 
 
 MOST_SPREAD = 2.0
-"""Largest standard deviation over the range of a curve, its own or people's; chosen. Who limps here has 1.02."""
+"""Largest standard deviation over the range of a curve, its own or people's; chosen. A person who limps here has
+1.02."""
 Curves = Mapping[str, NDArray]
 AS_IT_IS = "if it is right, trust_units takes it as it is"
 
 
 def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | None = None) -> None:
-    """Raise `SpringfootError` for mean curves (101,) that no walk has, saying what was seen and what it may be.
+    """Raise `SpringfootError`, with the finding and a guess of its cause, for mean curves (101,) that no walk has.
 
     Args:
         name: of the file.
         mean: curve -> percent 0 to 100 of the stride, in the units of `HumanGait`.
-        people: whose curves they are held against.
+        people: gait to compare the curves with.
         sd: spreads (101,) of some of the curves.
     """
     usual = {curve: people.mean(curve, PERCENT / 100) for curve in COLUMNS}
@@ -129,9 +130,9 @@ def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | N
 
 
 def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, people: HumanGait) -> None:
-    """Raise `SpringfootError` unless each leg alone walks as people do: a mean over both would hide one.
+    """Raise `SpringfootError` unless each leg alone walks as people do: a mean of both would hide a wrong one.
 
-    A leg with too few strides for a mean of its own is not checked. Arguments as of `cut_strides`.
+    Legs with too few strides for a mean are not checked. Arguments as of `cut_strides`.
     """
     for leg, series in walk.legs.items():
         if side not in ("both", leg):
@@ -149,16 +150,16 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
 
 
 def _bears_downward(force: NDArray) -> bool:
-    """Return whether a vertical force (T,) is that of a walk upside down: below 0 often, but not always.
+    """Tell whether a vertical force (T,) is that of a walk upside down: below 0 often, but not always.
 
-    A plate that nobody trod on shows noise, or an offset.
+    An empty plate shows noise, or an offset.
     """
     least = force.min(initial=0.0)
     return bool(-least > force.max(initial=0.0) and 0.25 < np.mean(force < 0.5 * least) < 0.9)
 
 
 def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Return guesses of the fault, the surest first; `usual` has all of people's curves."""
+    """Yield guesses of the fault, the surest first; `usual` has all of people's curves."""
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
             f"the knee is at {np.degrees(mean['knee']).mean():.0f} deg on the average: the angle between thigh and "
@@ -214,14 +215,14 @@ def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
 
 
 def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
-    """Return whether the curve hardly moves in some walks; not if all of its kind do so, as in a wrong unit."""
+    """Tell whether the curve hardly moves in some walks; not if all curves of its kind do so, as in a wrong unit."""
     rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < CURVE_LIMITS["ankle"].least
     others = [size >= CURVE_LIMITS[each].least for each, size in sizes.items() if _kind(each) == _kind(curve)]
     return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
 
 
 def _unit(kind: str, size: float) -> str:
-    """Return the unit that makes a curve so many times as large, if there is one."""
+    """Return the unit that makes a curve that many times as large, if there is one."""
     factors = MISTAKEN_UNITS[kind]
     unit = min(factors, key=lambda each: abs(np.log(size / factors[each])))
     near = abs(np.log(size / factors[unit])) < np.log(NEAR_UNIT)
@@ -229,7 +230,7 @@ def _unit(kind: str, size: float) -> str:
 
 
 def _moved(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Angles from another zero than ours."""
+    """Yield angles with another zero than ours."""
     for curve in (each for each in mean if each in _ALL_ANGLES):
         off = float(mean[curve].mean() - usual[curve].mean())
         if abs(off) > LARGEST_OFFSET:
@@ -247,13 +248,13 @@ def _kind(curve: str) -> str:
 
 
 def _as_written(curve: str, values: NDArray) -> tuple[float, float]:
-    """Least and largest value in the unit of the column."""
+    """Return the least and largest value in the unit of the column."""
     unit = 180 / np.pi if curve in _ALL_ANGLES else 1.0
     return float(values.min()) * unit, float(values.max()) * unit
 
 
 def _at_another_time(late: Curves, backward: Curves) -> Iterator[str]:
-    """Return the shift, or the running backward, by which every curve comes nearer to people's."""
+    """Yield the shift, or the reversal, by which every curve comes nearer to people's."""
     if len(late) < 2:
         return
     present = np.array([[each[0]] for each in late.values()])
@@ -292,7 +293,7 @@ def _guess(curve: str, values: NDArray, usual: Curves, late: NDArray, backward: 
 
 
 def _unborne(mean: Curves) -> Iterator[str]:
-    """Refuse forces that bear no body, and an ankle moment that is not theirs times a foot's lever."""
+    """Yield forces that bear no body, and an ankle moment that does not fit the forces and a foot's lever."""
     if "grf_vertical" not in mean:
         return
     force, (least, most), (nearest, farthest) = mean["grf_vertical"], BORNE, LEVERS

@@ -1,4 +1,4 @@
-"""From contact force to the gait cycle: heel strikes, toe-offs, strides, curves over percent of stride."""
+"""Find the gait cycle from contact force: heel strikes, toe-offs, strides, curves over percent of the stride."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -8,30 +8,31 @@ import numpy as np
 from springfoot.arrays import NDArray
 
 CONTACT_THRESHOLD_BW = 0.05
-"""A foot is on the ground above this vertical force [body weights]; chosen: 31 N at 63 kg (plates: 20 to 30 N)."""
+"""Vertical force above which a foot is on the ground [body weights]; chosen: 31 N at 63 kg (plates: 20 to 30 N)."""
 SHORTEST_CONTACT = 0.10
-"""Contacts shorter than this [s] are scuffs of the swinging foot; chosen: people's stance takes 0.5 s and more."""
+"""Time below which a contact is a scuff of the swinging foot [s]; chosen: people's stance takes 0.5 s and more."""
 SHORTEST_FLIGHT = 0.06
-"""Gaps shorter than this [s] are bounces within stance, not swing; chosen: people's swing takes 0.35 s and more."""
+"""Time below which a gap is a bounce within stance, not swing [s]; chosen: people's swing takes 0.35 s and more."""
 PERCENT = np.arange(101)
-"""Percent of the stride (or step) at which curves are given: 0, 1, ..., 100."""
+"""Percents of the stride (or step) of a curve: 0, 1, ..., 100."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contacts:
     """Gait events of one foot; times in s, ascending.
 
-    A foot on the ground when the record begins has no heel strike there, one still on the ground when it ends no
-    toe-off: an event is a crossing that was seen.
+    A foot on the ground at the beginning of the record has no heel strike there, and at the end no toe-off: an event is
+    a crossing of the threshold within the record.
     """
 
     heel_strikes: NDArray
     """Times (H,) at which the foot takes load."""
     toe_offs: NDArray
-    """Times (O,) at which it leaves the ground."""
+    """Times (O,) at which the foot leaves the ground."""
 
     def strides(self, after: float = 0.0) -> NDArray:
-        """Complete strides that begin at or after `after` [s]: (S, 3) heel strike, toe-off, next heel strike [s]."""
+        """Return complete strides that begin at or after `after` [s]: (S, 3) heel strike, toe-off, next heel strike
+        [s]."""
         begin = self.heel_strikes[:-1]
         end = self.heel_strikes[1:]
         toe_off = next_after(self.toe_offs, begin)
@@ -40,7 +41,7 @@ class Contacts:
 
 
 def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first: float = 0.0) -> Contacts:
-    """Heel strikes and toe-offs of one foot from its vertical force.
+    """Find heel strikes and toe-offs of one foot from its vertical force.
 
     `vertical_force` (T,) is sampled every `tick` [s], its first sample at time `first` [s]; `threshold` has its unit
     (usually `CONTACT_THRESHOLD_BW` times body weight). Gaps shorter than `SHORTEST_FLIGHT` are closed, then contacts
@@ -60,10 +61,10 @@ def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first:
 
 
 def find_steps(left: Contacts, right: Contacts, after: float = 0.0) -> tuple[NDArray, NDArray]:
-    """Return steps: from a heel strike to the next one, where that is the other foot's.
+    """Return steps: from a heel strike to the next one, if that is the other foot's.
 
-    Returns times (P, 2) of both heel strikes [s] and the side (P,) of the first, 0 left, 1 right. Only steps that
-    begin at or after `after` [s].
+    Returns times (P, 2) of both heel strikes [s] and the side (P,) of the first, 0 left, 1 right. Only steps that begin
+    at or after `after` [s].
     """
     times = np.concatenate([left.heel_strikes, right.heel_strikes])
     sides = np.repeat([0, 1], [len(left.heel_strikes), len(right.heel_strikes)])
@@ -75,12 +76,12 @@ def find_steps(left: Contacts, right: Contacts, after: float = 0.0) -> tuple[NDA
 
 
 def next_after(events: NDArray, times: NDArray) -> NDArray:
-    """For each of `times` the first of the ascending `events` later than it, infinity where there is none."""
+    """Return for each of `times` the first later one of the ascending `events`, infinity if there is none."""
     return np.append(events, np.inf)[np.searchsorted(events, times, side="right")]
 
 
 def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> NDArray:
-    """`series` (T, ...) at `times` of any shape [s], linearly between its samples; shape times.shape + (...).
+    """Return `series` (T, ...) at `times` of any shape [s], linear between samples; shape times.shape + (...).
 
     Sample k of the series belongs to time first + k * tick; times outside it take the value of its end.
     """
@@ -92,16 +93,13 @@ def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> 
 
 
 def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0) -> NDArray:
-    """Curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals from `begin` to `end` [s]."""
+    """Return curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals from `begin` to `end` [s]."""
     times = begin[:, None] + (end - begin)[:, None] * (PERCENT / 100)
     return sample(series, times, tick, first)
 
 
 def _without_short_runs(flags: NDArray, value: bool, shortest: float) -> NDArray:
-    """Return `flags` with inner runs of `value` that are shorter than `shortest` samples inverted.
-
-    Runs at the ends stay.
-    """
+    """Return `flags` with inner runs of `value` shorter than `shortest` samples inverted; runs at the ends stay."""
     edges = np.flatnonzero(flags[:-1] != flags[1:]) + 1
     bounds = np.concatenate([[0], edges, [len(flags)]])
     result = flags.copy()

@@ -1,4 +1,4 @@
-"""Fits `human_harmonics.json` to the reference data: `python -m springfoot.gait.people.fit_human REFERENCE_FOLDER`."""
+"""Fit `human_harmonics.json` to the reference data: `python -m springfoot.gait.people.fit_human REFERENCE_FOLDER`."""
 
 import argparse
 import csv
@@ -36,7 +36,7 @@ SPRING_HABITS = {
     "toe_off": [0.62, 0.70],
     "toe_swing_deg": 10.0,
 }
-"""What the foot's springs take of people besides curves: `springfoot.gait.people.human.FootHabits`."""
+"""Numbers of people for the foot's springs, besides curves: `springfoot.gait.people.human.FootHabits`."""
 COP_SOURCE = (
     "Winter DA. Biomechanics and Motor Control of Human Movement, 4th ed. (2009), appendix A: ONE subject, 56.7 kg, "
     "natural cadence. Foot length taken as the travel of the centre of pressure, 0.258 m."
@@ -83,7 +83,7 @@ def fit(reference: Path) -> dict:
 
 
 def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
-    """Least-squares polynomial over stance, which ends at the first row without a centre of pressure."""
+    """Fit a polynomial over stance, which ends at the first row without a centre of pressure, by least squares."""
     stance = [row for row in rows if row["cop_forward_from_ankle_m"]]
     ends = min(float(row["percent"]) for row in rows if not row["cop_forward_from_ankle_m"])
     forward = _column(stance, "cop_forward_from_ankle_m")
@@ -110,7 +110,7 @@ def _column(rows: list[dict[str, str]], name: str) -> NDArray:
 
 
 def main() -> int:
-    """Command line: writes `human_harmonics.json` beside this file; exit code 2 if the data are not there."""
+    """Write `human_harmonics.json` beside this file; return exit code 2 if the data are missing."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("reference", type=Path, help="folder with human_gait.csv, human_mtp.csv and human_cop.csv")
     try:
@@ -126,7 +126,7 @@ def main() -> int:
 
 
 def _compact(value: object) -> str:
-    """JSON with one line a curve."""
+    """Return JSON with one line a curve."""
     if not isinstance(value, dict):
         return json.dumps(value)
     return (

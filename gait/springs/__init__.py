@@ -1,4 +1,4 @@
-"""Stiffness: the law of the joints, schedules over the stride, and springs identified from motion."""
+"""Describe stiffness: the law of the joints, schedules over the stride, and springs identified from motion."""
 
 from typing import TYPE_CHECKING
 

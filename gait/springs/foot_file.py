@@ -1,7 +1,7 @@
-"""A foot of one's own in a file: a torque-angle table (CSV), or the settings of a foot or a schedule (JSON).
+"""Read a user's foot from a file: a torque-angle table (CSV), or the settings of a foot or a schedule (JSON).
 
 A table has a header and the columns `ankle_deg` and `ankle_torque_Nm`, `toe_deg` and `toe_torque_Nm`, or two of them:
-dorsiflexion and toe up positive, torques as the angles, so that a torque falls where its angle rises.
+dorsiflexion and toe up positive, torques with the sign of the angles, so that torque falls as the angle rises.
 """
 
 from pathlib import Path
@@ -17,9 +17,9 @@ from .stiffness import SPRINGS
 def read_foot(path: str | Path) -> dict[str, Any]:
     """Return the setting `left_foot` or `right_foot` in a file.
 
-    A CSV is a passive foot with these torques; the other joint is as usual. A JSON file is a foot's dictionary or a
-    `StiffnessSchedule`, then an adaptive foot that follows it. Raises `SpringfootError` for another file; the numbers
-    are checked where the setting is.
+    A CSV is a passive foot with these torques; the other joint has its defaults. A JSON file is a foot's dictionary, or
+    a `StiffnessSchedule` for an adaptive foot that follows it. Raises `SpringfootError` for another file; the setting
+    checks the numbers.
     """
     path = Path(path)
     if path.suffix.lower() == ".csv":

@@ -1,4 +1,4 @@
-"""System identification without disturbance: K, beta and theta_eq from torque, angle and velocity of a gait.
+"""Identify K, beta and theta_eq from torque, angle and velocity of an undisturbed gait.
 
 In each phase of the stride the joint is taken as one spring and damper, torque = K (theta_eq - theta - beta theta'),
 which is linear in K theta_eq, K and K beta: ordinary least squares. Intervals are exact if the torque's errors are
@@ -7,11 +7,11 @@ smoothed or averaged curves have errors that last for many samples, and then the
 says so); white noise of standard deviation d on the angle makes K too small, by s^2 / (s^2 + d^2) with s the angle's
 spread (`PhaseSpring.angle_spread`).
 
-What it cannot do: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle.
-What is found is the slope of the loop of torque over angle (quasi-stiffness), the spring's K only if theta_eq stood
-still in the phase. On the simulation's fixed schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at
-30-44 % of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning know
-nothing of that. Where a gait can be pushed, `perturbation` finds K itself.
+Its limit: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle. The
+result is the slope of the loop of torque over angle (quasi-stiffness), and the spring's K only if theta_eq stood still
+in the phase. On the simulation's fixed schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at 30-44
+% of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning do not show it.
+If a gait can be pushed, `identification_by_pushes` finds K itself.
 """
 
 from collections.abc import Sequence
@@ -27,46 +27,46 @@ from springfoot.errors import SpringfootError, require_number, require_within
 from .spring_fit import Estimate, fit_spring, intervals
 
 COLLINEAR = 0.95
-"""Correlation of angle and velocity beyond which they hardly tell K from beta (variance inflation above 10)."""
+"""Correlation of angle and velocity beyond which K and beta can hardly be separated (variance inflation above 10)."""
 ILL_CONDITIONED = 30.0
 """Condition number of (1, angle, velocity), columns of unit length, beyond which it harms (Belsley et al. 1980)."""
 LEAST_SPREAD = np.deg2rad(0.5)
-"""Angle spread [rad] below which there is too little motion: the best of gait laboratories err by as much, and such
-an error would halve K."""
+"""Angle spread [rad] below which there is too little motion: the best of gait laboratories err by as much, and such an
+error would halve K."""
 CORRELATED = 0.5
-"""Lag-1 correlation of the residuals beyond which the intervals are called too narrow."""
+"""Lag-1 correlation of the residuals beyond which a warning calls the intervals too narrow."""
 
 PARAMETERS = ("stiffness", "damping_time", "equilibrium")
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseSpring:
-    """The spring and damper identified in one phase; None where the data do not say."""
+    """The spring and damper identified in one phase; None for numbers that the data leave open."""
 
     start: float
-    """Stride phase at which it begins."""
+    """Stride phase at its beginning."""
     end: float
-    """Stride phase at which it ends."""
+    """Stride phase at its end."""
     samples: int
-    """Samples in it."""
+    """Samples in the phase."""
     stiffness: Estimate | None
     """K [N m/rad]; its interval by Student's t."""
     damping_time: Estimate | None
     """beta [s], a ratio of two estimates: its interval is Fieller's."""
     equilibrium: Estimate | None
-    """theta_eq [rad], likewise."""
+    """theta_eq [rad], with Fieller's interval."""
     r2: float | None
-    """Share of the torque's variance explained [0..1]."""
+    """Fraction of the torque's variance that the spring explains [0..1]."""
     correlation: float | None
-    """Of angle and velocity [-1..1]."""
+    """Correlation of angle and velocity [-1..1]."""
     condition: float
     """Condition number of (1, angle, velocity), columns of unit length."""
     angle_spread: float
-    """Standard deviation of that part of the angle which velocity does not tell [rad]: what K is found by."""
+    """Standard deviation of the part of the angle that velocity does not explain [rad]; K is found by it."""
     residual_correlation: float | None
     """Lag-1 correlation of the residuals in the order given [-1..1]; None if they are mere rounding."""
     warning: str
-    """One line on why not to trust the numbers; "" if nothing speaks against them."""
+    """Reason to doubt the numbers, one line; "" if there is none."""
 
 
 def identify(
@@ -77,9 +77,10 @@ def identify(
     bounds: Sequence[float],
     margin: float = 0,
 ) -> tuple[PhaseSpring, ...]:
-    """K, beta and theta_eq of each phase of the stride, by least squares, with their intervals.
+    """Identify K, beta and theta_eq of each phase of the stride by least squares, with their intervals.
 
-    They are those of a spring only if its theta_eq stood still in the phase: else use `perturbation.identify_pushed`.
+    They are those of a spring only if its theta_eq stood still in the phase; otherwise use
+    `identification_by_pushes.identify_pushed`.
 
     Args:
         torque: [N m], or per kg, positive as the angle (a plantarflexion moment with its sign turned).
@@ -95,7 +96,7 @@ def identify(
 
 
 def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
-    """Return the result of one phase and its warning."""
+    """Return the spring of one phase, with its warning."""
     count = len(torque)
     estimates: Sequence[Estimate | None] = [None] * 3
     r2 = correlation = lagged = None
@@ -154,7 +155,7 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
 def _windows(
     torque: ArrayLike, angle: ArrayLike, velocity: ArrayLike, phase: ArrayLike, bounds: Sequence[float], margin: float
 ) -> list[tuple[tuple[float, float], tuple[NDArray, NDArray, NDArray]]]:
-    """For each phase its bounds, and torque, angle and velocity (n,) of its samples."""
+    """Return for each phase its bounds, and torque, angle and velocity (n,) of its samples."""
     arrays = [np.asarray(values, float) for values in (torque, angle, velocity, phase)]
     shapes = [values.shape for values in arrays]
     if len(set(shapes)) > 1 or not all(np.isfinite(values).all() for values in arrays):

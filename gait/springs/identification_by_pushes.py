@@ -1,21 +1,22 @@
-"""Identification by perturbation: K and beta from how torque leaves its mean course when the body is pushed.
+"""Identify K and beta by perturbation: from the way torque leaves its mean course when the body is pushed.
 
 Pushes at random throw each stride off the mean of all strides. At equal phase of the controller a spring's rest angle
-is the same in all of them and cancels; with d the deviation from the mean at that phase,
+is the same in all strides and cancels; with d the deviation from the mean at that phase,
 
     d torque = -K(phase) (d angle + beta d velocity).
 
-People's ankles were identified so in walking: Rouse et al. 2014, IEEE Trans. Neural Syst. Rehabil. Eng. 22:870-878. An
-undisturbed gait cannot say it (`identification`): its theta_eq moves with the angle, and any K fits some theta_eq.
+People's ankles were identified in walking by this method: Rouse et al. 2014, IEEE Trans. Neural Syst. Rehabil. Eng.
+22:870-878. An undisturbed gait does not contain K (`identification`): its theta_eq moves with the angle, and any K fits
+some theta_eq.
 
-Phases are equal within bins of `BIN`, and the mean course is a straight line in each, since theta_eq moves on in it. K
-is linear between knots: a ramp taken for a constant leaks its own deviations into K. Intervals leave out one trial
-at a time (`jackknife`), so that errors may last a whole trial. And whatever else the torque might follow is asked: a
-joint that reacts to it is no spring, whatever K is fitted.
+Phases are equal within bins of `BIN`, and the mean course is a straight line in each bin, since theta_eq moves on in
+it. K is linear between knots: a ramp fitted by a constant leaks its own deviations into K. Intervals leave out one
+trial at a time (`jackknife`), so that errors may last a whole trial. Further states are tested as well: a joint whose
+torque reacts to one of them is no spring, whatever K is fitted.
 
-What no such experiment can tell: a reflex of the joint's own angle at the same instant is a spring to it, a reaction to
-a state that was not recorded is noise, and white noise of standard deviation d on the angle makes K too
-small, by s^2 / (s^2 + d^2) with s the angle's spread (`PushedSpring.angle_spread`).
+Limits of the experiment: a reflex of the joint's own angle at the same instant looks like a spring, a reaction to an
+unrecorded state like noise, and white noise of standard deviation d on the angle makes K too small, by s^2 / (s^2 +
+d^2) with s the angle's spread (`PushedSpring.angle_spread`).
 """
 
 from collections.abc import Sequence
@@ -35,17 +36,20 @@ from .spring_fit import Estimate
 BIN = 0.0025
 """Width of the bins of equal phase [stride]."""
 LEAST_IN_BIN = 8
-"""Samples below which a bin is left out: two of them its straight line takes."""
+"""Samples below which a bin is left out: its straight line takes two of them."""
 LEAST_TRIALS = 10
-"""Trials below which nothing is said, and below twice the number of further states: intervals rest on their number."""
+"""Trials below which the verdict is `UNKNOWN`, as below twice the number of further states: intervals rest on their
+number."""
 LEAST_EXPLAINED = 0.5
-"""Share of the torque's deviations that K and beta must explain for a spring: below, most of it is something else."""
+"""Fraction of the torque's deviations that K and beta of a spring must explain: below, most of the torque is no
+spring's."""
 LEAST_PRECISION = 0.5
-"""Half of K's interval over K beyond which K is not known."""
+"""Half width of K's interval over K beyond which K counts as unknown."""
 REACTION_LEVEL = 0.01
 """Significance at which further states must matter for the verdict `REACTS` (of true springs, 3 % meet it alone)."""
 REACTION_SHARE = 0.02
-"""Share of all that is explained which they must explain beyond K and beta: a torque a seventh of the spring's."""
+"""Fraction of the explained variance that further states must explain beyond K and beta for the verdict `REACTS`: a
+torque a seventh of the spring's."""
 
 SPRING = "spring"
 REACTS = "reacts: not a spring"
@@ -54,32 +58,32 @@ UNKNOWN = "not identified"
 
 @dataclass(frozen=True, kw_only=True)
 class PushedSpring:
-    """What pushes tell of one joint in one phase; None where the data do not say."""
+    """Result of pushes for one joint in one phase; None for numbers that the data leave open."""
 
     start: float
-    """Stride phase at which it begins."""
+    """Stride phase at its beginning."""
     end: float
-    """Stride phase at which it ends."""
+    """Stride phase at its end."""
     samples: int
-    """Samples in bins that are full enough."""
+    """Samples in bins with enough samples."""
     trials: int
-    """Trials they come from."""
+    """Trials of these samples."""
     stiffness: Estimate | None
     """K [N m/rad], its mean over the samples."""
     damping_time: Estimate | None
-    """beta [s], the ratio of the means of K beta and K; None where K may be 0."""
+    """beta [s], the ratio of the means of K beta and K; None if K may be 0."""
     explained: float
-    """Share of the variance of the torque's deviations that K and beta explain [0..1]."""
+    """Fraction of the variance of the torque's deviations that K and beta explain [0..1]."""
     reaction: float
-    """Share that further states explain beyond them [0..1]."""
+    """Fraction that further states explain beyond K and beta [0..1]."""
     reaction_p: float
-    """Probability of so much by chance if they do not matter; 1 where it cannot be computed."""
+    """Probability of that fraction by chance if the further states do not matter; 1 if it cannot be computed."""
     angle_spread: float
-    """Standard deviation of that part of the angle's deviations which velocity does not tell [rad]."""
+    """Standard deviation of the part of the angle's deviations that velocity does not explain [rad]."""
     verdict: str
     """`SPRING`, `REACTS` or `UNKNOWN`."""
     reason: str
-    """One line on why it is no spring; "" for one."""
+    """Reason why it is no spring, one line; "" for a spring."""
 
 
 def identify_pushed(
@@ -94,15 +98,15 @@ def identify_pushed(
     margin: float = 0.0,
     spacing: float | None = 0.02,
 ) -> tuple[PushedSpring, ...]:
-    """K, beta and a verdict for each phase of the stride, from many strides under random pushes.
+    """Identify K, beta and a verdict for each phase of the stride, from many strides under random pushes.
 
     Args:
         torque: (n,) [N m], positive as the angle, of the same instants as
         angle: (n,) [rad] and velocity: (n,) [rad/s].
-        phase: (n,) phase [0, 1) by which the rest angle moves; of a device, its controller's.
-        trial: (n,) which trial a sample is of; trials are independent of each other, samples of one need not be.
+        phase: (n,) phase [0, 1) by which the rest angle moves; for a device, its controller's.
+        trial: (n,) trial of each sample; trials are independent of each other, samples of one need not be.
         bounds: (P + 1,) ascending stride phases [0, 1]: P phases.
-        states: (n, q) what else the torque might follow, measured at the same instants, in any unit.
+        states: (n, q) further states that the torque might follow, at the same instants, in any unit.
         margin: part of the stride left out at both ends of each phase.
         spacing: K is linear between knots at most this part of the stride apart; None: constant in each phase.
 
@@ -153,7 +157,7 @@ def _checked(
 
 
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
-    """Return the result of one phase."""
+    """Return the spring of one phase."""
     low_in = low + margin
     high_in = high - margin
     inside = np.flatnonzero((data.phase >= low_in) & (data.phase < high_in))
@@ -232,7 +236,7 @@ def _unknown(known: dict[str, float], reason: str) -> PushedSpring:
 
 
 def _deviation(values: NDArray, phase: NDArray, cell: NDArray) -> NDArray:
-    """Return (n,) minus the straight line over `phase` through the values of each `cell`."""
+    """Return `values` (n,) minus the straight line over `phase` through the values of each `cell`."""
 
     def centred(column: NDArray) -> NDArray:
         return column - (np.bincount(cell, column) / np.bincount(cell))[cell]

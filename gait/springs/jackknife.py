@@ -1,7 +1,7 @@
-"""Regression on data in trials: what it finds, and how far off it may be when errors last as long as a trial.
+"""Fit regressions on data in trials, with intervals that hold even if errors last as long as a trial.
 
-Each trial is left out once. The spread of what the others then say is the uncertainty, whatever the errors of one trial
-have to do with each other (the estimator CV3 of MacKinnon, Nielsen & Webb 2022, Queen's Economics Working Paper 1485).
+Each trial is left out once. The spread of the remaining fits is the uncertainty, however the errors of one trial depend
+on each other (the estimator CV3 of MacKinnon, Nielsen & Webb 2022, Queen's Economics Working Paper 1485).
 """
 
 from typing import NamedTuple
@@ -18,21 +18,21 @@ WORST_CONDITION = 1e10
 
 
 class TrialFit(NamedTuple):
-    """Least squares of all trials, and again without each of them."""
+    """Least squares of all trials, and again without each trial."""
 
     coefficients: NDArray
-    """(p,)."""
+    """(p,) coefficients."""
     without: NDArray
-    """(trials, p)."""
+    """(trials, p) coefficients without each trial."""
     inflation: float
-    """Of variances, for the unknowns fitted before."""
+    """Factor on variances, for the unknowns fitted before."""
     explained: float
-    """Share of the variance explained [0..1]."""
+    """Fraction of the variance explained [0..1]."""
 
     def interval(self, value: float, without: NDArray) -> Estimate:
         """Return a function of the coefficients with its interval.
 
-        `without` (trials,): its values without each trial.
+        `value` is the function of all trials, `without` (trials,) the function without each trial.
         """
         trials = len(without)
         variance = self.inflation * (trials - 1) / trials * np.sum((without - without.mean()) ** 2)
@@ -40,7 +40,7 @@ class TrialFit(NamedTuple):
         return Estimate(float(value), float(value - half), float(value + half))
 
     def chance(self, first: int) -> float:
-        """Probability of coefficients `first` and on if all of them are 0: Hotelling's T^2; 1 with too few trials."""
+        """Return p that coefficients `first` and on are all 0, by Hotelling's T^2; 1 with too few trials."""
         values = self.coefficients[first:]
         without = self.without[:, first:]
         trials, count = without.shape
@@ -53,9 +53,11 @@ class TrialFit(NamedTuple):
 
 
 def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) -> TrialFit | None:
-    """Least squares, through 0, of `values` (n,) on `columns` (n, p); None where the data leave the coefficients open.
+    """Fit `values` (n,) on `columns` (n, p) by least squares through 0; return None if the data leave the coefficients
+    open.
 
-    `trial` (n,) counts trials from 0, each of which has samples. `spent`: unknowns that were fitted before, as means.
+    `trial` (n,) counts trials from 0, each with samples. `spent` is the number of unknowns fitted before, such as
+    means.
     """
     count, unknowns = columns.shape
     size = np.sqrt((columns**2).mean(0))

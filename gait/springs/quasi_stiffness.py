@@ -1,4 +1,6 @@
-"""The ankle's quasi-stiffness, the slope of its angle-moment curve: people's mean curves beside published trials."""
+"""Compare the ankle's quasi-stiffness, the slope of its angle-moment curve, of people's mean curves and published
+trials.
+"""
 
 from dataclasses import dataclass
 
@@ -13,19 +15,19 @@ class QuasiStiffness:
     """One phase of the ankle's angle-moment curve: people's mean curves beside published single trials."""
 
     phase: str
-    """Its name, as published."""
+    """Name of the phase, as published."""
     start: float
-    """Stride phase at which it begins."""
+    """Stride phase at its beginning."""
     end: float
-    """Stride phase at which it ends."""
+    """Stride phase at its end."""
     slope: float
-    """Of people's mean curve, moment over angle by least squares [N m/(rad kg)]."""
+    """Slope of people's mean curve, moment over angle by least squares [N m/(rad kg)]."""
     identified: PhaseSpring
-    """Spring and damper of the stretch, if theta_eq stood still in it (`identification`); K [N m/(rad kg)]."""
+    """Spring and damper of the phase, if theta_eq stood still in it (`identification`); K [N m/(rad kg)]."""
     published: float
     """Median of the published slopes [N m/(rad kg)]."""
     published_sd: float
-    """Their standard deviation over trials [N m/(rad kg)]."""
+    """Standard deviation of the published slopes over trials [N m/(rad kg)]."""
 
 
 FUKUCHI_SPEED = 1.2
@@ -41,7 +43,8 @@ adults (Fukuchi et al., PeerJ 6:e4640, 2018, CC BY 4.0; per-trial slopes compute
 
 
 def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
-    """People's ankle quasi-stiffness, not the joint's own K, at 1.2 m/s (`human_gait`) beside another laboratory's."""
+    """Return people's ankle quasi-stiffness, not the joint's own K, at 1.2 m/s (`human_gait`) beside another
+    laboratory's."""
     human = human_gait(FUKUCHI_SPEED)
     phase = np.arange(100) / 100
     angle = human.mean("ankle", phase)

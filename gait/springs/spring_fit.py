@@ -1,4 +1,4 @@
-"""Least squares of a spring and damper on one stretch of data, and its intervals: what `identification` stands on."""
+"""Fit a spring and damper to one stretch of data by least squares, with intervals, for `identification`."""
 
 from typing import NamedTuple
 
@@ -20,22 +20,23 @@ class Estimate(NamedTuple):
 
 
 class SpringFit(NamedTuple):
-    """tau = a - K theta - c theta', fitted along the last axis; leading axes are fits of their own."""
+    """Fit of tau = a - K theta - c theta' along the last axis; leading axes are fits of their own."""
 
     coefficients: NDArray
-    """(..., 3): a, K, c."""
+    """(..., 3) a, K, c."""
     covariance: NDArray
-    """(..., 3, 3)."""
+    """(..., 3, 3) covariance of a, K, c."""
     residual: NDArray
-    """(..., n)."""
+    """(..., n) residuals of the torque."""
     freedom: int
-    """n - 3."""
+    """Degrees of freedom, n - 3."""
     solvable: bool
     """False if the data leave K and c open; the numbers then mean nothing."""
 
 
 def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
-    """Least squares about the means, angle and velocity scaled to unit size: no digits lost to units or offsets."""
+    """Fit by least squares about the means, angle and velocity scaled to unit size: no digits lost to units or
+    offsets."""
     count = torque.shape[-1]
     mean = np.stack([angle.mean(-1), velocity.mean(-1)], -1)
     moved = np.stack([angle, velocity], -1) - mean[..., None, :]
@@ -70,8 +71,8 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
 def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
     """Return (value, low, high) of K, beta and theta_eq.
 
-    Fieller 1954 for the ratios: all r for which the numerator - r K does not differ from 0. Exact where the delta
-    method is not; where K may be 0 the ratio has no bounds.
+    Fieller 1954 for the ratios: all r for which the numerator - r K does not differ from 0. Exact, other than the delta
+    method; if K may be 0 the ratio has no bounds.
     """
     quantile = stdtrit(fit.freedom, (1 + CONFIDENCE) / 2)  # Student's t
     a, K, c = np.moveaxis(fit.coefficients, -1, 0)

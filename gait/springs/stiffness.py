@@ -1,4 +1,4 @@
-"""Joint stiffness: equation (4) of the thesis, K = d tau / d theta, and schedules of it over the stride.
+"""Compute joint stiffness, equation (4) of the thesis, K = d tau / d theta, and schedules of it over the stride.
 
 Angle and torque of ankle and toe over one stride -> gait events -> a straight line between each two -> springs.
 """
@@ -21,8 +21,8 @@ from ..people.human import human_gait
 SPRINGS = ("ankle", "toe")
 """The joints of a schedule, in the order of the last axis of its arrays."""
 LOWEST_STIFFNESS = (20.0, 5.0)
-"""Stiffness of ankle and toe in swing [N m/rad] for 1.70 m and 63 kg; chosen, the least that an action sets by default;
-the thesis says 0."""
+"""Stiffness of ankle and toe in swing [N m/rad] for 1.70 m and 63 kg; chosen, the least of an action by default; the
+thesis says 0."""
 STIFFNESS_RANGE = (0.0, 1e5)
 """Accepted stiffnesses of a schedule [N m/rad]; chosen."""
 ANGLE_RANGE = (-np.pi, np.pi)
@@ -35,7 +35,7 @@ class Segment(NamedTuple):
     """A spring that holds from one stride phase to that of the next segment."""
 
     start: float
-    """Stride phase [0, 1) of this leg at which it begins."""
+    """Stride phase [0, 1) of this leg at its beginning."""
     stiffness: float
     """K [N m/rad]."""
     equilibrium: float
@@ -62,7 +62,7 @@ class StiffnessSchedule:
             object.__setattr__(self, joint, segments)
 
     def at(self, phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """K [N m/rad] and theta_eq [rad] at stride phases of any shape, each (..., 2) for ankle and toe."""
+        """Return K [N m/rad] and theta_eq [rad] at stride phases of any shape, each (..., 2) for ankle and toe."""
         phase = np.mod(np.asarray(phase, float), 1.0)
         stiffness, equilibrium = np.empty((2, *phase.shape, len(SPRINGS)))
         for column, joint in enumerate(SPRINGS):
@@ -74,12 +74,12 @@ class StiffnessSchedule:
         return stiffness, equilibrium
 
     def to_json(self) -> dict[str, list[list[float]]]:
-        """Plain lists: {"ankle": [[start phase, K, theta_eq], ...], "toe": [...]}."""
+        """Return plain lists: {"ankle": [[start phase, K, theta_eq], ...], "toe": [...]}."""
         return {joint: [list(segment) for segment in getattr(self, joint)] for joint in SPRINGS}
 
     @classmethod
     def from_json(cls, data: object) -> "StiffnessSchedule":
-        """Return the inverse of `to_json`; `SpringfootError` if `data` is not of that form."""
+        """Return the inverse of `to_json`; raise `SpringfootError` for data of another form."""
         if not isinstance(data, dict) or set(data) != set(SPRINGS):
             raise SpringfootError(f"a stiffness schedule must be an object with keys ankle and toe, got {data!r:.80}")
         for joint, segments in data.items():
@@ -89,11 +89,11 @@ class StiffnessSchedule:
 
 
 def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: float = 0.0) -> tuple[float, float]:
-    """Equation (4): the spring (K [N m/rad], theta_eq [rad]) of a straight line in the angle-torque plane.
+    """Return the spring (K [N m/rad], theta_eq [rad]) of a straight line in the angle-torque plane, equation (4).
 
-    `start`, `end`: (angle [rad], torque [N m]), torque positive as the angle, so that K = -d tau / d theta and the
-    line is tau = K (theta_eq - theta). A line that no spring can follow, falling less than `lowest` or not falling at
-    all (torque growing with the angle, or changing at a standing angle), gets K = `lowest` through its mid-point.
+    `start`, `end`: (angle [rad], torque [N m]), torque positive as the angle, so that K = -d tau / d theta and the line
+    is tau = K (theta_eq - theta). A line that no spring can follow, falling less than `lowest` or not falling at all
+    (torque growing with the angle, or changing at a standing angle), gets K = `lowest` through its mid-point.
     """
     (first_angle, first_torque), (last_angle, last_torque) = start, end
     turned = last_angle - first_angle
@@ -106,11 +106,12 @@ def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: fl
 
 
 def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
-    """Stride phases of heel strike, foot flat, maximum dorsiflexion and toe-off, in this order, from the ankle angle.
+    """Return the phases of heel strike, foot flat, maximum dorsiflexion and toe-off, in this order, from the ankle
+    angle.
 
     `phase` (n,) ascends from 0, heel strike, at least to `toe_off`; `angle` (n,) [rad], dorsiflexion positive. Foot
-    flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has its foot flat
-    at heel strike, one that only plantarflexes its maximum too. Raises `SpringfootError` for curves that do not fit.
+    flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has its foot flat at
+    heel strike, one that only plantarflexes its maximum too. Raises `SpringfootError` for curves that do not fit.
     """
     phase, angle = _stance(phase, angle, toe_off)
     top = int(angle.argmax())
@@ -124,7 +125,7 @@ def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str
 
 
 def toe_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
-    """Stride phases of heel strike, heel-off, maximum dorsiflexion and toe-off, in this order, from the toe angle.
+    """Return the phases of heel strike, heel-off, maximum dorsiflexion and toe-off, in this order, from the toe angle.
 
     As `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of stance (a toe
     lands raised, too); heel-off the last time before it at which the toe has made no more than `HEEL_OFF_RISE` of its
@@ -152,20 +153,20 @@ def schedule_from_curves(
     lowest: tuple[float, float] = (0.0, 0.0),
     toe_stiffness: float = TOE_STIFFNESS,
 ) -> StiffnessSchedule:
-    """Equation (4) on any curves, measured, planned or simulated: a straight line, one spring, between two events.
+    """Return the springs of measured, planned or simulated curves by equation (4): a straight line between two events.
 
     Args:
         phase: (n,) stride phases, ascending from 0, heel strike, at least to `toe_off`.
         toe_off: stride phase at which swing begins; springs then rest at 0 with the lowest stiffness.
         ankle: angle (n,) [rad], dorsiflexion positive, and torque (n,) [N m], positive as the angle (a plantarflexion
             moment with its sign turned).
-        toe: the same of the toe, up positive; None where no moment is known: `toe_stiffness` resting at 0 in stance.
+        toe: the same of the toe, up positive; None without a known moment: `toe_stiffness` resting at 0 in stance.
         lowest: stiffness of ankle and toe [N m/rad] in swing, below which no line falls; the thesis says 0. A line
             no spring can follow takes it through its mid-point (`line_spring`).
-        toe_stiffness: [N m/rad], where `toe` is None.
+        toe_stiffness: [N m/rad], if `toe` is None.
 
-    Raises `SpringfootError` for curves that do not fit, or a rest angle beyond `ANGLE_RANGE` (a heavy load on a
-    line of low stiffness: give a higher `lowest`).
+    Raises `SpringfootError` for curves that do not fit, or a rest angle outside `ANGLE_RANGE` (a heavy load on a line
+    of low stiffness: give a higher `lowest`).
     """
     low_ankle, low_toe = (require_within("lowest", k, STIFFNESS_RANGE, "N m/rad") for k in lowest)
     ankle_lines = _lines(ankle_events(phase, ankle[0], toe_off), phase, *ankle, low_ankle)
@@ -179,14 +180,15 @@ def schedule_from_curves(
 
 
 THESIS_SWING = ((45.0, 0.0), (25.0, 10.0))
-"""Swing springs of ankle and toe, (K [N m/rad] for 1.70 m and 63 kg, rest angle [deg]), that complete its lines.
+"""Swing springs of ankle and toe, (K [N m/rad] for 1.70 m and 63 kg, rest angle [deg]), that complete the thesis's
+lines.
 
 The toe joint rests 10 deg up, as people hold it; with an ankle of 45 or a toe of 25 N m/rad it then clears the floor,
 with the lowest of both it does so in about half of the walks. Resting at 0 it catches the floor, as a drop foot does,
 with springs of 200 and 50 N m/rad as well: K alone does not help (tests/agents/policies/test_baselines.py).
 """
 PRINTED_SWING = tuple((k, 0.0) for k in LOWEST_STIFFNESS)
-"""As printed: the thesis gives swing no stiffness; the lowest that an ankle and a toe can have, resting at 0."""
+"""Swing springs as printed: the thesis gives swing no stiffness; the lowest of an ankle and a toe, resting at 0."""
 
 
 def thesis_schedule(
@@ -194,7 +196,7 @@ def thesis_schedule(
 ) -> StiffnessSchedule:
     """Return the thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
 
-    Torques scale with mass x height from people's at `speed` [m/s]. Of the toe people's moment is not known: it has
+    Torques scale with mass x height from people's at `speed` [m/s]. People's moment of the toe is unknown: the toe has
     `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. No line of the ankle falls below its `LOWEST_STIFFNESS`.
     `swing` is (K [N m/rad, for 1.70 m and 63 kg], rest angle [deg]) of ankle and toe after toe-off.
     """
@@ -215,7 +217,7 @@ def thesis_schedule(
 
 
 def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
-    """Phases and angles from heel strike to `toe_off`, its own sample the last."""
+    """Return phases and angles from heel strike to `toe_off`, with a sample at `toe_off` itself."""
     require_within("toe_off", toe_off, (0.0, 1.0))
     phase, angle = _curves(phase, angle)
     if not (len(phase) > 1 and phase[0] == 0.0 and np.all(np.diff(phase) > 0) and 0 < toe_off <= phase[-1]):
@@ -236,7 +238,7 @@ def _curves(*curves: ArrayLike) -> list[NDArray]:
 def _lines(
     events: dict[str, float], phase: ArrayLike, angle: ArrayLike, torque: ArrayLike, lowest: float
 ) -> list[Segment]:
-    """Return one segment from each event to the next; events that coincide leave no line between them."""
+    """Return one segment from each event to the next; events that coincide have none."""
     phases, angles, torques = _curves(phase, angle, torque)
     times = list(events.values())
     points = [(float(np.interp(time, phases, angles)), float(np.interp(time, phases, torques))) for time in times]
