@@ -1,8 +1,8 @@
-"""The body: every length, mass, centre of mass and inertia from height and body mass, proportions and a load.
+"""Describe the body: every length, mass, centre of mass and inertia from height, body mass, proportions and a load.
 
-Sources. Thesis: D. W. Nam, DGIST 2016, Table 1 (ratios of height). Winter: D. A. Winter, Biomechanics and
-Motor Control of Human Movement, 4th ed. 2009, Table 4.1 (mass fractions, centres of mass, radii of gyration)
-and Figure 4.1 (segment lengths). All ratios of masses are of body mass, all ratios of lengths of height unless said.
+Sources. Thesis: D. W. Nam, DGIST 2016, Table 1 (ratios of height). Winter: D. A. Winter, Biomechanics and Motor Control
+of Human Movement, 4th ed. 2009, Table 4.1 (mass fractions, centres of mass, radii of gyration) and Figure 4.1 (segment
+lengths). All ratios of masses are of body mass, all ratios of lengths of height unless said.
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ CARRIED_BEHIND = 0.2
 """Distance of a load's centre behind the trunk's CoM, at the same height [m at 1.70 m]; chosen: half the depth of the
 chest and half of a backpack 0.15 m thick."""
 CARRIED_GYRATION = 0.15
-"""Radius of gyration of a load [m at 1.70 m]; chosen: that of a uniform box 0.5 m high and 0.15 m thick."""
+"""Radius of gyration of a load [m at 1.70 m]; chosen, as of a uniform box 0.5 m high and 0.15 m thick."""
 
 
 def gravity(slope: float) -> NDArray:

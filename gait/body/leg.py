@@ -1,10 +1,10 @@
-"""One leg as a chain of rigid segments: its motion and load, and the joint moments they take.
+"""Compute motion, load and joint moments of one leg as a chain of rigid segments.
 
 Thigh, shank, foot and toe hang below the hip. The frame is fixed to the ground: x forward along it, z up at right
-angles to it. A *turn* is a segment's angle in that frame, positive where its front goes up; the thigh's is its
-flexion. A *moment* is the internal joint moment [N m], what muscles and springs apply: extension of hip and knee,
-plantarflexion of ankle and toe positive, so that moment = -torque where torque is positive as the angle. Segment
-masses, centres and inertias are `Body`'s. All arrays share their leading axes, written "..." below.
+angles to it. A *turn* is a segment's angle in that frame, positive where its front goes up; the thigh's is its flexion.
+A *moment* is the internal joint moment [N m] of muscles and springs: extension of hip and knee, plantarflexion of ankle
+and toe positive, so that moment = -torque where torque is positive as the angle. Segment masses, centres and inertias
+are `Body`'s. All arrays share their leading axes, written "..." below.
 """
 
 from collections.abc import Mapping
@@ -32,18 +32,18 @@ _MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegMotion:
-    """How one leg moves; from `leg_motion`, or filled in exactly. Segments in the order of `LEG_SEGMENTS`."""
+    """Motion of one leg; from `leg_motion`, or filled in exactly. Segments in the order of `LEG_SEGMENTS`."""
 
     turn: NDArray
     """(..., 4) segment turns [rad]."""
     rate: NDArray
-    """(..., 4) [rad/s]."""
+    """(..., 4) rates of the turns [rad/s]."""
     acceleration: NDArray
-    """(..., 4) [rad/s^2]."""
+    """(..., 4) accelerations of the turns [rad/s^2]."""
     hip: NDArray
     """(..., 2) hip (x, z) [m]; only its place relative to the load's points matters."""
     hip_acceleration: NDArray
-    """(..., 2) [m/s^2]."""
+    """(..., 2) acceleration of the hip [m/s^2]."""
 
     def __post_init__(self) -> None:
         leading = self.hip.shape[:-1]
@@ -52,12 +52,12 @@ class LegMotion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FootLoad:
-    """What the ground does to one foot, on its two segments: foot (first), toe (second)."""
+    """Load of the ground on the two segments of a foot: foot (first), toe (second)."""
 
     force: NDArray
     """(..., 2, 2) force (forward, up) [N]."""
     point: NDArray
-    """(..., 2, 2) a point (x, z) [m] of its line of action; of no account where the force is 0."""
+    """(..., 2, 2) a point (x, z) [m] of the force's line of action; irrelevant for a force of 0."""
 
     def __post_init__(self) -> None:
         _require_shapes(self, {"force": 2, "point": 2}, (*self.force.shape[:-2], 2))
@@ -65,7 +65,7 @@ class FootLoad:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointLoads:
-    """What passes through the joints, by name."""
+    """Moments and forces in the joints, by joint."""
 
     moment: dict[str, NDArray]
     """(...) internal joint moments [N m], signs as in the module's head."""
@@ -77,7 +77,7 @@ class JointLoads:
 
 
 def segment_turns(angles: Mapping[str, ArrayLike], slope: float = 0.0) -> NDArray:
-    """Segment turns (..., 4) [rad] from the angles thigh (to the true vertical), knee, ankle, toe [rad].
+    """Return segment turns (..., 4) [rad] from the angles thigh (to the true vertical), knee, ankle, toe [rad].
 
     On a `slope` [rad], uphill positive, the frame leans with the ground.
     """
@@ -87,13 +87,13 @@ def segment_turns(angles: Mapping[str, ArrayLike], slope: float = 0.0) -> NDArra
 
 
 def leg_motion(angles: Mapping[str, ArrayLike], hip: ArrayLike, tick: float, slope: float = 0.0) -> LegMotion:
-    """Return the motion of a leg from samples every `tick` [s]: angles (T,) as in `segment_turns`, hip (T, 2) (x, z)
+    """Return the motion of a leg from samples every `tick` [s]: angles (T,) as in `segment_turns`, hip (x, z) (T, 2)
     [m].
 
-    Rates and accelerations are those of the cubic splines through the samples: exact for cubics, else with an error
-    of the order of tick^2, and larger in the first and last few samples. Nothing is smoothed: noise of e in the
-    samples is noise of about 3 e / tick^2 in the accelerations, so filter measured data first. Raises `SpringfootError`
-    for fewer than 4 samples or values that are not finite.
+    Rates and accelerations are those of the cubic splines through the samples: exact for cubics, else with an error of
+    the order of tick^2, and larger in the first and last few samples. Nothing is smoothed: noise of e in the samples is
+    noise of about 3 e / tick^2 in the accelerations, so filter measured data first. Raises `SpringfootError` for fewer
+    than 4 samples or values that are not finite.
     """
     turns = segment_turns(angles, slope)
     hips = np.asarray(hip, float)
@@ -110,7 +110,7 @@ def leg_motion(angles: Mapping[str, ArrayLike], hip: ArrayLike, tick: float, slo
 
 
 def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArray]:
-    """Joints (..., 2) (x, z) [m] by name, from segment turns (..., 4) [rad] and the hip (..., 2) [m]."""
+    """Return joints (..., 2) (x, z) [m] by name, from segment turns (..., 4) [rad] and the hip (..., 2) [m]."""
     joints = [hip]
     for index, offset in enumerate(_far_ends(body)):
         joints.append(joints[-1] + np.stack(turned(turn[..., index], *offset), -1))
@@ -118,7 +118,7 @@ def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArra
 
 
 def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion:
-    """From columns of four turns, hip x, hip z, and their time derivatives."""
+    """Return a leg's motion from columns of four turns, hip x, hip z, and their time derivatives."""
     return LegMotion(
         turn=value[..., :4],
         rate=rate[..., :4],
@@ -129,7 +129,8 @@ def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion
 
 
 def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
-    """Rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive as a turn.
+    """Return the rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive as a
+    turn.
 
     `centre` is the CoM of the whole body, so that its own acceleration does not count in the sum over all parts.
     """
@@ -142,11 +143,11 @@ def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
 
 
 def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
-    """Return the load of one force (..., 2) [N] at `cop` (..., 2) (x, z) [m]: ahead of the toe joint (x, [m]) it is the
-    toe's.
+    """Return the load of a force (..., 2) [N] at `cop` (..., 2) (x, z) [m]: on the toe if `cop` is ahead of the toe
+    joint.
 
-    As the centre of pressure passes the joint the toe's moment starts with what the forward force has about it: its
-    lever is the height of the joint.
+    `toe_joint_x` is the x of the toe joint [m]. As the centre of pressure passes the joint, the toe's moment starts
+    with that of the forward force about the joint: its lever is the height of the joint.
     """
     ahead = (cop[..., 0] > np.asarray(toe_joint_x))[..., None]
     return FootLoad(
@@ -159,7 +160,7 @@ def load_at(force: NDArray, cop: NDArray, toe_joint_x: ArrayLike) -> FootLoad:
 
 
 def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[str, NDArray]:
-    """Equation (3): joint moments (...) [N m] by name from the ground reaction alone, r x F from each joint.
+    """Return joint moments (...) [N m] by name from the ground reaction alone, r x F from each joint: equation (3).
 
     Wells 1981 (Bulletin of Prosthetics Research 18, 15-19): weight and inertia of the segments are left out. The toe
     joint carries the toe's load, the joints above both segments'. In the thesis's Equation (3) r runs from the ZMP to
@@ -173,9 +174,10 @@ def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[st
 
 
 def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> JointLoads:
-    """Planar Newton-Euler inverse dynamics of toe, foot, shank and thigh, from the toe upwards.
+    """Compute joint moments and forces by planar Newton-Euler inverse dynamics of toe, foot, shank, thigh, from the toe
+    up.
 
-    Exact for the turns, rates and accelerations given. At the upper joint of each segment F = m (a - g) less the other
+    Exact for the given turns, rates and accelerations. At the upper joint of each segment F = m (a - g) less the other
     forces on it, and the moment is I times the turn's acceleration less the other moments about the CoM, that of F
     included (Winter 2009, section 5.1).
     """
@@ -214,7 +216,7 @@ def _require_shapes(holder: object, last: Mapping[str, int], leading: tuple[int,
 
 
 def _cross(r: NDArray, force: NDArray) -> NDArray:
-    """R x F in the plane, positive from x towards z: the sense of a turn."""
+    """Return r x F in the plane, positive from x towards z: the sense of a turn."""
     return r[..., 0] * force[..., 1] - r[..., 1] * force[..., 0]
 
 
@@ -225,7 +227,7 @@ def _far_ends(body: Body) -> tuple[tuple[float, float], ...]:
 
 
 def _inertial(body: Body) -> tuple[tuple[float, float], ...]:
-    """Mass [kg] and sagittal inertia about the CoM [kg m^2] of each segment."""
+    """Return mass [kg] and sagittal inertia about the CoM [kg m^2] of each segment."""
     return (
         (body.thigh_mass, body.thigh_inertia),
         (body.shank_mass, body.shank_inertia),
@@ -235,7 +237,7 @@ def _inertial(body: Body) -> tuple[tuple[float, float], ...]:
 
 
 def _com(body: Body, motion: LegMotion, joints: list[NDArray], index: int) -> tuple[NDArray, NDArray]:
-    """CoM (..., 2) [m] of a segment and its acceleration [m/s^2], along the chain from the hip."""
+    """Return the CoM (..., 2) [m] of a segment and its acceleration [m/s^2], along the chain from the hip."""
     forward, below = body.foot_com
     own = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
     com = joints[index] + np.stack(turned(motion.turn[..., index], *own[index]), -1)

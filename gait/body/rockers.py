@@ -1,4 +1,4 @@
-"""How a foot turns over the ground: pitches that rise with time, and the path of the ankle of a foot that turns."""
+"""Turn a foot over the ground: pitches that rise with time, and the path of the ankle of a turning foot."""
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -15,10 +15,10 @@ def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArra
 
 
 def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float | tuple[float, float]) -> NDArray:
-    """Return (3, ...): 0 until `start`, then to `top` at `end`, with two phase derivatives.
+    """Return (3, ...): 0 until `start`, then rising to `top` at `end`, with two phase derivatives.
 
-    The `shape` is a power, or the share of `top` half-way and the rate at the end over the mean rate: of a polynomial
-    of 2nd to 4th order.
+    The `shape` is a power; or, for a polynomial of 2nd to 4th order, the fraction of `top` half-way and the rate at the
+    end over the mean rate.
     """
     lasts = end - start
     done = np.maximum((np.asarray(phase) - start) / lasts, 0.0)
@@ -36,8 +36,7 @@ def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float 
 
 def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
     """Return (3, 3, ...): x, z, pitch of an ankle whose foot turns about a point of its flat place, two phase
-    derivatives.
-    """
+    derivatives."""
     ankle = turning(pitch, -pivot[0], body.ankle_height - pivot[1])
     ankle[0, 0] += pivot[0]
     ankle[0, 1] += pivot[1]
@@ -47,7 +46,7 @@ def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
 def turning(pitch: NDArray, forward: float, up: float) -> NDArray:
     """Return (3, 2, ...): the vector (forward, up) of a flat foot and its two phase derivatives.
 
-    `pitch` (3, ...) with its.
+    `pitch` (3, ...) has the pitch and its two phase derivatives.
     """
     angle, rate, curvature = pitch
     x, z = turned(angle, forward, up)

@@ -1,7 +1,7 @@
-"""What joints hold without muscle: passive elastic moments of tissue, and the tendon in which the calf pulls.
+"""Compute joint loads without muscle activity: passive elastic moments of tissue, and the tendon of the calf.
 
-Passive moments: Riener & Edrich, Journal of Biomechanics 32 (1999) 539-544, regressions over hip, knee and ankle
-angles of ten subjects, here for 1.70 m and 63 kg.
+Passive moments: Riener & Edrich, Journal of Biomechanics 32 (1999) 539-544, regressions over hip, knee and ankle angles
+of ten subjects, here for 1.70 m and 63 kg.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Walks planned by their zero-moment point (ZMP): CoM, feet, posture, forces, moments and effort."""
+"""Plan walks by their zero-moment point (ZMP): CoM, feet, posture, forces, moments and effort."""
 
 from typing import TYPE_CHECKING
 

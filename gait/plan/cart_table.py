@@ -1,8 +1,8 @@
-"""The cart-table model: the whole body as its CoM on a massless table standing on the ZMP (Kajita et al. 2003).
+"""Solve the cart-table model: the whole body as its CoM on a massless table standing on the ZMP (Kajita et al. 2003).
 
 Equation (1) of the thesis, its sign and its missing terms restored: p = x - z x'' / (z'' + g). On a slope a the frame
-leans with the ground, x along it and z at right angles to it, so that gravity has a part along it:
-p = x - z (x'' + g sin a) / (z'' + g cos a).
+leans with the ground, x along it and z at right angles to it, so that gravity has a part along it: p = x - z (x'' + g
+sin a) / (z'' + g cos a).
 """
 
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ STEP_SAMPLES = 240
 def zmp(
     x: ArrayLike, z: ArrayLike, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0
 ) -> NDArray:
-    """Equation (1): ZMP [m] of a CoM at `x`, `z` [m] with accelerations [m/s^2]; broadcasts.
+    """Return the ZMP [m] by equation (1) of a CoM at `x`, `z` [m] with accelerations [m/s^2]; broadcasts.
 
     On a `slope` [rad], uphill positive, x is along the ground and z at right angles to it.
     """
@@ -37,8 +37,8 @@ def zmp(
 class HyperbolicPath:
     """x(t) of a CoM at constant height over a piecewise polynomial ZMP, in closed form; made by `closed_form`.
 
-    In each piece x is a polynomial plus a cosh and a sinh. These two are kept as exp(-rate (t - start)) and
-    exp(rate (t - end)), which lose no digits in a long piece.
+    In each piece x is a polynomial plus a cosh and a sinh. These two are kept as exp(-rate (t - start)) and exp(rate (t
+    - end)), which lose no digits in a long piece.
     """
 
     polynomial: PPoly
@@ -51,7 +51,7 @@ class HyperbolicPath:
     """(pieces,) coefficients of exp(rate (t - end)) [m]."""
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """Position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
+        """Return the position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
         time = np.asarray(time, float)
         knots = self.polynomial.x
         piece = np.clip(np.searchsorted(knots, time, "right") - 1, 0, len(knots) - 2)
@@ -67,15 +67,15 @@ class Bob:
     step_time: float
     """Duration of a step [s]."""
     amplitude: float
-    """Of its cosine [m]: half of the rise and fall of one that has no second."""
+    """Amplitude of the cosine [m]: half of the rise and fall of a CoM without a second harmonic."""
     lowest_at: float
     """Time at which the cosine is lowest [s]."""
     second: tuple[float, float] = (0.0, 0.0)
-    """Of the second harmonic, over `amplitude`: cosine and sine of twice the turn since `lowest_at` [-]."""
+    """Second harmonic over `amplitude`: cosine and sine of twice the turn since `lowest_at` [-]."""
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """-amplitude (cos u + second[0] cos 2u + second[1] sin 2u), u = 2 pi (t - lowest_at) / T [m], or a time
-        derivative of it."""
+        """Return -amplitude (cos u + second[0] cos 2u + second[1] sin 2u), u = 2 pi (t - lowest_at) / T [m], or a time
+        derivative."""
         turn = 2 * pi / self.step_time
         # Each derivative of a cosine is a quarter turn ahead.
         angle = turn * (np.asarray(time) - self.lowest_at)
@@ -97,7 +97,7 @@ class ComMotion:
     height: float
     """Mean height above the floor [m]."""
     bob: Bob
-    """Its rise and fall."""
+    """Rise and fall of the CoM."""
     slope: float = 0.0
     """Slope of the ground [rad], uphill positive: x is along it, z at right angles to it."""
     path: PPoly | HyperbolicPath = field(repr=False)
@@ -123,7 +123,7 @@ class ComMotion:
         return (x if self.ahead is None else x + self.ahead(time)), z
 
     def zmp(self, time: ArrayLike) -> NDArray:
-        """ZMP [m] by equation (1), of the pivot."""
+        """Return the ZMP [m] by equation (1), of the pivot."""
         return zmp(*self.pivot(time), *self.acceleration(time), self.slope)
 
 

@@ -1,8 +1,8 @@
-"""A planned CoM over one step, without legs; and the one over people's zero-moment point (ZMP).
+"""Plan a CoM over one step, without legs; and the CoM over people's zero-moment point (ZMP).
 
 The planned legs of `plan_walk` stand on a flat toe to the end of a double support shorter than people's: under an
-upright trunk people's ZMP would take them from people's angles. What walks on people's legs (`envs`) follows this CoM
-instead: same steps, time and height, over a ZMP that is where people's is.
+upright trunk people's ZMP would take them from people's angles. A body on people's legs (`envs`) follows this CoM
+instead: same steps, time and height, over people's ZMP.
 """
 
 from dataclasses import dataclass, replace
@@ -30,13 +30,13 @@ LOWEST = 0.065
 class ComPlan:
     """The CoM of a periodic walk.
 
-    Step phase 0..1 runs from the heel strike of the leading foot to that of the other one. Its frame has x [m]
-    forward of the leading (stance) foot's ankle when flat, z [m] up from the floor. Phases may have any shape and are
-    taken modulo 1. On a slope x is along the ground and z at right angles to it.
+    Step phase 0..1 runs from the heel strike of the leading foot to that of the other foot. Its frame has x [m] forward
+    of the leading (stance) foot's ankle when flat, z [m] up from the floor. Phases may have any shape and are taken
+    modulo 1. On a slope x is along the ground and z at right angles to it.
     """
 
     body: Body
-    """The body that walks."""
+    """The planned body."""
     speed: float
     """Mean forward speed along the ground [m/s] = step_length / step_time."""
     step_time: float
@@ -48,9 +48,9 @@ class ComPlan:
     motion: ComMotion
     """The CoM over the time of a step, lowest in double support."""
     human: HumanGait
-    """People's gait at this speed and height, or what `plan_walk` was given in its place."""
+    """People's gait at this speed and height, or the gait given to `plan_walk` in its place."""
     lean: float = 0.0
-    """Pitch of the trunk to where its CoM, with that of a load, is upright over the hip [rad], forward positive."""
+    """Pitch of the trunk at which its CoM, with that of a load, is upright over the hip [rad], forward positive."""
 
     @property
     def slope(self) -> float:
@@ -63,24 +63,24 @@ class ComPlan:
         return 2 * self.step_time
 
     def com(self, step_phase: ArrayLike) -> Point:
-        """CoM (x from the stance ankle, z from the floor) [m]."""
+        """Return the CoM (x from the stance ankle, z from the floor) [m]."""
         return self.motion.position(self._time(step_phase))
 
     def com_velocity(self, step_phase: ArrayLike) -> Point:
-        """CoM velocity (forward, up) [m/s]."""
+        """Return the CoM velocity (forward, up) [m/s]."""
         return self.motion.velocity(self._time(step_phase))
 
     def com_acceleration(self, step_phase: ArrayLike) -> Point:
-        """CoM acceleration (forward, up) [m/s^2], continuous through the steps."""
+        """Return the CoM acceleration (forward, up) [m/s^2], continuous through the steps."""
         return self.motion.acceleration(self._time(step_phase))
 
     def pivot(self, step_phase: ArrayLike) -> Point:
-        """Return the point (x, z) [m] to which the ground reaction force points: the CoM, unless the legs' swing
-        counts."""
+        """Return the point (x, z) [m] to which the ground reaction force points: the CoM, or with swinging legs a point
+        ahead of it."""
         return self.motion.pivot(self._time(step_phase))
 
     def zmp(self, step_phase: ArrayLike) -> NDArray:
-        """ZMP [m] from the stance ankle, by equation (1) from the planned motion itself."""
+        """Return the ZMP [m] from the stance ankle, by equation (1) from the planned motion itself."""
         return self.motion.zmp(self._time(step_phase))
 
     def _time(self, step_phase: ArrayLike) -> NDArray:

@@ -1,7 +1,6 @@
-"""What a stride costs a body, planned or simulated: work and muscle excitation of its moments, acceleration of its
-joints. It knows no walk of people's.
+"""Compute the effort of a stride, planned or simulated: work and muscle excitation of its moments, joint accelerations.
 
-All terms are dimensionless, so that they keep their weights with body and speed.
+It uses no walk of people's. All terms are dimensionless, so that they keep their weights with body and speed.
 """
 
 from dataclasses import dataclass
@@ -24,25 +23,26 @@ STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "t
 """Largest moment in extension and flexion, plantarflexion and dorsiflexion, over body weight times height [-]; chosen,
 rounded: the order of the maximal voluntary moments of young adults on dynamometers; of the toe a guess."""
 VOLUME = {"hip": (0.25, 0.13), "knee": (0.25, 0.10), "ankle": (0.15, 0.033), "toe": (0.02, 0.015)}
-"""Muscle that extends and that flexes over all of the leg's, by volume [-]; rounded, after Handsfield et al., J.
-Biomech. 47 (2014) 631-638; of the toe a guess. Activation counts by it: what is small tires, but costs little."""
+"""Volume of the muscles that extend and that flex each joint, over the volume of all the leg's muscles [-]; rounded,
+after Handsfield et al., J. Biomech. 47 (2014) 631-638; of the toe a guess. Activation is weighted by it: a small
+muscle tires, but costs little."""
 ACTIVATION_TIME = 0.05
-"""Time in which a muscle's activation follows its excitation [s]; chosen, as models of muscles have it."""
+"""Time constant with which a muscle's activation follows its excitation [s]; chosen, as models of muscles have it."""
 _ANKLE = JOINTS.index("ankle")
 MOTION_RANGE_DEG = {"knee": (0.0, 135.0), "ankle": (-48.0, 18.0), "toe": (-30.0, 70.0)}
 """Least and largest angle [deg], dorsiflexion and toe up positive: ranges of motion of the American Academy of
 Orthopaedic Surgeons (1965)."""
 
 PRICES = (1.0, 1.0, 1.0, 3.0)
-"""What a search pays for a unit of work, activation, its rate, and acceleration; chosen: energy and squared excitation
-weigh alike, and acceleration is no more than they are. Without it a foot may swing up and down for nothing."""
+"""Price of a unit of work, activation, its rate, and acceleration; chosen: energy and squared excitation weigh alike,
+and acceleration no more than they. Without acceleration a foot may swing up and down for nothing."""
 PER_DEGREE = 0.1
-"""Effort that a joint beyond its range counts for in a search [1/deg]; chosen."""
+"""Effort of a joint beyond its range, in a search [1/deg]; chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """The terms of one stride, both legs together."""
+    """Terms of the effort of one stride, both legs together."""
 
     work: float
     """Metabolic energy of the work of hips, knees and ankles over body weight times distance [-]."""
@@ -59,27 +59,27 @@ class Effort:
 
     @property
     def total(self) -> float:
-        """What a search pays at `PRICES`."""
+        """Return the effort at `PRICES`."""
         return float(np.dot(PRICES, self.terms))
 
     @property
     def terms(self) -> tuple[float, float, float, float]:
-        """What has a price: work, activation, its rate, acceleration."""
+        """Return the terms that have a price: work, activation, its rate, acceleration."""
         return self.work, self.activation, self.rate, self.acceleration
 
 
 @dataclass(frozen=True, kw_only=True)
 class Muscle:
-    """Factors on what is said of muscles, to see what it does."""
+    """Factors on properties of the muscles, to study their effect."""
 
     tissue: float = 1.0
-    """On passive moments (`tissue.passive_moments`)."""
+    """Factor on passive moments (`tissue.passive_moments`)."""
     tendon: float = 1.0
-    """On the give of the Achilles tendon."""
+    """Factor on the give of the Achilles tendon."""
 
 
 AS_IS = Muscle()
-"""Muscles as said."""
+"""Muscles without changes."""
 
 
 def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
@@ -102,11 +102,11 @@ def effort_of_stride(
     distance: float,
     muscle: Muscle = AS_IS,
 ) -> Effort:
-    """Return the effort of a stride of `distance` [m] in `stride_time` [s] whose legs do the same, half a stride apart.
+    """Return the effort of a stride of `distance` [m] in `stride_time` [s] with equal legs, half a stride apart.
 
     `angle`, `rate` and `moment` (S, 4) are one leg's at hip (thigh to the vertical), knee, ankle and toe, evenly over
-    the stride: flexion and dorsiflexion positive [rad], [rad/s], extension and plantarflexion positive [N m]. Without
-    a `rate` it is the angle's.
+    the stride: flexion and dorsiflexion positive [rad], [rad/s], extension and plantarflexion positive [N m]. Without a
+    `rate` it is derived from the angle.
     """
     tick = stride_time / len(angle)
     toe = JOINTS.index("toe")
@@ -137,24 +137,23 @@ def effort_of_stride(
 
 
 def _change(values: NDArray, tick: float) -> NDArray:
-    """Time derivative of what repeats itself every stride."""
+    """Return the time derivative of values that repeat every stride."""
     return (np.roll(values, -1, 0) - np.roll(values, 1, 0)) / (2 * tick)
 
 
 def _joints(turns: NDArray) -> NDArray:
     """Return (..., 4) hip, knee, ankle and toe, flexion and dorsiflexion positive, from turns of thigh, shank, foot,
-    toe.
-    """
+    toe."""
     thigh, shank, foot, toe = np.moveaxis(turns, -1, 0)
     return np.stack([thigh, thigh - shank, foot - shank, toe - foot], -1)
 
 
 def _strength(body: Body, moment: NDArray) -> NDArray:
-    """Return the strength [N m] against which each of the moments (..., 4) counts."""
+    """Return the strength [N m] of the muscles that make each of the moments (..., 4)."""
     return body.mass * GRAVITY * body.height * _of_groups(STRENGTH, moment)
 
 
 def _of_groups(table: dict[str, tuple[float, float]], moment: NDArray) -> NDArray:
-    """Return (..., 4) what a table says of the muscles that make each of the moments (..., 4)."""
+    """Return (..., 4) the table's number of the muscles that make each of the moments (..., 4)."""
     extending, flexing = np.array([table[joint] for joint in JOINTS]).T
     return np.where(moment > 0.0, extending, flexing)

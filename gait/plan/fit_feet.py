@@ -1,9 +1,9 @@
-"""Fits the foot's constants at people's roll over the toe tip (`foot_style.py`) to people's curves, and prints them.
+"""Fit the foot's constants at people's roll over the toe tip (`foot_style.py`) to people's curves, and print them.
 
-python -m springfoot.gait.plan.fit_feet
+    python -m springfoot.gait.plan.fit_feet
 
 Each walk has the CoM that `plan_walk` gives to the shortest double support with the whole roll, as high as the
-straightest knee allows; a swing in the floor costs too.
+straightest knee allows; a swing foot in the floor costs too.
 """
 
 from dataclasses import dataclass, replace
@@ -22,19 +22,19 @@ from .plan import LEAST_FULL_ROLL, WalkPlan, plan_walk
 from .posture import POSTURE_SAMPLES, STRAIGHTEST_KNEE, full_reach, legs_under_com
 
 SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.7)
-"""[m/s]; chosen."""
+"""Speeds of the walks [m/s]; chosen."""
 JOINT_WEIGHTS = {"thigh": 1.0, "knee": 1.0, "ankle": 0.5, "toe": 0.2}
-"""Of the joints' errors; chosen."""
+"""Weights of the joints' errors; chosen."""
 CLEARANCE = 0.017
 """Height of the foot in mid-swing below which it costs [m]; chosen: people's is 13 to 20 mm."""
 PER_METRE = 2e4
-"""What a swing foot in the floor costs [deg/m]; chosen."""
+"""Cost of a swing foot in the floor [deg/m]; chosen."""
 STANDARD = Body()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """A walk whose CoM is given, up to its height."""
+    """A walk with a given CoM, up to its height."""
 
     plan: WalkPlan
     zmp_times: NDArray
@@ -42,7 +42,7 @@ class Case:
     people: dict[str, NDArray]
 
     def errors(self) -> NDArray:
-        """Weighted errors of the joints [deg] with the constants of now, and what the floor costs."""
+        """Return the weighted errors of the joints [deg] with the present constants, and the cost of the floor."""
         path = feet_under_zmp(STANDARD, self.plan.step_length, self.zmp_times, self.zmp_points, self.plan.feet.roll)
         motion = self.plan.motion
         for _ in range(3):
@@ -72,7 +72,7 @@ def case(speed: float) -> Case:
 
 
 def constants() -> NDArray:
-    """Return those at a roll of 1, in the order of `use`."""
+    """Return the constants at a roll of 1, in the order of `use`."""
     return np.array(
         [
             *(foot_style.TOE_ROCKER_POWER[1], foot_style.ROLL_POWER),
@@ -82,7 +82,7 @@ def constants() -> NDArray:
 
 
 def use(values: NDArray) -> None:
-    """Put other constants in the place of those at a roll of 1."""
+    """Replace the constants at a roll of 1."""
     toe_power, roll_power, *via = map(float, values)
     foot_style.TOE_ROCKER_POWER = (foot_style.TOE_ROCKER_POWER[0], toe_power)
     foot_style.ROLL_POWER = roll_power

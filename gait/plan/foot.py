@@ -1,10 +1,10 @@
-"""Where a foot is over its stride: heel, ankle and toe rockers on the ground, then the swing.
+"""Plan the path of a foot over its stride: heel, ankle and toe rockers on the ground, then the swing.
 
 The toe rocker has two parts: the foot turns about the toe joint over a flat toe, and late in a long double support the
 toe rolls over its tip and lifts the joint.
 
-All positions are in the foot's own frame: x [m] forward of where its ankle is while the foot is flat, z [m] up from
-the floor. Pitch [rad] is positive toes up. Stride phase 0 is this foot's heel strike, 1 its next, two steps further on.
+All positions are in the foot's own frame: x [m] forward of its ankle when flat, z [m] up from the floor. Pitch [rad] is
+positive toes up. Stride phase 0 is this foot's heel strike, 1 its next, two steps further on.
 """
 
 from dataclasses import dataclass, replace
@@ -22,14 +22,14 @@ from ..body.rockers import rising, rolling, turned, turning
 from .foot_style import FootStyle, peoples_style
 
 ROCKER_MARGIN = 0.005
-"""The foot comes flat, and stays flat, this far of the ZMP's way before and after it needs to [m at 1.70 m]; chosen."""
+"""Travel of the ZMP by which foot flat comes earlier, and heel-off later, than needed [m at 1.70 m]; chosen."""
 QUICKEST_FOOT_FLAT = 0.02
 """Earliest stride phase of foot flat; chosen: in very short steps the ZMP starts ahead of the landing heel."""
 HEEL_ROCKER_POWER = 2
-"""Power with which the pitch falls with what is left of the heel rocker; chosen: it ends without a jump of its rate."""
+"""Power with which the pitch falls over the rest of the heel rocker; chosen: it ends without a jump of its rate."""
 
 MID_SWING = (0.3, 0.7)
-"""Parts of the swing between which ball and heel must clear the floor: they leave and land on either side of it."""
+"""Parts of the swing between which ball and heel must clear the floor."""
 FLOOR_TOLERANCE = 0.003
 """Largest depth of a swing foot in the floor [m]; chosen: a landing heel slides in at a shallow angle."""
 
@@ -46,32 +46,34 @@ class FootPath:
     heel_off: float
     """Stride phase at which the toe rocker begins."""
     tip_off: float
-    """Stride phase at which the toe begins to roll over its tip; `toe_off` where it does not."""
+    """Stride phase at which the toe begins to roll over its tip; `toe_off` without a roll."""
     toe_off: float
     """Stride phase at which the toe leaves the ground."""
     roll: float
-    """How far the toe rolls over its tip late in stance: 0 not at all, 1 as people's; it weighs their pairs of
-    constants (`foot_style`)."""
+    """Roll of the toe over its tip late in stance: 0 for none, 1 for people's; it weighs the pairs of constants in
+    `foot_style`."""
     style: FootStyle
     """Pitches at the events, and the shape of the path between them."""
     lift: float = 0.0
-    """The via points of the swing lie this much [m] higher than those of the style."""
+    """Height of the swing's via points above the style's [m]."""
 
     def pitch(self, stride_phase: ArrayLike) -> NDArray:
-        """Foot to ground [rad], toes up positive, 0 from foot flat to heel-off."""
+        """Return the foot's pitch to the ground [rad], toes up positive, 0 from foot flat to heel-off."""
         return self._jet(stride_phase)[2]
 
     def toe_pitch(self, stride_phase: ArrayLike) -> NDArray:
-        """Toe to ground [rad] from foot flat to toe-off: 0, and negative as it rolls over its tip."""
+        """Return the toe's pitch to the ground [rad] from foot flat to toe-off: 0, and negative as it rolls over its
+        tip."""
         return self._roll(np.clip(np.mod(np.asarray(stride_phase, float), 1.0), self.tip_off, self.toe_off))[0]
 
     def ankle(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Ankle axis (x, z) [m]."""
+        """Return the ankle axis (x, z) [m]."""
         x, z, _ = self._jet(stride_phase)
         return x, z
 
     def toe_joint(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Toe joint (x, z) [m]; exactly at its standing place from foot flat until the toe rolls over its tip."""
+        """Return the toe joint (x, z) [m]; exactly at its standing place from foot flat until the toe rolls over its
+        tip."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         x, z, pitch = self._jet(phase)
         forward, up = turned(pitch, self.body.ankle_to_toe_joint, -self._drop)
@@ -82,14 +84,15 @@ class FootPath:
         )
 
     def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Lowest point of the heel (x, z) [m], its back at the sole unless it is round; on the floor until heel-off."""
+        """Return the lowest point of the heel (x, z) [m], its back at the sole unless it is round; on the floor until
+        heel-off."""
         x, z, pitch = self._jet(stride_phase)
         back, down = turned(pitch, self.flat_heel, self._heel_radius - self.body.ankle_height)
         return x + back, z + down - self._heel_radius
 
     @property
     def flat_heel(self) -> float:
-        """Where the heel touches the floor under a flat foot, x [m]."""
+        """Return the x [m] at which the heel of a flat foot touches the floor."""
         return self._heel_radius - self.body.heel_to_ankle
 
     @property
@@ -97,31 +100,32 @@ class FootPath:
         return self.style.heel_radius * self.body.length_scale
 
     def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
-        """Ball of the foot above the floor [m]: the toe joint above its standing height."""
+        """Return the height of the ball of the foot above the floor [m]: the toe joint above its standing height."""
         return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
 
     @property
     def heel_strike_pitch(self) -> float:
-        """Foot to ground at heel strike [rad] (thesis q_f)."""
+        """Return the foot's pitch to the ground at heel strike [rad] (thesis q_f)."""
         return self.style.heel_strike_pitch
 
     @property
     def toe_off_pitch(self) -> float:
-        """Foot to ground at toe-off, as a positive number [rad] (thesis q_b)."""
+        """Return the foot's pitch to the ground at toe-off, as a positive number [rad] (thesis q_b)."""
         return self.style.toe_off_pitch
 
     @property
     def roll_pitch(self) -> float:
-        """Toe to ground at toe-off, as a positive number [rad]."""
+        """Return the toe's pitch to the ground at toe-off, as a positive number [rad]."""
         return self.style.roll_pitch
 
     @property
     def clearance(self) -> float:
-        """Least height [m] of ball and heel above the floor in `MID_SWING`."""
+        """Return the least height [m] of ball and heel above the floor in `MID_SWING`."""
         return float(self.swing_heights(MID_SWING).min())
 
     def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Rear and front end (x, x) [m] of what is on the ground in stance: heel, sole, toe joint to tip, then tip."""
+        """Return the rear and front end (x, x) [m] of the foot's part on the ground in stance: heel, sole, toe joint to
+        tip, tip."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         joint = self.body.ankle_to_toe_joint
         heel = self.flat_heel - self._heel_radius * self._heel_rocker(np.minimum(phase, self.foot_flat))[0, 2]
@@ -130,13 +134,13 @@ class FootPath:
         return rear, np.where(phase >= self.foot_flat, tip, heel)
 
     def swing_heights(self, part: tuple[float, float]) -> NDArray:
-        """Return (2, 200) ball and heel above the floor [m] over a part of the swing."""
+        """Return (2, 200) heights of ball and heel above the floor [m] over a part of the swing."""
         phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
         return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
 
     @property
     def _drop(self) -> float:
-        """Toe joint below the ankle in a flat foot [m]."""
+        """Return the height of the ankle over the toe joint in a flat foot [m]."""
         return self.body.ankle_height - self.body.toe_joint_height
 
     def _jet(self, stride_phase: ArrayLike) -> NDArray:
@@ -176,7 +180,8 @@ class FootPath:
 
     @cached_property
     def _swing(self) -> BSpline:
-        """(x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously differentiable."""
+        """Return (x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously
+        differentiable."""
         start = self._toe_rocker(self.toe_off)
         end = self._heel_rocker(0.0)
         end[0, 0] += 2 * self.step_length
@@ -197,11 +202,11 @@ def feet_under_zmp(
     clearance: float | None = None,
     style: FootStyle | None = None,
 ) -> FootPath:
-    """Feet whose rockers follow the ZMP, so that it stays on what is on the ground.
+    """Return feet whose rockers follow the ZMP, so that the ZMP stays within the feet's parts on the ground.
 
     The ZMP runs straight between points [m from the stance ankle] at times [s]: heel strike, the other foot's toe-off,
-    perhaps more, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style`
-    takes the place of people's. Raises `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
+    perhaps more, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style` takes
+    the place of people's. Raises `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
     """
     margin = ROCKER_MARGIN * body.length_scale
     heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)
@@ -255,7 +260,7 @@ def feet_under_zmp(
 
 
 def refuse_swing_in_ground(feet: FootPath) -> None:
-    """Raise `SpringfootError` for a swing foot deeper in the floor than `FLOOR_TOLERANCE`: its ball or heel.
+    """Raise `SpringfootError` for a swing foot with ball or heel deeper in the floor than `FLOOR_TOLERANCE`.
 
     The tip of the toe is not checked: early in swing the toe bends back to people's posture, which at 1.2 m/s would
     take its tip 20 mm into the floor; a sprung toe gives way.

@@ -1,6 +1,7 @@
-"""How a foot rolls off the ground and swings: its pitches at the events, and the shape of its path between them.
+"""Describe how a foot rolls off the ground and swings: its pitches at the events, and the shape of its path between
+them.
 
-People's are chosen and fitted near their curves; a walk predicted from its body alone has others (`walk_style`).
+People's style is chosen and fitted near their curves; a walk predicted from its body alone has another (`walk_style`).
 """
 
 from dataclasses import dataclass
@@ -20,14 +21,14 @@ TOE_OFF_PITCH = ((1.32, 1.5), (1.39, 0.5))
 ROLL_PITCH = ((0.0, 0.5), (0.78, 0.5))
 """Toe to ground at toe-off: a [rad] and n of a (step length / leg length)^n; people's is 37 deg at 1.2 m/s."""
 TOE_ROCKER_POWER = (2.12, 3.08)
-"""The heel rises with this power of the time since heel-off."""
+"""Power of the time since heel-off with which the heel rises."""
 ROLL_POWER = 2.22
-"""The toe joint rises with this power of the time since the ZMP left the toe tip."""
+"""Power of the time since the ZMP left the toe tip with which the toe joint rises."""
 
 # The swing passes two via points, a third and two thirds through it, and leaves and lands at the rockers' position,
 # velocity and acceleration.
 VIA_FORWARD = ((0.237, 0.693), (0.319, 0.633))
-"""Place of the ankle at the via points, as parts of its way from toe-off to heel strike."""
+"""Travel of the ankle at the via points of the swing, as a fraction of its travel from toe-off to heel strike."""
 VIA_UP = ((0.225, 0.104), (0.175, 0.090))
 """Height of the ankle above the floor at the via points [m at 1.70 m]."""
 VIA_PITCH = ((-1.0, -0.183), (-0.746, -0.039))
@@ -51,25 +52,25 @@ class FootStyle:
     roll_pitch: float
     """Toe to ground at toe-off, as a positive number [rad]."""
     toe_rocker_power: float = 2.0
-    """The heel rises with this power of the time since heel-off."""
+    """Power of the time since heel-off with which the heel rises."""
     roll_power: float
-    """The toe joint rises with this power of the time since the ZMP left the toe tip."""
+    """Power of the time since the ZMP left the toe tip with which the toe joint rises."""
     via_forward: tuple[float, ...]
-    """Place of the ankle at the via points of the swing, as parts of its way from toe-off to heel strike."""
+    """Travel of the ankle at the via points of the swing, as a fraction of its travel from toe-off to heel strike."""
     via_up: tuple[float, ...]
-    """Height of the ankle above the floor there [m at 1.70 m]."""
+    """Height of the ankle above the floor at the via points [m at 1.70 m]."""
     via_pitch: tuple[float, ...]
-    """Pitch of the foot there [rad]."""
+    """Pitch of the foot at the via points [rad]."""
     heel_rise: tuple[float, float] | None = None
-    """Share of the toe-off pitch that the foot has half-way from heel-off, and the rate of its pitch at toe-off over
+    """Fraction of the toe-off pitch that the foot has half-way from heel-off, and the rate of its pitch at toe-off over
     the mean rate; None: `toe_rocker_power`."""
     flat: float | None = None
-    """Part of double support after which the landed foot is flat; None: as the ZMP passes its heel."""
+    """Part of double support after which the landed foot is flat; None: when the ZMP passes its heel."""
     heel_radius: float = 0.0
-    """Of the heel on which the foot rolls as it lands [m at 1.70 m]; 0: it turns about the heel's back."""
+    """Radius of the heel on which the foot rolls as it lands [m at 1.70 m]; 0: it turns about the heel's back."""
     heel_off: float | None = None
     """Part of the step over which the heel rises before the other foot lands, unless the ZMP passes the toe joint
-    later; None: from when it passes."""
+    later; None: from the moment at which the ZMP passes."""
     toe_swing: float | None = None
     """Angle of the toe joint in swing [rad]; None: people's curve."""
 
@@ -79,8 +80,8 @@ def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: fl
 
     Args:
         stride: step length over leg length.
-        roll: how far the toe rolls over its tip late in stance: 0 not at all, 1 as people's.
-        heel_rocker, tip_rocker: how long the foot turns about its heel, the toe about its tip [strides].
+        roll: roll of the toe over its tip late in stance: 0 for none, 1 for people's.
+        heel_rocker, tip_rocker: duration of the foot's turn about its heel, and of the toe's about its tip [strides].
     """
     return FootStyle(
         heel_strike_pitch=min(pitch_at(HEEL_STRIKE_PITCH, stride, roll), HEEL_ROCKER_RATE * heel_rocker),

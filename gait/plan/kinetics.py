@@ -1,4 +1,5 @@
-"""Forces and joint moments of a walk: equations (2) and (3), the share of each foot, and inverse dynamics of a plan.
+"""Compute forces and joint moments of a walk: equations (2) and (3), the load on each foot, inverse dynamics of a plan.
+
 Frame, signs and the mechanics of one leg are those of `leg.py`, which takes any trajectory.
 """
 
@@ -33,7 +34,7 @@ ZMP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class ProjectionError:
-    """GRF projection minus inverse dynamics, of one joint in one part of the stride."""
+    """Difference of GRF projection and inverse dynamics, of one joint in one part of the stride."""
 
     joint: str
     part: Literal["stance", "swing"]
@@ -46,7 +47,8 @@ class ProjectionError:
 
 
 def ground_reaction(mass: float, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0) -> NDArray:
-    """Equation (2), F = m (a - g): force (..., 2) forward, up [N] on a body of `mass` [kg] from its CoM acceleration.
+    """Return the force (..., 2) forward, up [N] on a body of `mass` [kg] from its CoM acceleration: equation (2), F = m
+    (a - g).
 
     On a `slope` [rad], uphill positive, forward is along the ground and up at right angles to it.
     """
@@ -55,13 +57,13 @@ def ground_reaction(mass: float, x_acceleration: ArrayLike, z_acceleration: Arra
 
 
 def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Shares the total ground reaction between two feet: forces (..., 2) [N] on the rear and the front one.
+    """Divide the total ground reaction between two feet: return forces (..., 2) [N] on the rear and the front one.
 
     `force` (..., 2) [N] acts through the CoM `com` (..., 2) [m], so that it meets the ground at the ZMP p. Each foot's
     force points from its centre of pressure, p1 and p2 [m], through the CoM; its upward part is (p2 - p)/(p2 - p1) of
     the total for the rear foot, the rest for the front one. Both together are then `force` at p exactly. In steps
-    shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` where a foot would have to pull: a ZMP that is
-    not between p1 and p2, a force that does not point up.
+    shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` if a foot would have to pull: a ZMP that is not
+    between p1 and p2, a force that does not point up.
     """
     if not np.all(force[..., 1] > 0):
         raise SpringfootError("the ground can only push: the upward force must be > 0 N")
@@ -83,15 +85,17 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
 
 
 def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Ground reaction (..., 2) [N] on one foot of a plan, and its centre of pressure (...) [m], in that foot's frame.
+    """Return the ground reaction (..., 2) [N] on one foot of a plan, and its centre of pressure (...) [m], in that
+    foot's frame.
 
-    In single support it is all of equation (2), at the ZMP; in double support `share_forces` gives it. There the centre
-    of pressure of the front foot waits at the heel until the foot is flat, and then goes to where the ZMP starts along
-    that foot as the other one leaves. That of the rear foot goes on from where the ZMP left it to the tip of the toe,
-    and waits there while the toe rolls over it. So the force of each foot starts and ends at zero. In swing the force
-    is 0, and the centre of pressure stays at the tip of the toe.
+    In single support the force is all of equation (2), at the ZMP; in double support `share_forces` gives it. There the
+    centre of pressure of the front foot waits at the heel until the foot is flat, and then goes to the ZMP's place at
+    the other foot's toe-off. That of the rear foot goes on from the ZMP's last place to the tip of the toe, and waits
+    there while the toe rolls over it. So the force of each foot starts and ends at zero. In swing the force is 0, and
+    the centre of pressure stays at the tip of the toe.
+
     In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat: there the rear foot
-    bears it all until then, and both centres of pressure stand still while the load passes over.
+    bears all of the force until then, and both centres of pressure stand still while the load passes over.
     """
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
     second = phase >= 0.5
@@ -110,7 +114,8 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
 
 
 def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
-    """Centres of pressure [m] of the rear and the front foot in double support, in the front foot's frame."""
+    """Return the centres of pressure [m] of the rear and the front foot in double support, in the front foot's
+    frame."""
     body = plan.body
     flat = 2 * plan.feet.foot_flat
     end = 2 * plan.feet.toe_off - 1

@@ -1,8 +1,8 @@
-"""What the swing of the legs does to the ground reaction force.
+"""Compute the effect of swinging legs on the ground reaction force.
 
 The cart-table's force points from the ZMP to the CoM: nothing turns. Legs that swing do: their angular momentum L about
 the CoM changes by dL/dt = (p - x) F_z + z F_x, so that the force points from the ZMP p to a pivot, dL/dt / F_z ahead of
-the CoM. With it the moments of the hips that inverse dynamics gives are those that keep the trunk upright.
+the CoM. With it the hip moments of inverse dynamics are those that keep the trunk upright.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from .cart_table import ComMotion
 from .posture import LOWEST_COM, POSTURE_SAMPLES, LegPostures, full_reach
 
 PLAN_SETTLED = 1e-5
-"""Largest change of CoM height and pivot between two rounds of a plan that stands [m]; chosen."""
+"""Largest change of CoM height and pivot between two rounds of a settled plan [m]; chosen."""
 ROUNDS = 60
 """Rounds after which a plan that does not settle is refused; chosen: most settle within 15."""
 
@@ -34,10 +34,11 @@ def spinning_legs(
     height: float | None = None,
     lean: float = 0.0,
 ) -> tuple[ComMotion, LegPostures]:
-    """Return the CoM and the legs whose angular momentum it knows, as high as leaves every knee flexed by `knee` [rad].
+    """Return the CoM motion that accounts for the legs' angular momentum, and its legs.
 
-    `legs_at` plans for a CoM `height` [m], which may be given, and a pivot; `still` is that of legs that do not turn;
-    `lean` [rad] is that of the trunk. Raises `SpringfootError` where they do not settle.
+    The CoM is as high as leaves every knee flexed by `knee` [rad]. `legs_at` plans for a CoM `height` [m], which may be
+    given, and a pivot; `still` is the pivot of legs that do not turn; `lean` [rad] is that of the trunk. Raises
+    `SpringfootError` if the rounds do not settle.
     """
     reach = full_reach(body, knee)
     given = height
@@ -58,7 +59,8 @@ def spinning_legs(
 
 
 def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0) -> CubicSpline:
-    """Forward from the CoM to the pivot [m] over the time of a step, trunk held upright or at a `lean` [rad]."""
+    """Return the distance of the pivot ahead of the CoM [m] over the time of a step, trunk upright or at a `lean`
+    [rad]."""
     stride_time = 2 * motion.step_time
     half = POSTURE_SAMPLES // 2
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES

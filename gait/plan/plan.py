@@ -1,9 +1,9 @@
-"""A walk planned by the zero-moment point (ZMP): CoM, feet, leg inverse kinematics -> joint angles over the stride.
+"""Plan a walk by the zero-moment point (ZMP): CoM, feet, leg inverse kinematics -> joint angles over the stride.
 
-The ZMP runs straight from the rear foot to the front one in double support and along the stance foot in single
-support. The feet follow it: the foot is flat as the ZMP passes its heel, the heel rises as the ZMP passes its toe
-joint, and in a long double support the toe rolls over its tip once the ZMP has passed that, so that the ZMP never
-leaves what is on the ground. The hip is placed so that the CoM of the whole planned body, trunk upright, is the planned
+The ZMP runs straight from the rear foot to the front one in double support and along the stance foot in single support.
+The feet follow it: the foot is flat as the ZMP passes its heel, the heel rises as the ZMP passes its toe joint, and in
+a long double support the toe rolls over its tip once the ZMP has passed the tip, so that the ZMP never leaves the
+feet's parts on the ground. The hip is placed so that the CoM of the whole planned body, trunk upright, is the planned
 CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
 """
 
@@ -40,23 +40,23 @@ STEP_TIME_RANGE = (0.25, 1.2)
 THESIS_STEP_TIME = 0.5
 """Step time of the thesis (T_c) [s], at 1.70 m."""
 DOUBLE_SUPPORT = 0.12
-"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. To its end the toe lies flat; the longer a given
-one, the further the toe rolls over its tip, as people's does in their 0.26 at 1.2 m/s."""
+"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. The toe lies flat to its end; in a longer given one
+the toe rolls over its tip, the further the longer, as people's does in their 0.26 at 1.2 m/s."""
 LEAST_FULL_ROLL = 0.18
-"""The roll is whole, as people's, in a double support of `PEOPLES_SHARE`, but of not less than this over step time [-];
-chosen: people's own at the fastest, 1.96 m/s."""
+"""Least double support over step time with people's whole roll [-]; above it the whole roll takes a double support of
+`PEOPLES_SHARE`; chosen: people's own at the fastest, 1.96 m/s."""
 ROLLING_STEP = (1.0, 1.5)
-"""Steps up to the first are too short for a roll, from the second on it is whole [foot lengths]; chosen: in short ones
-the tip of the rear foot lies beside the front foot."""
+"""Step lengths without a roll and with a whole roll [foot lengths]; chosen: in short steps the tip of the rear foot
+lies beside the front foot."""
 ZMP_TRAVEL = ((-0.020, 0.140), PEOPLES_ZMP)
 """ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m], over a flat toe and at a whole
-roll; in between along the straight line. The former is chosen: of the travels tried, it brings the knee nearest to
-people's at 1.2 m/s."""
+roll; in between along the straight line. That of a flat toe is chosen: of the travels tried, it brings the knee
+nearest to people's at 1.2 m/s."""
 RISE = 0.65
 """Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]; chosen: 39
 mm at 1.2 m/s, where people's is 36 to 39 mm."""
 MOST_UNLOADING = 0.75
-"""Largest part of the weight that the rise and fall may take from the feet [-]; chosen; it limits the rise at high
+"""Largest part of the weight that rise and fall may take from the feet [-]; chosen; it limits the rise at high
 speeds."""
 
 
@@ -76,7 +76,7 @@ class WalkPlan(ComPlan):
     """Hip x, z [m] in the foot's frame over stride phase, a little beyond 0..1."""
 
     def support(self, step_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Rear and front end [m] of the hull of what is on the ground of both feet, in the step's frame."""
+        """Return the rear and front end [m] of the hull of both feet's parts on the ground, in the step's frame."""
         phase = np.mod(np.asarray(step_phase, float), 1.0) / 2
         rear, front = self.feet.on_ground(phase)
         rear_of_trailing, front_of_trailing = self.feet.on_ground(phase + 0.5)
@@ -87,16 +87,17 @@ class WalkPlan(ComPlan):
         )
 
     def joint_angles(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
-        """Thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
+        """Return thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
         return _named(self.joint_table(np.mod(stride_phase, 1.0)))
 
     def hip_position(self, stride_phase: ArrayLike) -> Point:
-        """Hip (x, z) [m] in the frame of the foot whose stride it is."""
+        """Return the hip (x, z) [m] in the frame of the foot of this stride."""
         x, z = np.moveaxis(self.hip_table(np.mod(stride_phase, 1.0)), -1, 0)
         return x, z
 
     def toe_joint_position(self, stride_phase: ArrayLike) -> Point:
-        """Toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat until the toe rolls over."""
+        """Return the toe joint (x, z) [m] in the foot's frame; at its standing place from foot flat until the toe rolls
+        over."""
         return self.feet.toe_joint(stride_phase)
 
 
@@ -115,25 +116,32 @@ def plan_walk(
     human: HumanGait | None = None,
     style: WalkStyle | None = None,
 ) -> WalkPlan:
-    """Plans a walk of `body` at `speed` [m/s] along the ground.
+    """Plan a walk of `body` at `speed` [m/s] along the ground.
 
-    `cadence="people"`: step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
-    1.2 m/s, 1.70 m); where their data end, both change with the square root of speed. `"thesis"`: 0.5 s a step at
-    every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m. `step_time` [s] replaces either, the
-    step length following from the speed. `double_support` [s], mean `com_height`, `com_amplitude` (half of rise and
-    fall; 0 keeps the height constant, solved in closed form) and `zmp_travel` (start, end of single support, from the
-    stance ankle) [m] replace the defaults above; the default height is the greatest that leaves the knees
-    `STRAIGHTEST_KNEE`. `clearance` [m] raises or lowers the swing foot until that is its least height in mid-swing
-    (`FootPath.clearance`; 17 mm at 1.70 m unless given). `slope` [rad] is uphill positive: step time and length,
-    rockers and swing stay those of level ground unless given, so the knees bend more than people's, who change them.
-    `human` takes the place of people (`human_gait`): its step length and time, and its toe in swing. `style` takes the
-    place of all that people's curves chose here but those (`walk_style`); what else is given counts more.
-    At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM
-    is accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. In a longer one
-    the toe rolls over its tip, the further the longer, and the default `zmp_travel` lies further forward: 0.12 s leave
-    0.23 g, and angles 5.6, 7.0 and 9.3 deg off.
-    Raises `SpringfootError`, saying by how much, for a walk that cannot be: legs too short, ZMP outside the feet, a
-    swing foot in the ground.
+    Args:
+        body: to plan for.
+        speed: mean forward speed [m/s].
+        cadence: "people": step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
+            1.2 m/s, 1.70 m); outside their data both change with the square root of speed. "thesis": 0.5 s a step at
+            every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m.
+        step_time: [s] in place of the cadence's; the step length follows from the speed.
+        double_support: [s] in place of `DOUBLE_SUPPORT`. In a longer one the toe rolls over its tip, the further the
+            longer, and the default `zmp_travel` lies further forward.
+        com_height: mean [m]; by default the greatest that leaves the knees `STRAIGHTEST_KNEE`.
+        com_amplitude: half of rise and fall [m]; 0 keeps the height constant, solved in closed form.
+        zmp_travel: ZMP at the start and end of single support, from the stance ankle [m].
+        clearance: least height of the swing foot in mid-swing [m] (`FootPath.clearance`; 17 mm at 1.70 m by default).
+        slope: [rad], uphill positive. Step time and length, rockers and swing stay those of level ground unless given,
+            so the knees bend more than people's, who change them.
+        human: gait in place of people's (`human_gait`): its step length and time, and its toe in swing.
+        style: choices in place of those by people's curves (`walk_style`); other arguments win over it.
+
+    At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM is
+    accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. With a double support
+    of 0.12 s the acceleration is 0.23 g, and the angles are 5.6, 7.0 and 9.3 deg off.
+
+    Raises `SpringfootError`, saying by how much, for an impossible walk: legs too short, ZMP outside the feet, a swing
+    foot in the ground.
     """
     speed = require_within("speed", speed, PLAN_SPEED_RANGE, "m/s")
     if cadence not in get_args(Cadence):
@@ -209,7 +217,7 @@ def plan_walk(
 
 
 def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
-    """Step time [s] and length [m]."""
+    """Return step time [s] and length [m]."""
     if cadence == "thesis":
         step_time = THESIS_STEP_TIME * sqrt(body.length_scale)
         return step_time, speed * step_time
@@ -219,14 +227,15 @@ def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[flo
 
 
 def _roll(body: Body, human: HumanGait, double_support: float, step_time: float, step_length: float) -> float:
-    """`FootPath.roll` of a double support [s]."""
+    """Return the `FootPath.roll` of a double support [s]."""
     full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
     roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
     return roll * float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
 
 
 def _zmp_travel(body: Body, given: tuple[float, float] | None, otherwise: ArrayLike) -> tuple[float, float]:
-    """ZMP [m] from the stance ankle at the start and end of single support; `otherwise` [m at 1.70 m]."""
+    """Return the ZMP [m] from the stance ankle at the start and end of single support: `given`, or `otherwise` [m at
+    1.70 m]."""
     if given is None:
         zmp_from, zmp_to = np.asarray(otherwise) * body.length_scale
         return float(zmp_from), float(zmp_to)
@@ -253,7 +262,7 @@ def _refuse_zmp_outside(plan: WalkPlan) -> None:
 
 
 def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolator:
-    """Table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic, which does not overshoot."""
+    """Return a table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic, which does not overshoot."""
     edge = 4
     padded = np.concatenate([values[-edge:] - shift, values, values[: edge + 1] + shift])
     return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)

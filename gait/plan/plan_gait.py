@@ -1,4 +1,6 @@
-"""A plan as a gait: its own angles, moments and forces in the place of people's, for whatever follows a gait."""
+"""Describe a plan as a gait: its own angles, moments and forces in the place of people's, to be followed as a
+target.
+"""
 
 import numpy as np
 
@@ -11,15 +13,15 @@ from .kinetics import foot_force, planned_leg
 from .plan import WalkPlan
 
 SERIES_SAMPLES = 400
-"""Samples of the stride of which series are made; chosen."""
+"""Samples of the stride for series; chosen."""
 RAMP = 0.06
 """Stride phase over which the schedule of K goes from one phase of stance to the next; chosen."""
 FLAT_SHARE = 0.5
-"""Where early stance ends, as a part of the way from foot flat to heel-off; chosen."""
+"""End of early stance, as a fraction of the time from foot flat to heel-off; chosen."""
 
 
 def gait_of(plan: WalkPlan) -> HumanGait:
-    """Return the gait of a plan: everything of it from body, plan and inverse dynamics.
+    """Return the gait of a plan, computed from body, plan and inverse dynamics alone.
 
     Curves are Fourier series of as many terms as people's are. Moments and powers are for body mass and height as
     people's are [N m/kg at 1.70 m]. The spread is 0: a plan has none.
@@ -56,7 +58,7 @@ def gait_of(plan: WalkPlan) -> HumanGait:
 
 
 def _foot(plan: WalkPlan) -> FootHabits:
-    """Return where the schedule of K has its phases: at the plan's own events, the other foot's toe-off and landing."""
+    """Return the phases of the schedule of K: the plan's own events, and the other foot's toe-off and landing."""
     feet = plan.feet
     flat = feet.foot_flat
     off = feet.heel_off

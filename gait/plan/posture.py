@@ -1,4 +1,6 @@
-"""The posture under a planned CoM: leg inverse kinematics, and the hip that makes the body's CoM the planned one."""
+"""Compute the posture under a planned CoM: leg inverse kinematics, and the hip that puts the body's CoM in its
+place.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ STRAIGHTEST_KNEE = 0.06
 LOWEST_HIP = 0.12
 """Largest mean depth of the hip below standing [leg lengths]; chosen."""
 LOWEST_COM = 0.8
-"""Lowest CoM that is tried [leg lengths]; chosen."""
+"""Lowest CoM to try [leg lengths]; chosen."""
 DEEPEST_KNEE_DEG = 135.0
 """Largest knee flexion [deg]: the range of motion of the American Academy of Orthopaedic Surgeons (1965)."""
 
@@ -32,7 +34,7 @@ DEEPEST_KNEE_DEG = 135.0
 def leg_angles(
     forward: ArrayLike, down: ArrayLike, thigh_length: float, shank_length: float
 ) -> tuple[NDArray, NDArray]:
-    """Leg inverse kinematics: (thigh to the vertical, knee) [rad], flexion positive.
+    """Return (thigh to the vertical, knee) [rad], flexion positive, by leg inverse kinematics.
 
     `forward`, `down` [m]: the ankle from the hip. An ankle out of reach gets a straight knee.
     """
@@ -45,7 +47,7 @@ def leg_angles(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegPostures:
-    """One leg over its stride on the grid of phases: hip (x, z) and hip to ankle [m], joint angles [rad]."""
+    """One leg over its stride, sampled: hip (x, z) and hip to ankle [m], joint angles [rad]."""
 
     hip: NDArray
     thigh: NDArray
@@ -63,10 +65,10 @@ def legs_under_com(
     near: LegPostures | None = None,
     lean: float = 0.0,
 ) -> LegPostures:
-    """Return the posture, trunk upright, or leaning under a load, whose whole-body CoM is the planned one; sooner found
-    `near` one. `lean` [rad] is that of `ComPlan`.
+    """Return the postures whose whole-body CoM is the planned one, the trunk upright, or leaning under a load.
 
-    Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, whatever the slope.
+    The search starts at the postures `near`, if given. `lean` [rad] is that of `ComPlan`. Positions are in the frame of
+    the ground; trunk and thigh angles are to the true vertical, whatever the slope.
     """
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)
@@ -88,7 +90,8 @@ def legs_under_com(
 
 @lru_cache(maxsize=2)
 def _feet_over_stride(feet: FootPath, human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
-    """Ankle (2, samples), foot pitch and toe angle (samples,); kept, as one plan asks for them a dozen times."""
+    """Return ankle (2, samples), foot pitch and toe angle (samples,); cached, as one plan asks for them a dozen
+    times."""
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     return np.stack(feet.ankle(phase)), feet.pitch(phase), toe_angle(feet, human, phase)
 
@@ -104,12 +107,20 @@ def legs_under(
     near: NDArray | None = None,
     lean: float = 0.0,
 ) -> LegPostures:
-    """Return the posture whose whole-body CoM is `com` (2, ...) [m]; the CoM of trunk and load is upright over the hip,
-    but for a `lean` [rad].
+    """Return the posture whose whole-body CoM is `com` (2, ...) [m].
 
-    `ankle` (2, ...) [m], foot `pitch` and `toe` angle (...) [rad] may have an axis of legs more, where `com` has one of
-    length 1; `both` makes the sum over both legs, as `com` is shaped, of what is given for those. The hip is (..., 2);
-    `near` (2, ...) is where it is looked for first.
+    Args:
+        body: of the posture.
+        com: (2, ...) CoM (x, z) [m].
+        ankle: (2, ...) [m]; with `pitch` and `toe` it may have an axis of legs where `com` has one of length 1.
+        pitch: (...) of the foot [rad].
+        toe: (...) angle of the toe [rad].
+        both: sums a leg's values over both legs, in the shape of `com`.
+        slope: of the ground [rad].
+        near: (2, ...) hip at which the search starts [m].
+        lean: pitch of the trunk off the posture with its CoM, and that of a load, upright over the hip [rad].
+
+    The hip of the result is (..., 2).
     """
     foot_and_toe = _foot_moment(body, pitch, toe)
     hip = com - np.array([0.0, 0.1 * body.leg_length])[:, *[None] * (com.ndim - 1)] if near is None else near
@@ -145,7 +156,7 @@ def legs_under(
 
 
 def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
-    """First mass moment (x, z) [kg m] of foot and toe about the ankle."""
+    """Return the first mass moment (x, z) [kg m] of foot and toe about the ankle."""
     forward, below = body.foot_com
     toe_joint = np.stack(turned(pitch, body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height))
     foot_com = np.stack(turned(pitch, forward, -below))
@@ -154,8 +165,11 @@ def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
 
 
 def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
-    """Toe joint [rad]: flat on the ground in stance, then on its tip; in swing as the style has it, else people's; laid
-    down with the foot."""
+    """Return the toe joint's angle [rad]: flat on the ground in stance, then on its tip; in swing the style's, else
+    people's.
+
+    As the foot goes flat, the toe is laid down with it.
+    """
     swing = feet.style.toe_swing
     at_toe_off = human.mean("toe", feet.toe_off) if swing is None else swing
     people = human.mean("toe", phase) if swing is None else np.full(phase.shape, swing)
@@ -174,7 +188,7 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
 
 
 def full_reach(body: Body, knee: float) -> float:
-    """Hip to ankle [m] at a knee flexion [rad]."""
+    """Return the distance of hip and ankle [m] at a knee flexion [rad]."""
     a = body.thigh_length
     b = body.shank_length
     return sqrt(a**2 + b**2 + 2 * a * b * cos(knee))
@@ -202,7 +216,7 @@ def highest_legs(
 
 
 def refuse_impossible_legs(body: Body, legs: LegPostures) -> None:
-    """Raise `SpringfootError` for legs that would have to be longer, or to bend further, than they can."""
+    """Raise `SpringfootError` for legs that would have to be longer, or bend further, than is possible."""
     too_far = float(legs.reach.max()) - full_reach(body, 0.0)
     if too_far > 0:
         phase = int(legs.reach.argmax()) / POSTURE_SAMPLES

@@ -1,17 +1,17 @@
-"""The thesis as printed, faults included: trajectories, forces, ZMP and joint torques of its appendix.
+"""Repeat the thesis as printed, faults included: trajectories, forces, ZMP and joint torques of its appendix.
 
 D. W. Nam, Numerical analysis of ZMP based biped walking model with different stiffness of ankle and toe joint, DGIST
-2016. `ThesisWalk` gives its Figures 6 (`com`), 7 (`ankle`), 8 (`toe_joint`), 9 (`ground_reaction`) and 10 (`zmp`).
-The corrected walk is `plan_walk`. Its program does not run as printed; `READINGS` says how each name was read.
+2016. `ThesisWalk` gives its Figures 6 (`com`), 7 (`ankle`), 8 (`toe_joint`), 9 (`ground_reaction`) and 10 (`zmp`). The
+corrected walk is `plan_walk`. Its program does not run as printed; `READINGS` says how each name was read.
 
-What is wrong, where it stands:
-CoM knots      ask for mean speeds of 1.67, 0.66 and 1.50 m/s within a step: a body weight fore and aft (`com_knots`).
-CoM height     is half a step out of phase: highest in double support (`com_height`).
-Toe joint      at heel strike lies 8 mm too near the ankle; its spline leaves the floor in stance (`toe_joint`).
-Ground force   is that of both feet: never shared, never 0 (`ground_reaction`), and turns the swing foot's joints too.
-ZMP            MATLAB's / between two rows is a least-squares quotient, one number, not a division (`zmp`).
-Joint torque   takes the sine of a sum of directions on top of r x F, and sin(1) of the height (`joint_torque`).
-Time axis      divides by 0.75 s what is called a cycle; the stride lasts 1.0 s (`normalised_time`).
+Faults, and the methods that have them:
+ CoM knots      ask for mean speeds of 1.67, 0.66 and 1.50 m/s within a step: a body weight fore and aft (`com_knots`).
+ CoM height     is half a step out of phase: highest in double support (`com_height`).
+ Toe joint      at heel strike lies 8 mm too near the ankle; its spline leaves the floor in stance (`toe_joint`).
+ Ground force   is that of both feet: never shared, never 0 (`ground_reaction`), and turns the swing foot's joints too.
+ ZMP            MATLAB's / between two rows is a least-squares quotient, one number, not a division (`zmp`).
+ Joint torque   takes the sine of a sum of directions on top of r x F, and sin(1) of the height (`joint_torque`).
+ Time axis      divides by 0.75 s, which it calls a cycle; the stride lasts 1.0 s (`normalised_time`).
 """
 
 from dataclasses import dataclass, field
@@ -46,11 +46,12 @@ READINGS = {
     "l_ff (section 2.3, toe joint)": "the appendix's l_ft; in Table 1 it is ankle to toe tip, 0.1717 m",
     "l_ab (section 2.3)": "l_bf; where x at heel strike differs (no l_an sin q_f there), the appendix holds",
 }
-"""A name in the thesis -> what it is read as here."""
+"""Name in the thesis -> its reading here."""
 
 
 def table_1(body: Body | None = None) -> dict[str, float]:
-    """Table 1: symbol -> length [m] for `body`, 1.70 m unless given. Printed: shank and thigh 0.417 for 0.4165."""
+    """Return Table 1: symbol -> length [m] for `body`, 1.70 m unless given. Printed: shank and thigh 0.417 for
+    0.4165."""
     body = body or Body()
     return {
         "l_foot": body.foot_length,
@@ -76,7 +77,7 @@ class ThesisWalk:
     k: int = 1
     """Number of the step; the appendix computes k = 1."""
     interpolation: Interpolation = "line and sine"
-    """What joins the CoM's knots in x: Figure 6's line and sine, MATLAB's cubic spline, or a cubic polynomial."""
+    """Curve through the CoM's knots in x: Figure 6's line and sine, MATLAB's cubic spline, or a cubic polynomial."""
     division: Division = "elementwise"
     """ZMP by equation (1) as meant, or with the one quotient that the appendix's / yields ("matrix")."""
     body: Body = field(default_factory=Body)
@@ -94,7 +95,7 @@ class ThesisWalk:
     com_behind_at_start: float = 0.25
     """x_sd [m]: CoM behind the support ankle as single support starts. Huang et al. 2001 search for both."""
     highest_ankle_forward: float = 0.4654
-    """L_a0 [m]: how far the highest ankle is ahead of the ankle's last place."""
+    """L_a0 [m]: distance of the highest ankle ahead of the ankle's last place."""
     highest_ankle_height: float = 0.14
     """H_a0 [m]: height of the highest ankle."""
     toe_off_pitch: float = 0.4

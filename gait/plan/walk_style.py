@@ -1,6 +1,8 @@
-"""What a plan may choose of a walk whose steps are given: where and when the ZMP passes, how the CoM bobs, how feet
-roll and swing. People's choice is the default of `plan_walk`; `least_work.json` has the choices of least effort, which
-know no curve of people's (`springfoot study plan-tuning`).
+"""Describe the choices of a plan with given steps: course and timing of the ZMP, bob of the CoM, roll and swing of
+feet.
+
+People's choice is the default of `plan_walk`; `least_work.json` has the choices of least effort, which use no curve of
+people's (`springfoot study plan-tuning`).
 """
 
 import json
@@ -24,7 +26,7 @@ from .foot_style import FootStyle
 STYLES = Path(str(resources.files("springfoot.gait.plan") / "least_work.json"))
 """The package's own file of styles."""
 PAIR = tuple[float, float]
-"""The type of what is two numbers."""
+"""Type of a pair of numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,23 +42,25 @@ class WalkStyle:
     knee: float
     """Least knee flexion of the stride [rad], which sets the height of the CoM."""
     zmp_way: tuple[float, float] | None = None
-    """Parts of its travel that the ZMP has done a third and two thirds through single support; None: these parts."""
+    """Fractions of its travel that the ZMP has covered after one and two thirds of single support; None: one and two
+    thirds."""
     lowest: float = 0.5
     """Part of double support after which the CoM is lowest."""
     rise_again: tuple[float, float] = (0.0, 0.0)
     """Second harmonic of the CoM's height (`cart_table.Bob`): cosine and sine over half of `rise` [-]."""
     lean: float = 0.0
-    """Pitch at which the trunk is held [rad], forward positive, 0 with its CoM upright over the hip."""
+    """Pitch of the trunk [rad], forward positive, 0 with its CoM upright over the hip."""
     foot: FootStyle
-    """How the feet roll and swing."""
+    """Style of the feet's roll and swing."""
 
     def to_json(self) -> dict[str, Any]:
-        """Plain JSON values; `style_from` is the inverse."""
+        """Return plain JSON values; `style_from` is the inverse."""
         return json.loads(json.dumps(asdict(self)))
 
 
 def style_from(values: Mapping[str, Any]) -> WalkStyle:
-    """Return the style of JSON values (lists for tuples); raises `ValueError`, `TypeError` or `KeyError` for others."""
+    """Return the style of JSON values (lists for tuples); raise `ValueError`, `TypeError` or `KeyError` for other
+    values."""
     own = dict(values)
     style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
     for part in (style, style.foot):
@@ -74,7 +78,7 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
 
 
 def _is_a(kind: Any, value: Any) -> bool:
-    """Return whether a value is of a field's type, and its numbers are finite."""
+    """Tell whether a value has a field's type, and finite numbers."""
     if get_origin(kind) is tuple:
         own = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
         return own and all(isfinite(as_float(each)) for each in value)
@@ -82,9 +86,11 @@ def _is_a(kind: Any, value: Any) -> bool:
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:
-    """Return the style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`: linear between
-    the speeds it was searched at, and beyond them that of the nearest. Raises `SpringfootError` for a file of no
-    styles."""
+    """Return the style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`.
+
+    Linear between the speeds of the searches; outside them the nearest style. Raises `SpringfootError` for a file
+    without styles.
+    """
     table = _committed() if file is None else styles_of(file)
     speeds = sorted(table)
     place = float(np.interp(speed, speeds, np.arange(len(speeds))))
@@ -111,7 +117,7 @@ def _committed() -> dict[float, WalkStyle]:
 
 
 def styles_of(file: Path) -> dict[float, WalkStyle]:
-    """Speed [m/s at 1.70 m] -> the style of a file; raises `SpringfootError` for one that has none."""
+    """Return speed [m/s at 1.70 m] -> style, from a file; raise `SpringfootError` for a file without styles."""
     try:
         styles = json.loads(read_bytes(file, MOST_JSON_BYTES))["styles"]
         found = {float(speed): style_from(values) for speed, values in styles.items()}
