@@ -189,7 +189,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `speed_rate`              | `0.25`          | rate at which it goes to a new one [m/s^2]                         |
     | **reference**             |                 |                                                                    |
     | `cadence`                 | `"people"`      | step length and time of `"people"` or of the `"thesis"`            |
-    | `guide`                   | `"people"`      | whose walk it follows: that of `"people"` or of its `"plan"`       |
+    | `guide`                   | `"people"`      | target of the walk: `"people"`, or its own `"plan"`                |
     | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
     | `plan_file`               | `None`          | the plan's style and leg constants in place of the package's       |
     | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
@@ -216,7 +216,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `push_newton`             | `0.0`           | size of each push on the trunk [N] for 63 kg, scales with mass     |
     | `push_seconds`            | `0.1`           | duration of each push [s]                                          |
     | `push_interval`           | `4.0`           | one push at a random time in each interval [s]                     |
-    | `sensor_noise`            | `0.0`           | SD of noise on what is measured of the observation                 |
+    | `sensor_noise`            | `0.0`           | SD of noise on the measured entries of the observation             |
     | `stiffness_delay_s`       | `0.0`           | a new stiffness acts this much later [s]                           |
     | `stiffness_delay_range_s` | `None`          | delays drawn at each reset [s], in place of it                     |
     | **reward**                |                 |                                                                    |

@@ -1,4 +1,4 @@
-"""What both Gymnasium faces share: spaces, spec, options of a reset, pictures, and what is pickled."""
+"""Share the parts of both Gymnasium environments: spaces, spec, options of a reset, pictures, pickling."""
 
 from collections.abc import Mapping
 from copy import copy
@@ -22,7 +22,7 @@ METADATA: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": ro
 
 
 class Face:
-    """A batch behind one of Gymnasium's interfaces: its spec, its camera, and what is pickled of it."""
+    """A batch behind one of Gymnasium's interfaces: its spec, its camera, its pickling."""
 
     settings: BipedSettings
     biped: Biped
@@ -38,12 +38,13 @@ class Face:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
+        """Return the spec of `gym.make` or `make_vec`; its `max_episode_steps` are those of the settings."""
         self._spec = copy(spec)
         if self._spec is not None:
             self._spec.max_episode_steps = self.settings.max_episode_steps
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the camera: a copy opens its own when it is asked for a picture."""
+        """Return everything but the camera: a copy opens a camera at its first picture."""
         return self.__dict__ | {"_camera": None}
 
     def _camera_for(self) -> Camera:
@@ -64,7 +65,7 @@ class Face:
 
 
 def spaces_of(biped: Biped) -> tuple[Box, Box]:
-    """Observation and action space of one environment."""
+    """Return observation and action space of one environment."""
     low = biped.observation_low
     high = biped.observation_high
     return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
@@ -85,7 +86,7 @@ def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) ->
 
 
 def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
-    """Bodies and speeds that the options of a reset set in N environments: (N,) by the names of `DRAWN`."""
+    """Return the bodies and speeds of N environments in the options of a reset: (N,) by the names of `DRAWN`."""
     given = {}
     for name in DRAWN:
         if name in options:

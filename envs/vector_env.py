@@ -29,8 +29,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
 ):
     """N of `SegmentedFootBiped` in one batched simulation: same settings, spaces, rewards and bits.
 
-    Environment i of a vector seeded with s does what `SegmentedFootBiped` seeded with s + i does. Its info comes as
-    arrays (N,) by name, each with Gymnasium's mask `_name` (N,) of where it holds. `biped.model_of(i)` is its MuJoCo
+    Environment i of a vector seeded with s equals `SegmentedFootBiped` seeded with s + i. Its info comes as arrays (N,)
+    by name, each with Gymnasium's mask `_name` (N,) of valid entries. `biped.model_of(i)` is its MuJoCo
     model, `biped.data(i)` a copy of its state.
 
     Args:

@@ -1,4 +1,4 @@
-"""Stopping in good order: the first SIGINT or SIGTERM asks for it, the second ends at once what is being done."""
+"""Stop a training in good order at the first SIGINT or SIGTERM, and at once at the second."""
 
 import signal
 import threading
@@ -9,7 +9,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Stopping:
-    """Whether somebody has asked to stop, and the signal that did; a context manager, of effect in the main thread."""
+    """Request to stop, with its signal if there was one; a context manager that works in the main thread only."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -25,7 +25,7 @@ class Stopping:
             raise KeyboardInterrupt
 
     def ask(self) -> None:
-        """Ask to stop, without a signal."""
+        """Request to stop, without a signal."""
         self.asked = True
 
     def _restore(self) -> None:
@@ -42,5 +42,5 @@ class Stopping:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Let them be handled as before."""
+        """Restore the earlier handling of the signals."""
         self._restore()

@@ -1,4 +1,4 @@
-"""What TensorBoard is told of a run beside its curves: the configuration, as a text and as hyperparameters."""
+"""Write the configuration of a run to TensorBoard, as a text and as hyperparameters."""
 
 import json
 import threading
@@ -13,11 +13,11 @@ from .config import TrainingConfig, config_to_json
 _WRITERS = "tensorboard"
 """Package of the thread that writes events."""
 METRICS = ("evaluation/return_mean", "evaluation/falls", "evaluation/seconds_mean")
-"""Curves that TensorBoard's table of hyperparameters holds the runs against."""
+"""Curves by which TensorBoard's table of hyperparameters compares runs."""
 
 
 def log_configuration(logger: Logger, config: TrainingConfig) -> None:
-    """Tell TensorBoard the configuration; its table HPARAMS compares several runs by it."""
+    """Write the configuration to TensorBoard; its table HPARAMS compares several runs by it."""
     values = config_to_json(config)
     text = "```json\n" + json.dumps(values, indent=2) + "\n```"
     hyperparameters = HParam(_flat(values), dict.fromkeys(METRICS, 0.0))
@@ -29,7 +29,8 @@ def log_configuration(logger: Logger, config: TrainingConfig) -> None:
 
 @contextmanager
 def no_word_of_writers() -> Iterator[None]:
-    """Within it no thread of TensorBoard's that cannot write prints a traceback: who waits for it raises that, too."""
+    """Suppress tracebacks of TensorBoard's writer threads inside the block; waiting for such a thread raises its error
+    anyway."""
     before = threading.excepthook
 
     def told(ended: threading.ExceptHookArgs) -> None:
@@ -44,7 +45,8 @@ def no_word_of_writers() -> Iterator[None]:
 
 
 def _flat(values: dict[str, Any], at: str = "") -> dict[str, bool | str | float | None]:
-    """`{"environment": {"speed": 1.2}}` as `{"environment/speed": 1.2}`; lists as text, what is None left out."""
+    """Return `{"environment": {"speed": 1.2}}` as `{"environment/speed": 1.2}`; lists as text, without entries of
+    None."""
     flat: dict[str, bool | str | float | None] = {}
     for name, value in values.items():
         if isinstance(value, dict) and value:

@@ -187,7 +187,7 @@ def total(terms, options, reward) -> None:
 
 
 class Task:
-    """What a policy sees, what it is rewarded for, and what counts as a fall, for N bodies.
+    """Observation, reward and falls of N bodies.
 
     Args:
         settings: the weights of the reward, and the time of a step.
@@ -234,7 +234,7 @@ class Task:
         return observation
 
     def tracking(self, bodies: NDArray) -> NDArray:
-        """CoM minus target: x [m], z [m] and forward speed [m/s], shape (N, 3); `bodies` (N,) of `BODY_ROW`."""
+        """Return CoM minus target: x [m], z [m] and forward speed [m/s], shape (N, 3); `bodies` (N,) of `BODY_ROW`."""
         error = np.empty((len(self.rows), 3))
         track(self._subjects.rows, bodies, self.table, error)
         return error
@@ -244,13 +244,13 @@ class Task:
         return bodies["measured"]["com"] - self.tracking(bodies)[:, :2]
 
     def reasons(self, m: "Measurement", terminated: NDArray) -> NDArray:
-        """Return (N,) why an episode is `terminated` (N,), as codes of `TERMINATIONS`."""
+        """Return (N,) the reason why an episode is `terminated` (N,), as codes of `TERMINATIONS`."""
         reasons = np.where(terminated, self.fallen(m), 0)
         for index in np.flatnonzero(terminated & (m.diverged >= 0)).tolist():
             reasons[index] = divergence(m, index)
         return reasons
 
     def fallen(self, m: "Measurement") -> NDArray:
-        """Return (N,) why each body has fallen, as codes of `TERMINATIONS`; 0 while it has not."""
+        """Return (N,) the reason of each body's fall, as codes of `TERMINATIONS`; 0 without one."""
         tilted = np.where(np.abs(m.base[:, 2]) <= MAX_PITCH, 0, TOO_TILTED)
         return np.where(m.base[:, 1] >= self.rows["scales"]["min_hip_height"], tilted, TOO_LOW)

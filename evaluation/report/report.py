@@ -1,8 +1,8 @@
-"""What an evaluation leaves behind: a folder of files.
+"""Write the files of an evaluation into its folder.
 
 metrics.json                    every number
 gait_cycle.csv, _left, _right   mean curves over percent of stride, and their spread
-strides.npz                     the 100 Hz series all of it is computed from
+strides.npz                     the 100 Hz series behind all of it
 every_stride.csv, .parquet      the curves of each stride
 gait.png, walk.gif              pictures
 stiffness_schedule.csv, finite_states.json   K and theta_eq as tables, which are policies again
