@@ -66,6 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    """Run the command whose name comes first, or print help."""
     try:
         match words:
             case ["train", *rest]:

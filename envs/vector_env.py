@@ -174,6 +174,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         return [check_seed(each) for each in seed]
 
     def _reset_mask(self, mask: Any) -> NDArray:
+        """Return the mask (N,) of a reset, checked; True everywhere for None."""
         if mask is None:
             return np.ones(self.num_envs, bool)
         if not isinstance(mask, np.ndarray) or mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():

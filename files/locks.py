@@ -118,6 +118,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _same(handle: int, path: Path) -> bool:
+    """Tell whether a handle is still that of the file at `path`."""
     try:
         return os.path.samestat(os.fstat(handle), path.stat())
     except OSError:
@@ -125,6 +126,7 @@ def _same(handle: int, path: Path) -> bool:
 
 
 def _live(path: Path, over: threading.Event) -> None:
+    """Touch the owner's file every `BEAT` seconds until the event `over`."""
     while not over.wait(BEAT):
         with suppress(OSError):
             os.utime(path)
@@ -155,6 +157,7 @@ def _taken(folder: Path, owner: dict[str, Any], more: str = "") -> str:
 
 
 def _named(owner: dict[str, Any]) -> str:
+    """Return the owner in words: process, host and age."""
     try:
         age = (datetime.now(UTC) - datetime.fromisoformat(owner["began"])).total_seconds()
         return f"process {int(owner['pid'])} on {owner['host']}, begun {_span(age)} ago"
@@ -163,6 +166,7 @@ def _named(owner: dict[str, Any]) -> str:
 
 
 def _span(seconds: float) -> str:
+    """Return a time [s] in words."""
     for unit, size in (("d", 86400), ("h", 3600), ("min", 60)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"

@@ -54,6 +54,7 @@ class Table:
         return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
 
     def _number(self, line: int, column: str, cell: str) -> float:
+        """Return a cell as a finite number; raise `SpringfootError` otherwise."""
         try:
             value = float(cell)
         except ValueError:

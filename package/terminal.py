@@ -49,6 +49,7 @@ def _name_glfw_library() -> None:
 
 
 def _end_at_once(number: int, _frame: Any) -> None:
+    """End the process with one line on standard error and the signal's exit code."""
     said, code = _SAID[signal.Signals(number)]
     with suppress(OSError):  # nobody reads it any more
         os.write(2, b"springfoot: " + said + b"\n")
@@ -56,6 +57,7 @@ def _end_at_once(number: int, _frame: Any) -> None:
 
 
 def _written_out(command: Callable[[], int]) -> int:
+    """Run a command and write out its output; return the exit code, also if the output cannot be written."""
     for handle in (0, 1, 2):  # one that is closed would become that of a file, into which others then print
         try:
             os.fstat(handle)

@@ -188,6 +188,7 @@ def own_settings(name: str, settings: BipedSettings) -> dict[str, Any]:
 
 
 def _factor_from(text: str) -> float:
+    """Return the factor of `schedule:FACTOR` from its text; raise `SpringfootError` unless it is positive."""
     try:
         factor = float(text)
     except ValueError:
@@ -198,6 +199,8 @@ def _factor_from(text: str) -> float:
 
 
 def _stiffness_from(text: str) -> tuple[float, float]:
+    """Return the stiffnesses [N m/rad] of `constant:ANKLE,TOE` from their text; raise `SpringfootError` unless both are
+    positive."""
     try:
         ankle, toe = map(float, text.split(","))
     except ValueError:

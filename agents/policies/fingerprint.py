@@ -61,6 +61,7 @@ def require_same(name: object, stored: Mapping[str, str], current: Mapping[str, 
 
 
 def _digest(names: Iterable[str], *numbers: Any) -> str:
+    """Return the SHA-256 digest of names, and of numbers to six significant digits."""
     values = np.concatenate([np.ravel(item).astype(np.float64) for item in numbers])
     values[np.abs(values) < 1e-9] = 0.0  # rounding noise has no significant digits
     return hashlib.sha256(" ".join([*names, *(f"{value:.6g}" for value in values)]).encode()).hexdigest()

@@ -29,6 +29,7 @@ def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
 
 
 def _bounds(name: str) -> tuple[float, float] | None:
+    """Return the least and largest value of a tensor's numbers, by its name; None for unknown names."""
     kind, _, item = name.partition(".")
     item = item.rpartition(".")[2]
     if kind in ("network", "layer"):

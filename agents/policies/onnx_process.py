@@ -38,6 +38,7 @@ def onnx_session(path: Path, width: int) -> tuple[Any, str]:
 
 
 def _session(path: Path) -> Any:
+    """Open a file with onnxruntime, on one thread."""
     import onnxruntime  # not above: an extra
 
     options = onnxruntime.SessionOptions()

@@ -101,6 +101,8 @@ def _curves(table: Table, what: str) -> NDArray:
 
 
 def _stiffness(table: Table) -> NDArray:
+    """Return K (SAMPLES, side, joint) [N m/rad] of a table; raise `SpringfootError` for numbers outside the accepted
+    range."""
     stiffness = _curves(table, "stiffness_Nm_per_rad")
     low, high = STIFFNESS_RANGE
     if not (low < stiffness.min() and stiffness.max() <= high):

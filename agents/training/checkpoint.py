@@ -109,6 +109,7 @@ def newest_checkpoint(out: Path) -> Checkpoint | None:
 
 
 def _timesteps(path: Path) -> int:
+    """Return the timesteps in a checkpoint's file name."""
     match = _NAME.fullmatch(path.name)
     assert match is not None
     return int(match[1])

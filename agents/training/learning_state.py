@@ -125,6 +125,8 @@ def restore_learning(
 
 
 def _fitting(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
+    """Return an array of a state; raise `ValueError` for another shape, another type, or numbers that are not
+    finite."""
     values = arrays[name]
     if values.shape != shape or values.dtype != kind:
         raise ValueError(f"{name} is {values.dtype} {values.shape}, not {kind.__name__} {shape}")

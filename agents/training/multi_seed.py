@@ -159,6 +159,7 @@ class _Trainings:
         return _row(config, folder, "interrupted" if self.stopping else "failed")
 
     def _stop(self, number: int, _frame: Any) -> None:
+        """Pass a signal on to the running trainings."""
         with self._lock:
             self.stopping = signal.Signals(number)
             for process in self._running:

@@ -42,6 +42,7 @@ class Progress:
         self._print_line()
 
     def _print_line(self) -> None:
+        """Print a line of progress if there is no bar."""
         if self._bar.disable:
             self._last_line = monotonic()
             rate = (self._done - self._first) / max(self._last_line - self._began, 1e-9)

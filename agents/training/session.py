@@ -86,6 +86,7 @@ class Session(BaseCallback):
         return self._record
 
     def _learn(self) -> None:
+        """Run PPO from the beginning or the checkpoint, with progress and signals handled."""
         ppo = self.learner.ppo
         session = {"from_timesteps": self._first, **source(PACKAGES)}
         logged = self._go_on(session)
@@ -261,6 +262,7 @@ class Session(BaseCallback):
         self._written = monotonic(), monotonic() - began
 
     def _write_record(self, status: str) -> None:
+        """Write run.json with this session's status, time and evaluations."""
         self._record |= {"config": config_to_json(self._config), "status": status, "timesteps": self._trained}
         self._record |= {"seconds": round(self._seconds(), 1), "best": best_of(self._record)}
         if status == "interrupted" and self._stopping.signal is not None:

@@ -160,6 +160,7 @@ def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _constants_of(file: Path, name: str) -> dict[str, dict]:
+    """Return name -> leg constants of a file; raise `SpringfootError` unless it has `name`."""
     try:
         table = json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"]
         _ = constants_from(table[name])

@@ -118,6 +118,8 @@ def neutral(constants: LegConstants) -> NDArray:
 
 
 def _toe(foot: FootHabits, flat_deg: float) -> NDArray:
+    """Return the rest angle of the toe over the stride (SAMPLES,) [rad]: `flat_deg` from foot flat to toe-off, else as
+    in swing."""
     corners = [*foot.toe_flat, *foot.toe_off]
     swing = foot.toe_swing_deg
     return np.deg2rad(np.interp(GRID, corners, [swing, flat_deg, flat_deg, swing]))

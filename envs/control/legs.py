@@ -207,6 +207,7 @@ class LegController:
 
 
 def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
+    """Return a leg's constants in the order of `GAINS`, for the settings' body."""
     body = walk.body
     stride_time = walk.plan.stride_time
     scale = body.stiffness_scale

@@ -135,6 +135,7 @@ class Subjects:
         return self._embody(ids, [replace(self._home, height=each, mass=own) for each, own in sizes])
 
     def _embody(self, ids: NDArray, bodies: Sequence[Body]) -> list[int]:
+        """Give environments `ids` these bodies; return the indices with a changed body."""
         others = []
         for index, body in zip(ids.tolist(), bodies, strict=True):
             if body != self.bodies[index]:
@@ -207,6 +208,7 @@ class Subjects:
         return np.inf if interval is None else time + interval * random.uniform(0.5, 1.5)
 
     def _check(self, body: Body, speed: float) -> None:
+        """Raise `SpringfootError` for a speed that the tables do not cover for this body."""
         time_scale = sqrt(body.height / self._home.height)
         low = self._speeds[0] * time_scale
         high = self._speeds[-1] * time_scale

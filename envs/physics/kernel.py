@@ -122,6 +122,7 @@ def _fingerprint(function: Callable[..., Any]) -> str:
 
 
 def _meaning(value: Any) -> str:
+    """Return a text for the value of a name in a kernel's code: equal texts for equal behaviour."""
     if isinstance(value, Dispatcher):
         return value.py_func.__qualname__  # with its own fingerprint
     if isinstance(value, np.ndarray):

@@ -49,6 +49,7 @@ class Camera:
         self._open(model)
 
     def _open(self, model: mujoco.MjModel) -> None:
+        """Open a renderer or a window for a model."""
         self._model = model
         if self._mode == "human":
             other = Camera._with_window and Camera._with_window()

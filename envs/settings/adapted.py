@@ -69,6 +69,7 @@ def _number(text: str) -> float:
 
 
 def _is_set(values: Any) -> bool:
+    """Tell whether a value maps names to numbers, or to lists of numbers, none of 1e6 or more."""
     return isinstance(values, Mapping) and all(
         abs(as_float(each)) < 1e6
         for value in values.values()

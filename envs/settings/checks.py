@@ -73,7 +73,7 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
 
 
 def refusing_unknown(settings: type[Settings]) -> type[Settings]:
-    """Make a dataclass of settings refuse a name that is none of its fields, as `check_names` does."""
+    """Make a dataclass of settings refuse unknown names, as `check_names` does."""
     made = settings.__init__
     names = [item.name for item in fields(settings)]  # type: ignore[arg-type]
 

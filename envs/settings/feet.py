@@ -137,6 +137,7 @@ def foot_setting(name: str, value: Any) -> FootSetting:
 
 
 def _plain(name: str, value: Any) -> str | dict[str, Any]:
+    """Return a foot's plain JSON values, checked: a word, or a dictionary of its kind and given numbers."""
     kind = value.get("kind") if isinstance(value, Mapping) else value
     if not isinstance(kind, str) or kind not in KINDS:
         form = "" if isinstance(value, (str, Mapping)) else ", or a dictionary with one of them as its 'kind'"
@@ -167,6 +168,7 @@ def _plain(name: str, value: Any) -> str | dict[str, Any]:
 
 
 def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
+    """Return the plain form of a foot's stiffness schedule, checked."""
     try:
         schedule = StiffnessSchedule.from_json(value)
     except SpringfootError as error:

@@ -248,6 +248,7 @@ class BipedSettings:
         return ceil(self.episode_seconds / self.step_seconds - 0.5)
 
     def _check_draws(self) -> None:
+        """Check the ranges to draw from."""
         for name, allowed, unit in (
             *(("height_range", HEIGHT_RANGE, "m"), ("mass_range", MASS_RANGE, "kg")),
             ("speed_range", PLAN_SPEED_RANGE, "m/s"),

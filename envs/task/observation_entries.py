@@ -24,6 +24,7 @@ class Entry(NamedTuple):
 
 
 def _entries() -> tuple[Entry, ...]:
+    """Return the entries in the order of the observation."""
     legs = [(side, joint) for side in SIDES for joint in JOINTS]
     sign: dict[str, str] = dict(zip(JOINTS, ("flexion", "flexion", "dorsiflexion", "toe up"), strict=True))
     return (

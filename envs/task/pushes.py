@@ -46,6 +46,7 @@ class Pushes:
         return np.where((since >= 0) & (since < self._duration), self._force * self._scale["mass"], 0.0)
 
     def _draw(self, index: int, random: np.random.Generator) -> None:
+        """Draw time and direction of the next push of environment `index`."""
         self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)
         self._force[index] = self._size * (-1.0, 1.0)[random.integers(2)]
         self._ends[index] += self._interval

@@ -56,6 +56,7 @@ class LiveScene:
             self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], away)
 
     def _begin(self) -> None:
+        """Build the scene of a new model: ground, body, arrows."""
         model = self._model = self._session.model
         self._feet = [model.body(f"foot_{side}").id for side in SIDES]
         scene = self._server.scene

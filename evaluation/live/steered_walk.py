@@ -260,6 +260,7 @@ class LiveSession:
         return self.frame
 
     def _force(self, tick: Tick) -> NDArray:
+        """Return the array `Frame.force` from the last control window."""
         force = tick.measurement.force[0]
         contact = tick.measurement.contact[0]
         load = force[..., 1]
@@ -301,6 +302,7 @@ class LiveSession:
         return Biped(settings, 1, rest=foot_curves(settings, constants, walk)[0][None] + offset)
 
     def _check(self, wishes: Wishes) -> None:
+        """Raise `SpringfootError` for wishes outside their ranges."""
         for name, (low, high) in WISH_RANGES.items():
             require_number(name, getattr(wishes, name), low, high)
         for name in ("ankle_stiffness", "toe_stiffness"):

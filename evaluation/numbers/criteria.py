@@ -109,6 +109,7 @@ def _force(name: str, low: float = -inf, high: float = inf) -> Criterion:
 
 
 def _rmse(joint: str, high: float) -> Criterion:
+    """Return the criterion of the RMSE of a joint's angle to people's mean [deg]."""
     return Criterion(
         name=joint, path=("joints", joint, "rmse_deg"), high=high, unit="°", loosen="share", label=f"RMSE {joint}"
     )
@@ -197,6 +198,7 @@ LOADS_LIKE_PEOPLE = (
 
 
 def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
+    """Return the criterion of a joint's positive or negative work in a stride [J/kg]."""
     name = f"{joint} work {'+' if sign == 'positive' else '−'}"
     path = ("joint_work_J_kg", joint, sign)
     return Criterion(name=name, path=path, low=low, high=high, unit=" J/kg", pattern=".3f", loosen="share")

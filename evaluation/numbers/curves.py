@@ -18,7 +18,7 @@ class StrideCurves:
     squares: NDArray | float = 0.0
 
     def add(self, curves: NDArray) -> None:
-        """Add strides (S, 101, C)."""
+        """Add strides' curves (S, 101, C)."""
         self.count += len(curves)
         self.total = self.total + curves.sum(axis=0)
         self.squares = self.squares + np.square(curves).sum(axis=0)

@@ -65,6 +65,7 @@ def measure(recording: Recording) -> Gait:
 
 
 def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
+    """Return the numbers of metrics.json, nested as in docs/reference/metrics.md."""
     settings = recording.settings
     both = tally.both
     human = reference_gait(settings)

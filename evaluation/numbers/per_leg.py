@@ -43,6 +43,7 @@ def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
 
 
 def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
+    """Return the numbers of one leg, 0 left, 1 right."""
     curves = tally.feet[side]
     mine = np.array(tally.stride_sides, int) == side
     features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))

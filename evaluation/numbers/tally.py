@@ -148,6 +148,7 @@ def add_episode(
 def _add_steps(
     tally: StrideTally, series: dict[str, NDArray], contacts: list[Contacts], steady: tuple[float, float]
 ) -> None:
+    """Add the steps of one episode: CoM, CoP and reward over the step, lengths, times, double support."""
     steps, sides = find_steps(contacts[0], contacts[1], after=steady[0])
     in_time = steps[:, 1] <= steady[1]
     steps = steps[in_time]

@@ -53,6 +53,7 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
 
 
 def _panel(group: str, title: str, unit: str, own: tuple[NDArray, NDArray], **more: Any) -> dict[str, Any]:
+    """Return one panel of the page: title, unit, the walk's mean and SD, and `more`, such as people's."""
     return {
         "group": group,
         "title": title,
@@ -76,6 +77,7 @@ def _legs(gait: Gait, name: str, apart: bool) -> dict[str, Any]:
 
 
 def _people(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any]:
+    """Return people's mean and SD of a curve over percent of the stride, for a panel."""
     unit = np.degrees(1.0) if degrees else 1.0
     phase = PERCENT / 100
     return {
@@ -85,6 +87,7 @@ def _people(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any
 
 
 def _angles(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+    """Return the panels of joint angles."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}
     return [
         _panel(
@@ -98,6 +101,8 @@ def _angles(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
 
 
 def _kinetics(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+    """Return the panels of moments, powers and ground reaction forces."""
+
     def stride(group: str, title: str, unit: str, column: str, theirs: dict[str, Any]) -> dict[str, Any]:
         return _panel(group, title, unit, _of(gait.both, column), **theirs, **_legs(gait, column, apart))
 
@@ -116,6 +121,7 @@ def _kinetics(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]
 
 
 def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
+    """Return the panels of CoM and CoP over the step, with their plan."""
     group = "Centre of mass, centre of pressure and their plans, over the step"
     axis = "step"
     com, (x, z) = gait.com, recording.plan_com.T

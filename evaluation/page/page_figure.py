@@ -114,6 +114,7 @@ def _foot(setting: FootSetting) -> dict[str, Any]:
 
 
 def _at_joint(joint: FootJoint) -> str:
+    """Return the word for the parts at a joint: muscles, lock or device."""
     if joint.device is None:
         return "muscles"
     return "lock" if joint.device == LOCK else "device"

@@ -104,6 +104,7 @@ def episodes_of(recording: Recording, rows: NDArray) -> Recording:
 
 
 def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], NDArray]:
+    """Return numbers and series of the last moments of a walk that only fell."""
     series = recording.shown()
     drawn = _figure_series(recording, series, body_of(recording.settings))
     end = TICK * len(drawn)

@@ -38,6 +38,7 @@ def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str
 
 
 def _made(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
+    """Return the text on the origin of the page: command, seeds, commit, versions, settings."""
     made = source(PAGE_PACKAGES)
     commit = made["commit"] or "none: not in a clone of the project"
     lines = [f"command: {command}"] if command else []
@@ -55,6 +56,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def _verdict(index: int, metrics: dict[str, Any]) -> str:
+    """Return the HTML of one policy's verdict."""
     colour = COLOURS[index % len(COLOURS)]
     items = "".join(f"<dt>{escape(term)}</dt><dd>{escape(said)}</dd>" for term, said in spoken_verdict(metrics).items())
     return (
@@ -97,6 +99,8 @@ _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
 
 
 def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: bool) -> str:
+    """Return, in words, the number of criteria and the missed ones; that there is no verdict unless the walk is
+    `judged`."""
     if not judged:
         return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
     values = numbers(dict(metrics))

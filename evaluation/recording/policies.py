@@ -101,6 +101,8 @@ def policy_label(name: str) -> str:
 
 
 def _own_name(name: str) -> str:
+    """Return the name of a policy's file without folder and suffix; for the best and last policy of a run with the
+    run's name."""
     path = Path(name)
     if path.suffix not in (".safetensors", ".onnx", *SCHEDULE_SUFFIXES):
         return path.resolve().name.replace(":", "-").replace(",", "-")

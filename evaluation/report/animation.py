@@ -91,6 +91,7 @@ class _Canvas:
         self._stiffness_range = np.log(np.stack(stiffness_ranges(settings, body), axis=-1))
 
     def frame(self, tick: int) -> Image.Image:
+        """Return the picture of the body at a tick."""
         image = Image.new("RGB", (OVERSAMPLING * SIZE[0], OVERSAMPLING * SIZE[1]), PAPER)
         self._draw = ImageDraw.Draw(image)
         self._tick = tick
@@ -177,12 +178,14 @@ class _Canvas:
         self._disc(knee, 0.014 * size, fill=PAPER)
 
     def _stiffness_colour(self, side: int, joint: int) -> tuple[int, int, int]:
+        """Return the colour of a joint by its K, from soft to stiff."""
         low, high = self._stiffness_range[joint]
         share = np.clip((np.log(max(self._at("stiffness")[side, joint], 1.0)) - low) / (high - low), 0, 1)
         red, green, blue = (SOFT + share * (STIFF - SOFT)).astype(int)
         return int(red), int(green), int(blue)
 
     def _force(self, side: int, colour: tuple) -> None:
+        """Draw the ground reaction force of one foot as an arrow from its CoP."""
         force = self._at("force")[side]
         contact = self._at("contact")[side]
         vertical = force[:, 1].sum()
@@ -203,6 +206,7 @@ class _Canvas:
         self._draw.polygon([self._pixel(point) for point in corners], fill=colour)
 
     def _masses(self) -> None:
+        """Draw the CoM, and its planned place."""
         size = self._body.length_scale
         self._disc(self._at("com_reference"), 0.034 * size, outline=PLAN, width=round(1.8 * OVERSAMPLING))
         self._disc(self._at("com"), 0.020 * size, fill=PAPER, outline=INK, width=OVERSAMPLING)

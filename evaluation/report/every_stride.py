@@ -59,6 +59,7 @@ def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]
 
 
 def _write_parquet(path: Path, strides: Sequence[tuple[dict[str, Any], NDArray]]) -> None:
+    """Write the table as Parquet, with pyarrow."""
     import pyarrow as pa  # pyright: ignore[reportMissingImports]  # optional
     import pyarrow.parquet as pq  # pyright: ignore[reportMissingImports]
 

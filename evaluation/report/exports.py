@@ -108,6 +108,7 @@ def _slope(settings: BipedSettings) -> float:
 
 
 def _write_storage(path: Path, what: str, columns: Mapping[str, NDArray], in_degrees: bool) -> None:
+    """Write columns as a storage file of OpenSim."""
     rows = np.stack(list(columns.values()), axis=-1)
     head = [
         f"springfoot {what}",

@@ -70,6 +70,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
 
 
 def _angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
+    """Draw the angle of one joint over the stride, people's behind it."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}.get(joint, "flexion")
     ax.set(title=f"{joint.capitalize()} angle", ylabel=f"{positive} (deg)")
     phase = PERCENT / 100
@@ -79,6 +80,7 @@ def _angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numb
 
 
 def _moment(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
+    """Draw the moment of one joint over the stride, people's behind it."""
     positive = "extension" if joint in ("hip", "knee") else "plantarflexion"
     ax.set(title=f"{joint.capitalize()} moment", ylabel=f"{positive} (N·m/kg)")
     if joint != "toe":
@@ -88,6 +90,7 @@ def _moment(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, num
 
 
 def _force(ax: Axes, legs: Legs, human: HumanGait, direction: str, title: str, numbers: dict) -> None:
+    """Draw a component of the ground reaction force over the stride, people's behind it."""
     ax.set(title=title, ylabel=f"{'up' if direction == 'vertical' else 'forward'} (body weights)")
     name = f"grf_{direction}"
     _people(ax, human.mean(name, PERCENT / 100), human.sd(name, PERCENT / 100))
@@ -103,6 +106,7 @@ def _force(ax: Axes, legs: Legs, human: HumanGait, direction: str, title: str, n
 
 
 def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
+    """Draw the CoM over the step, its plan behind it."""
     for ax, name, title, ylabel, column in (
         (axes[0], "x", "CoM ahead of ankle", "forward (m)", 0),
         (axes[1], "z", "CoM height", "above the floor (m)", 1),
@@ -121,6 +125,8 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
 
 
 def _springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
+    """Draw K of ankle and toe, the ankle's angle with its rest angle, and its power; people's angle and power behind
+    them."""
     for ax, name in zip(axes[:2], ("ankle", "toe"), strict=True):
         ax.set(title=f"{name.capitalize()} stiffness K", ylabel="N·m/rad")
         _model(ax, legs, f"{name}_stiffness_Nm_per_rad")
@@ -166,6 +172,7 @@ def _stride_axis(ax: Axes, toe_off: float | None, people_toe_off: float) -> None
 
 
 def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) -> None:
+    """Write the figure's heading: policy, falls, speed, step, reference."""
     settings = recording.settings
     metrics = gait.metrics
     falls = f"{metrics['falls']} fall{'s' * (metrics['falls'] != 1)}"

@@ -61,6 +61,7 @@ def write_report(
 
 
 def _write_numbers(folder: Path, recording: Recording, gait: Gait) -> None:
+    """Write metrics.json, the tables of the gait cycle, and strides.npz."""
     text = json.dumps(gait.metrics, indent=2, allow_nan=False, ensure_ascii=False)
     (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
     left, right = gait.feet

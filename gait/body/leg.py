@@ -209,6 +209,7 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
 
 
 def _require_shapes(holder: object, last: Mapping[str, int], leading: tuple[int, ...]) -> None:
+    """Raise `SpringfootError` unless the arrays of `holder` have the shapes (*leading, last[name])."""
     for name, size in last.items():
         shape = getattr(holder, name).shape
         if shape != (*leading, size):

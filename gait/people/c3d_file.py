@@ -185,7 +185,8 @@ def _per_frame(samples: NDArray, frames: int) -> NDArray:
 
 
 def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
-    """Return the frames between gaps at the beginning and the end; refuse a gap in between."""
+    """Return the frames without the gaps at the record's beginning and end; raise `SpringfootError` for a gap in
+    between."""
     broken = {
         f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()
     }

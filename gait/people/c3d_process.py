@@ -36,6 +36,7 @@ def c3d_trial(path: Path) -> Trial:
 
 
 def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
+    """Return the walk in the arrays and the JSON text of the child process."""
     if "error" in header:
         raise SpringfootError(header["error"])
     legs: dict[str, dict[str, np.ndarray]] = {}

@@ -192,6 +192,7 @@ def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
 
 
 def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
+    """Yield curves with more noise than `ROUGHNESS`."""
     for curve, values in mean.items():
         jump = float(np.median(np.abs(np.diff(values, 2))))
         if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
@@ -199,6 +200,7 @@ def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
 
 
 def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
+    """Yield curves that are too large or too small, with the mistaken unit if there is one."""
     for curve, size in sizes.items():
         kind, (low, high, _) = _kind(curve), CURVE_LIMITS[curve]
         if curve == "ankle_moment" and "grf_vertical" not in mean:
@@ -242,6 +244,7 @@ def _moved(mean: Curves, usual: Curves) -> Iterator[str]:
 
 
 def _kind(curve: str) -> str:
+    """Return the kind of a curve: angle, moment, power or grf."""
     if curve in _ALL_ANGLES:
         return "angle"
     return "grf" if curve.startswith("grf") else curve.rpartition("_")[2]
@@ -320,7 +323,10 @@ def _unborne(mean: Curves) -> Iterator[str]:
 
 
 def _likeness(values: NDArray, usual: NDArray) -> NDArray:
-    """Return (100,) correlation with `usual` of the curve moved earlier by 0 to 99 % of the stride."""
+    """Return (100,) correlations with `usual` of the curve moved earlier by 0 to 99 % of the stride.
+
+    A circular cross-correlation, by Fourier transform.
+    """
     one, other = (each[:-1] - each[:-1].mean() for each in (values, usual))
     scale = float(np.sqrt((one @ one) * (other @ other))) or 1.0
     return np.fft.irfft(np.fft.rfft(one) * np.conj(np.fft.rfft(other)), len(one)) / scale

@@ -119,6 +119,7 @@ class HumanGait:
         return self._evaluate(self.mean_series, name, phase, derivative=True)
 
     def _evaluate(self, series: Curves, name: str, phase: ArrayLike, derivative: bool = False) -> NDArray:
+        """Return a curve, or its phase derivative, from its series at stride phases of any shape."""
         if name not in series:
             raise SpringfootError(f"no human curve named {name!r}; there are {', '.join(series)}")
         coefficients = series[name]

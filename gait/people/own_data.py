@@ -261,6 +261,7 @@ def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGai
 
 
 def _checked(own: OwnGait) -> OwnGait:
+    """Return `own`; raise `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a toe-off."""
     for name, (low, high, unit) in ACCEPTED.items():
         if getattr(own, name) is not None:
             require_within(f"{own.name}: {name}", getattr(own, name), (low, high), unit)

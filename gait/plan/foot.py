@@ -152,6 +152,8 @@ class FootPath:
         return np.where(phase < self.foot_flat, heel, np.where(phase <= self.toe_off, toe, swing))
 
     def _heel_rocker(self, phase: ArrayLike) -> NDArray:
+        """Return (3, 3, ...): ankle (x, z) and pitch while the foot turns about its heel, with two phase
+        derivatives."""
         left = 1 - np.asarray(phase) / self.foot_flat
         power = HEEL_ROCKER_POWER
         pitch = self.heel_strike_pitch * left**power
@@ -162,6 +164,8 @@ class FootPath:
         return jet
 
     def _toe_rocker(self, phase: ArrayLike) -> NDArray:
+        """Return (3, 3, ...): ankle (x, z) and pitch while the foot turns about its toe joint, with two phase
+        derivatives."""
         body = self.body
         shape = self.style.heel_rise or self.style.toe_rocker_power
         pitch = rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)

@@ -248,6 +248,7 @@ def _zmp_travel(body: Body, given: tuple[float, float] | None, otherwise: ArrayL
 
 
 def _refuse_zmp_outside(plan: WalkPlan) -> None:
+    """Raise `SpringfootError` for a plan whose ZMP leaves the feet on the ground."""
     feet = plan.feet
     # What is on the ground changes at the events: both sides of each are looked at.
     events = 2 * np.array([feet.foot_flat, feet.heel_off, feet.tip_off - 0.5, feet.toe_off - 0.5])

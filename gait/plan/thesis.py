@@ -253,6 +253,7 @@ class ThesisWalk:
         return np.maximum(zmp - front, 0.0) + np.minimum(zmp - rear, 0.0)
 
     def _arm(self, joint: Joint, time: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Return the vector (x, z) [m] from the ZMP to a joint."""
         if joint not in get_args(Joint):
             raise SpringfootError(f"joint must be one of {', '.join(get_args(Joint))}, got {joint!r}")
         x, z = self.ankle(time) if joint == "ankle" else self.toe_joint(time)
@@ -283,6 +284,7 @@ class ThesisWalk:
         return {joint: CubicSpline(self.knot_times, np.stack(xz, -1)) for joint, xz in knots.items()}
 
     def _within(self, time: ArrayLike) -> NDArray:
+        """Return the times as an array; raise `SpringfootError` for times outside the step."""
         time = np.asarray(time, float)
         ends = self.knot_times[[0, -1]]
         # Half a nanosecond: `linspace` may end a rounding error late.

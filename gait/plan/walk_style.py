@@ -100,6 +100,7 @@ def least_work(speed: float, file: Path | None = None) -> WalkStyle:
 
 
 def _mixed(low: Any, high: Any, weight: float) -> Any:
+    """Interpolate between the JSON values of two styles, number by number."""
     if low is None:
         return None
     if isinstance(low, dict):

@@ -29,6 +29,7 @@ def read_foot(path: str | Path) -> dict[str, Any]:
 
 
 def _tables(path: Path) -> dict[str, list[list[float]]]:
+    """Return joint -> torque-angle line [deg, N m] of a CSV file."""
     table = read_csv(path)
     found = {}
     for joint in SPRINGS:

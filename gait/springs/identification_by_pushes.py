@@ -143,6 +143,7 @@ def _checked(
     trial: ArrayLike,
     states: ArrayLike | None,
 ) -> _Data:
+    """Return the samples as arrays; raise `SpringfootError` for wrong shapes or numbers that are not finite."""
     arrays = tuple(np.asarray(values, float) for values in (torque, angle, velocity, phase, trial))
     shapes = [values.shape for values in arrays]
     if len(set(shapes)) > 1 or len(shapes[0]) != 1 or not all(np.isfinite(values).all() for values in arrays):
@@ -158,6 +159,7 @@ def _checked(
 
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
     """Return the spring of one phase."""
+    # Samples of the phase, by bins of equal phase; bins with few samples are left out.
     low_in = low + margin
     high_in = high - margin
     inside = np.flatnonzero((data.phase >= low_in) & (data.phase < high_in))
@@ -172,6 +174,7 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
     needed = max(LEAST_TRIALS, 2 * (data.states.shape[1] + 2))
     if trials < needed:
         return _unknown(known, f"{trials} trials are too few, {needed} are needed")
+    # Deviations from the mean course; curvature of the spring counts as a further state.
     torque, angle, velocity, *states = (
         _deviation(column, phase, cell)
         for column in (data.torque[inside], data.angle[inside], data.velocity[inside], *data.states[inside].T)
@@ -179,12 +182,14 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
     bends = [_deviation(bend, phase, cell) for bend in (angle**2, angle * np.abs(angle))]
     hats = _hats(phase, low_in, high_in, spacing)
     spread = float(np.sqrt(np.mean((angle - velocity * (angle @ velocity) / max(velocity @ velocity, 1e-300)) ** 2)))
+    # d torque = -K d angle - K beta d velocity, K and K beta linear between knots; then with further states besides.
     springs = np.concatenate([hats * -angle[:, None], hats * -velocity[:, None]], 1)
     spent = 2 * (int(cell.max()) + 1)
     fit = fit_by_trial(springs, torque, trial, spent)
     wide = fit_by_trial(np.column_stack([springs, *states, *bends]), torque, trial, spent)
     if fit is None or wide is None:
         return _unknown(known, "angle and velocity move too little, or as one, to tell K from beta")
+    # K, and beta = (K beta) / K, as means over the samples: of all trials, and without each trial.
     weights = hats.mean(0)
     columns = len(weights)
     stiffness = fit.coefficients[:columns] @ weights
@@ -210,6 +215,7 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
 
 
 def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> tuple[str, str]:
+    """Return the verdict on a joint in a phase, and the reason if it is no spring."""
     if chance < REACTION_LEVEL and reaction >= REACTION_SHARE * (explained + reaction):
         return REACTS, f"further states explain {100 * reaction:.0f} % of the torque's deviations beyond K and beta"
     if K.value + 2 * (K.high - K.value) < 0 and explained >= REACTION_SHARE:
@@ -222,6 +228,7 @@ def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> t
 
 
 def _unknown(known: dict[str, float], reason: str) -> PushedSpring:
+    """Return the result of a phase whose data leave all numbers open, with the reason."""
     return PushedSpring(
         **known,  # type: ignore[arg-type]
         stiffness=None,

@@ -250,6 +250,7 @@ def _lines(
 
 
 def _segment(joint: str, entry: object) -> Segment:
+    """Return a segment from its JSON form; raise `SpringfootError` for bad numbers."""
     if not isinstance(entry, (list, tuple)) or len(entry) != 3:
         raise SpringfootError(f"{joint} segment must be [phase, N m/rad, rad], got {entry!r:.80}")
     start = require_within(f"{joint} segment start", entry[0], (0.0, 1.0))

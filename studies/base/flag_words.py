@@ -77,6 +77,7 @@ def _read(kind: Any, words: list[str]) -> Any:
 
 
 def _one(kind: Any, words: list[str]) -> Any:
+    """Return the value of a type that is not a union, from the words behind its flag."""
     if get_origin(kind) is tuple:
         items = get_args(kind)
         kinds = [items[0]] * len(words) if items[1:] == (...,) else items
@@ -90,6 +91,7 @@ def _one(kind: Any, words: list[str]) -> Any:
 
 
 def _meaning(kind: Any) -> str:
+    """Return the allowed values of a type, in words."""
     if get_origin(kind) is Literal:
         return f"one of {', '.join(map(str, get_args(kind)))}"
     if get_origin(kind) is tuple:

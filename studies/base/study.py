@@ -102,6 +102,7 @@ def without_places(command: str) -> str:
 
 
 def _write(path: Path, content: str | Callable[[Path], object]) -> None:
+    """Write a file of an answer, from its text or its function."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if callable(content):
         content(path)

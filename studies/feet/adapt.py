@@ -170,6 +170,7 @@ class Adapt(Study):
     def _search(
         self, begin: Person, search: int, label: str, progress: OnProgress
     ) -> tuple[Person, list[tuple[int, float, float]]]:
+        """Run one search; return the person at its mean, and number, best and median cost of each generation."""
         settings = BipedSettings(speed=self.speed)
         space = PersonSearch(begin, self.speed, self.design)
         seed = self.seed + 1_000_000 * (search - 1)

@@ -118,6 +118,7 @@ class Orthosis(WalkingStudy):
         return Answer(text="\n\n".join(text.values()), files=files)
 
     def _weak(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
+        """Return a row for each weak calf, body, commanded speed and spring."""
         rows: list[dict[str, Any]] = []
         orthoses = [{"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": 0.0} for spring in WEAK_SPRINGS]
         for mass, speed, strength in self._weak_cells():
@@ -129,6 +130,7 @@ class Orthosis(WalkingStudy):
         return rows
 
     def _drop(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
+        """Return a row for each drop foot's speed, spring and rest angle."""
         rows = []
         springs = list(product(SWING_SPRINGS, SWING_RESTS))
         feet = [{"kind": "drop", "orthosis": {"ankle_stiffness": k, "ankle_deg": rest}} for k, rest in springs]
@@ -161,6 +163,7 @@ class Orthosis(WalkingStudy):
         return rows
 
     def _weak_cells(self) -> Iterator[tuple[float, float, float]]:
+        """Yield mass [kg], commanded speed [m/s] and strength of each weak calf."""
         return (
             iter([(63.0, asked, 0.25) for asked in (1.2, 1.4)])
             if self.quick
@@ -251,6 +254,8 @@ def at_walked_speeds(rows: Sequence[Row], speeds: Sequence[float]) -> list[dict[
 
 
 def _energy_at(speed: float, slow: Row, fast: Row) -> float | None:
+    """Return a spring's energy at a walked `speed`, linear between two walks; None unless it lies between them, without
+    falls."""
     if slow["falls"] or fast["falls"] or None in (slow["energy_J_kg_m"], fast["energy_J_kg_m"]):
         return None
     low = slow["walked_m_s"]

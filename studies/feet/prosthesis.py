@@ -183,6 +183,7 @@ class Prosthesis(TrainingStudy):
                 yield _row(foot, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own[1]
 
     def _train(self) -> bool:
+        """Train the missing policies and copy them into `policies`; return True if a training failed."""
         jobs = []
         for search in SEARCHES:
             for seed in range(self.seeds):
@@ -345,6 +346,7 @@ def _place(row: Row) -> tuple[float, ...]:
 
 
 def _walks_table(rows: Sequence[Row]) -> str:
+    """Return the Markdown table of the walks at the first place, mean ± SD over groups or seeds."""
     head = ["foot", "person", "search", "rows", *(each.label for each in TOLD)]
     lines = []
     for (foot, person, search), group in _groups(rows).items():
@@ -354,6 +356,7 @@ def _walks_table(rows: Sequence[Row]) -> str:
 
 
 def _groups(rows: Sequence[Row]) -> dict[tuple[str, str, Any], list[Row]]:
+    """Return (foot, person, search) -> its rows."""
     groups: dict[tuple[str, str, Any], list[Row]] = {}
     for row in rows:
         groups.setdefault((row["foot"], row["person"], row["search"]), []).append(row)
@@ -361,6 +364,7 @@ def _groups(rows: Sequence[Row]) -> dict[tuple[str, str, Any], list[Row]]:
 
 
 def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
+    """Return a number of several rows as "mean ± SD", in words."""
     values = [row[key] for row in rows if row[key] is not None]
     if not values:
         return MISSING
@@ -391,6 +395,7 @@ def _passive_against(rows: Sequence[Row], foot: str) -> str:
 
 
 def _shares_text(shares: Sequence[Row]) -> str:
+    """Return the Markdown table of the changes by adaptive stiffness."""
     lines = []
     for row in shares:
         asked = next(each for each in ASKED if each.key == row["number"])
@@ -415,6 +420,7 @@ def _interval(row: Row, name: str, pattern: str) -> str:
 
 
 def _elsewhere(rows: Sequence[Row], ran: str) -> str:
+    """Return the section on other bodies and speeds."""
     keys = [("falls", ".2f"), ("speed_m_s", ".2f"), ("falls_pushed", ".2f")]
     keys += [(each.key, each.pattern) for each in ASKED if each.key != "falls_pushed"]
     lines = []

@@ -25,6 +25,7 @@ def read_feet(path: Path) -> dict[str, Any]:
 
 
 def _read(path: Path, key: str, what: str) -> dict[str, Any]:
+    """Return a JSON file with the entry `key`; raise `SpringfootError` for any other, calling it no `what`."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -199,6 +199,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     phase = PERCENT / 100
     mean = {curve: both.mean(column) * unit for curve, (column, unit) in CURVES.items()}
     theirs, their_work, band = _target(target)
+    # Curves: joints, forces and moments from the target, CoM and CoP from the plan.
     off: dict[str, Any] = {curve: values - theirs[curve] for curve, values in mean.items()}
     course = planned_course(biped.plan)
     planned_speed = biped.plan.com_velocity(np.minimum(phase, 1 - 1e-9))[0]
@@ -207,7 +208,8 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["com_speed"] = tally.com.mean("vx") - planned_speed
     off["cop"] = np.nan_to_num(tally.cop.mean("x") - course["plan_zmp"])[:-1]  # at 100 % the plan is at the next foot
     off["beyond_sd"] = _beyond(off["hip_moment"], band)
-    off = {name: values / np.sqrt(len(values)) for name, values in off.items()}
+    off = {name: values / np.sqrt(len(values)) for name, values in off.items()}  # so that the length is an RMS
+    # Numbers: timing, peaks, work, and the properties of a good walk.
     late = phase > LATE_SWING
     off["late_hip_moment"] = np.maximum(mean["hip_moment"][late] - theirs["hip_moment"][late].max() - 0.1, 0.0)
     off["speed"] = mean_speed(tally) - biped.settings.speed

@@ -136,6 +136,7 @@ def _sets(known: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Le
 
 
 def _draw(path: Path, front: Mapping[str, tuple[float | None, float]]) -> None:
+    """Draw the falls of each set with untuned springs over its misses."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
         ax = figure.subplots()

@@ -111,6 +111,7 @@ class Predict(WalkingStudy):
             return self._staged(progress)
 
     def _staged(self, progress: OnProgress) -> Answer:
+        """Run the stages in order, each from its kept result if there is one."""
         found = self.folder / FOUND
         took = {}
 
@@ -199,6 +200,7 @@ class Predict(WalkingStudy):
             raise KeyboardInterrupt
 
     def _evaluated(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
+        """Walk with the policy, undisturbed and pushed, and return the report's text; kept by the policy's `digest`."""
         how = PushedWalks(
             episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads
         )

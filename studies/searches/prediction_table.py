@@ -89,6 +89,7 @@ def prediction_table(columns: Mapping[str, Mapping[str, Any]], held: Sequence[st
 
 
 def _value(criterion: Criterion, values: Mapping[str, Any]) -> float | None:
+    """Return the number of a criterion in a column; None if the column does not have it."""
     try:
         return criterion.value(dict(values))
     except KeyError:

@@ -159,6 +159,7 @@ def criteria_table(
 
 
 def _state(criterion: Criterion, values: dict[str, Any]) -> str:
+    """Return the mark of a number: "" if it meets the criterion, "(" if only the loosened one, "**" if neither."""
     if criterion.holds(values):
         return ""
     return "(" if criterion.loosened().holds(values) else "**"

@@ -169,6 +169,7 @@ def headline(study: Influence, responses: Mapping[str, Response]) -> str:
 
 
 def _cell(cell: int) -> str:
+    """Return joint and phase of a cell, in words."""
     joint, phase = CELLS[cell]
     begin, end = PHASES[phase]
     return f"{SPRINGS[joint]}, {phase} ({100 * begin:.0f}–{100 * end:.0f} %)"
@@ -194,6 +195,7 @@ def tables(study: Influence, responses: Mapping[str, Response]) -> str:
 
 
 def _chain(responses: Mapping[str, Response]) -> str:
+    """Return the table of the first condition, link by link."""
     own = next(iter(responses.values()))
     head = [
         *("joint", "phase %", "Δτ N·m", "Δa forward m/s²", "Δa up m/s²", "∫Δa dt forward mm/s"),
@@ -229,6 +231,7 @@ def _chain(responses: Mapping[str, Response]) -> str:
 
 
 def _everywhere(responses: Mapping[str, Response]) -> str:
+    """Return the table of the lasting change of speed under each condition."""
     rows = [
         [_cell(cell), *(_number(own, MANY_STRIDES_SPEED, cell, "+.1f", 1e3) for own in responses.values())]
         for cell in range(len(CELLS))
@@ -239,6 +242,7 @@ def _everywhere(responses: Mapping[str, Response]) -> str:
 
 
 def _foretelling(responses: Mapping[str, Response]) -> str:
+    """Return the table of the links: correlations over joints and phases."""
     rows = [
         [name, *(MISSING if not isfinite(r) else f"{r:.2f} [{low:.2f}, {high:.2f}]" for r, low, high, _ in each)]
         for name, each in ((name, [own.links[name] for own in responses.values()]) for name in LINKS)
@@ -249,6 +253,7 @@ def _foretelling(responses: Mapping[str, Response]) -> str:
 
 
 def _what_ran(study: Influence, responses: Mapping[str, Response]) -> str:
+    """Return the sentences on the walks: numbers, falls, cut changes."""
     short = "".join(
         f" The range of the actions cuts up to {own.cut.max():.0%} of a cell's changes short in `{name}`."
         for name, own in responses.items()
@@ -314,6 +319,7 @@ def _bars(ax: Axes, own: Response, key: Key, label: str, title: str, unit: float
 
 
 def _speeds(ax: Axes, own: Response) -> None:
+    """Draw the change of speed in the strides of `DRAWN_STRIDES`, by joint and phase."""
     for label, (when, color, shift) in DRAWN_STRIDES.items():
         key: Key = ("every stride", "speed_m_s", when)
         ax.errorbar(
@@ -335,6 +341,7 @@ def _whiskers(own: Response, key: Key, unit: float) -> np.ndarray:
 
 
 def _foretold(ax: Axes, responses: Mapping[str, Response]) -> None:
+    """Draw the lasting change of speed over the integral of the acceleration at fixed states, for every condition."""
     (name, first), *others = responses.items()
     for number, (_, own) in enumerate(others):
         ax.plot(

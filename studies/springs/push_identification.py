@@ -236,6 +236,7 @@ class Identify(WalkingStudy):
 
     @property
     def _pushes(self) -> str:
+        """Return the pushes of the experiment, in words."""
         decided = f" K decided at {self.decisions}." if self.decisions else ""
         decided += f" {100 * self.margin:g} % of the stride left out at both ends of each phase." if self.margin else ""
         return (

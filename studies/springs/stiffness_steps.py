@@ -207,6 +207,7 @@ class _Record:
         biped.on_tick = self._keep
 
     def _keep(self, tick: Tick) -> None:
+        """Keep positions, forces and phases of a tick, and sample the first stride of unchanged walks."""
         m = tick.measurement
         own = slice(self._num)
         walks = m.com.copy(), m.com_velocity[:, 0].copy(), m.ankle[..., 0].copy(), m.force[..., 1].sum(-1)
@@ -215,6 +216,8 @@ class _Record:
             self._sample(index, tick.phase[index])
 
     def _sample(self, index: int, phase: NDArray) -> None:
+        """Add the effect of each change at the present state of an unchanged walk, for legs in the phase of the
+        change."""
         torque, acceleration = step_at(self._biped.model, self._biped.data(index), self._change)
         for cell, (joint, name) in enumerate(CELLS):
             begin, end = PHASES[name]
@@ -224,6 +227,7 @@ class _Record:
     def paired(self, strides: int, active: NDArray, cut: NDArray) -> PairedWalks:
         """Return each changed walk less the unchanged walk of its seed."""
         com, velocity, ankle, load, phase, stride = (np.stack(each) for each in zip(*self._ticks, strict=True))
+        # The movement of each walk; the unchanged walks come first and give the clock.
         movement = np.full((len(active), strides, len(MOVEMENT)), np.nan)
         clocks = np.zeros((self._num, strides))
         for index in range(len(active)):
@@ -238,6 +242,7 @@ class _Record:
                 clocks[own] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
             movement[index] = _movement(com[:, index], ankle[:, index], contacts, landed, clocks[own])
         movement = movement.reshape(-1, self._num, *movement.shape[1:])
+        # The velocity of all copies of a seed when each phase of its unchanged first stride ends.
         ends = np.stack([_ends(*each) for each in zip(phase.T, stride.T, strict=True)], -1)  # (phases, S)
         now = velocity.reshape(len(velocity), -1, self._num)[ends, :, np.arange(self._num)]  # (phases, S, copies)
         single = 1 + np.arange(len(CELLS)) * len(DURATIONS)

@@ -82,6 +82,7 @@ def walk_pairs(
 
 
 def _row(recording: Recording) -> dict[str, Any]:
+    """Return the numbers of one pair's episode, as in pairs.csv."""
     metrics = measure(recording).metrics
     settings = recording.settings
     speed = metrics["speed_m_s"]["mean"]
@@ -133,6 +134,7 @@ def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[
 
 
 def _spread(standing: Sequence[Mapping[str, Any]], column: str, pattern: str) -> list[str]:
+    """Return median, 95 % bound and worst value of a column, as words."""
     size = [abs(row[column]) for row in standing]
     most = size[int(np.ceil(0.95 * len(size))) - 1]
     return [format(value, pattern) for value in (np.median(size), most, size[-1])]
