@@ -138,8 +138,10 @@ class Simulation:
         self._position[ids] = position
         self._turn[ids] = turn
         self._held[ids] = np.nan
-        self._qpos[ids, :3], self._qpos[ids, 3:] = base, angle.reshape(len(ids), -1)
-        self._qvel[ids, :3], self._qvel[ids, 3:] = base_velocity, velocity.reshape(len(ids), -1)
+        self._qpos[ids, :3] = base
+        self._qpos[ids, 3:] = angle.reshape(len(ids), -1)
+        self._qvel[ids, :3] = base_velocity
+        self._qvel[ids, 3:] = velocity.reshape(len(ids), -1)
         for state, given in ((self._qpos, base), (self._qvel, base_velocity)):
             state[ids, 1] += self._ground[ids, 0] * given[:, 0]
 

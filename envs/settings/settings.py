@@ -257,7 +257,8 @@ class BipedSettings:
                 check_range(name, getattr(self, name), unit)
                 for value in getattr(self, name):
                     require_within(name, value, allowed, unit)
-        (short, tall), (light, heavy) = self.height_range or 2 * (self.height,), self.mass_range or 2 * (self.mass,)
+        short, tall = self.height_range or 2 * (self.height,)
+        light, heavy = self.mass_range or 2 * (self.mass,)
         if light / tall**2 > BMI_RANGE[1] or heavy / short**2 < BMI_RANGE[0]:
             raise SpringfootError(
                 "height_range and mass_range must have a body with a body-mass index in "

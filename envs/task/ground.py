@@ -32,15 +32,17 @@ class Ground:
         self._simulation = simulation
         self.slope = subjects.slope
         """(N,) slope of the ground [rad], uphill positive."""
-        self.height, self._phase = rows["ground"]["height"], rows["ground"]["phase"]
-        """(N, side) height of the ground below each foot above the mean ground [m]; the legs' phases a window ago."""
+        self.height = rows["ground"]["height"]
+        """(N, side) height of the ground below each foot above the mean ground [m]."""
+        self._phase = rows["ground"]["phase"]  # (N, side) stride phases a window ago
 
     def reset(self, ids: NDArray, randoms: Sequence[np.random.Generator], leg_phase: NDArray) -> None:
         """Begin episodes of environments `ids` (K,) on even ground, with legs at the phases `leg_phase` (N, side)."""
         if self._settings.slope_range_deg is not None:
             for index, random in zip(ids.tolist(), randoms, strict=True):
                 self.slope[index] = radians(random.uniform(*self._settings.slope_range_deg))
-        self.height[ids], self._phase[ids] = 0.0, leg_phase[ids]
+        self.height[ids] = 0.0
+        self._phase[ids] = leg_phase[ids]
         self._simulation.lay(ids, self.slope[ids], self.height[ids])
 
     def advance(self, m: Measurement, leg_phase: NDArray, randoms: Sequence[np.random.Generator | None]) -> None:

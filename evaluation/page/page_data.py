@@ -124,7 +124,8 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
     """Return the panels of CoM and CoP over the step, with their plan."""
     group = "Centre of mass, centre of pressure and their plans, over the step"
     axis = "step"
-    com, (x, z) = gait.com, recording.plan_com.T
+    com = gait.com
+    x, z = recording.plan_com.T
     cop = gait.tally.cop
     return [
         _panel(group, "CoM ahead of the ankle", "forward, m", _of(com, "x"), plan=shown_numbers(x), axis=axis),

@@ -113,7 +113,8 @@ class _Canvas:
         return x, self._floor - point[1] * self._scale
 
     def _disc(self, centre: NDArray, radius: float, **style) -> None:
-        (x, y), r = self._pixel(centre), radius * self._scale
+        x, y = self._pixel(centre)
+        r = radius * self._scale
         self._draw.ellipse((x - r, y - r, x + r, y + r), **style)
 
     def _capsule(self, start: NDArray, end: NDArray, radius: float, colour: tuple) -> None:
@@ -213,7 +214,8 @@ class _Canvas:
         self._disc(self._at("com"), 0.008 * size, fill=INK)
 
     def _words(self) -> None:
-        unit, (width, height) = OVERSAMPLING, SIZE
+        unit = OVERSAMPLING
+        width, height = SIZE
         self._text((14 * unit, 10 * unit), self._title, 15, INK, "la")
         self._text((14 * unit, 31 * unit), self._subtitle, 11, FAINT, "la")
         y = (height - 12) * unit

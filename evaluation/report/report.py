@@ -87,6 +87,7 @@ def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) 
     }
     columns = {}
     for name in curves.names:
-        columns[name], columns[f"{name}_sd"] = curves.mean(name), curves.sd(name)
+        columns[name] = curves.mean(name)
+        columns[f"{name}_sd"] = curves.sd(name)
     rows = ([percent, *leading.values(), *(column[percent] for column in columns.values())] for percent in PERCENT)
     path.write_text(csv_text(["percent", *leading, *columns], rows), encoding="utf-8", newline="")

@@ -202,7 +202,8 @@ def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
 def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
     """Yield curves that are too large or too small, with the mistaken unit if there is one."""
     for curve, size in sizes.items():
-        kind, (low, high, _) = _kind(curve), CURVE_LIMITS[curve]
+        kind = _kind(curve)
+        low, high, _ = CURVE_LIMITS[curve]
         if curve == "ankle_moment" and "grf_vertical" not in mean:
             high = ALONE
         if size > high or (size < low and not _may_be_small(curve, sizes)):
@@ -299,7 +300,9 @@ def _unborne(mean: Curves) -> Iterator[str]:
     """Yield forces that bear no body, and an ankle moment that does not fit the forces and a foot's lever."""
     if "grf_vertical" not in mean:
         return
-    force, (least, most), (nearest, farthest) = mean["grf_vertical"], BORNE, LEVERS
+    force = mean["grf_vertical"]
+    least, most = BORNE
+    nearest, farthest = LEVERS
     borne = float(force[:-1].mean())
     if not least <= borne <= most:
         guess = "both feet together, or not per body weight?" if borne > most else "not per body weight?"

@@ -210,7 +210,8 @@ class ThesisWalk:
         """
         x, _ = self.com(time)
         at = self.knot_times if self.division == "matrix" else time
-        (forward, up), height = self.com_acceleration(at), self.com_height(at)
+        forward, up = self.com_acceleration(at)
+        height = self.com_height(at)
         if self.division == "matrix":
             return x - (height * forward) @ (up + GRAVITY) / np.sum((up + GRAVITY) ** 2)
         return x - height * forward / (up + GRAVITY)
@@ -224,13 +225,15 @@ class ThesisWalk:
         (of their difference) already; its z part by sin(1), as the sine is taken of a row of ones too; and the whole
         force turns this foot's joints even while it is in the air.
         """
-        (x, z), (forward, up) = self._arm(joint, time), self.ground_reaction(time)
+        x, z = self._arm(joint, time)
+        forward, up = self.ground_reaction(time)
         turn = (pi / 2 - np.arctan2(z, x)) + (pi / 2 - np.arctan2(up, forward))
         return sin(1) * z * forward - np.sin(turn) * x * up
 
     def cross_product(self, joint: Joint, time: ArrayLike) -> NDArray:
         """Equation (3) as meant, r x F with r from ZMP to joint [N m]; plantarflexion positive."""
-        (x, z), (forward, up) = self._arm(joint, time), self.ground_reaction(time)
+        x, z = self._arm(joint, time)
+        forward, up = self.ground_reaction(time)
         return z * forward - x * up
 
     # Where the ZMP leaves the feet ---------------------------------------------------------------------------
@@ -249,7 +252,8 @@ class ThesisWalk:
 
     def zmp_outside(self, time: ArrayLike) -> NDArray:
         """Return the distance of the ZMP ahead of the feet on the ground (positive) or behind them [m], else 0."""
-        zmp, (rear, front) = self.zmp(time), self.support(time)
+        zmp = self.zmp(time)
+        rear, front = self.support(time)
         return np.maximum(zmp - front, 0.0) + np.minimum(zmp - rear, 0.0)
 
     def _arm(self, joint: Joint, time: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -262,7 +266,8 @@ class ThesisWalk:
     @cached_property
     def _com_x(self):
         """Forward position and acceleration as functions of time."""
-        t, (x, _) = self.knot_times, self.com_knots
+        t = self.knot_times
+        x, _ = self.com_knots
         if self.interpolation == "not-a-knot":
             spline = CubicSpline(t, x)
             return spline, spline.derivative(2)

@@ -95,7 +95,8 @@ def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: fl
     is tau = K (theta_eq - theta). A line that no spring can follow, falling less than `lowest` or not falling at all
     (torque growing with the angle, or changing at a standing angle), gets K = `lowest` through its mid-point.
     """
-    (first_angle, first_torque), (last_angle, last_torque) = start, end
+    first_angle, first_torque = start
+    last_angle, last_torque = end
     turned = last_angle - first_angle
     lost = first_torque - last_torque
     stiffness = lost / turned if abs(turned) > 1e-6 else 0.0

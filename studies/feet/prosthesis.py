@@ -168,7 +168,8 @@ class Prosthesis(TrainingStudy):
         """Yield the rigid foot with a held toe, and the passive feet, at the speed of the held toe's search."""
         if (speed := _held_speed()) is None:
             return
-        (height, mass), feet = BODIES[0], committed_feet()
+        height, mass = BODIES[0]
+        feet = committed_feet()
         where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
         found = [(TOE_HELD, "", TOE_HELD), *(("passive", search, kept_name("passive", search)) for search in SEARCHES)]
         given = {"speed": speed, "episode_seconds": self.seconds}

@@ -221,7 +221,8 @@ class LegTuning(Study):
             best = int(np.argmin(paid))
             better = found[best]
             if better is not None and paid[best] < lengths[-1]:
-                (damping, place), here = tried[best], better
+                damping, place = tried[best]
+                here = better
                 keep(search.constants(place))
             else:
                 damping *= 10.0

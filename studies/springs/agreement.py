@@ -106,7 +106,8 @@ def agreement_table(found: Sequence[Agreement]) -> str:
     head += ["SD of θ_eq: mean, worst", "SD of torque / peak: mean, worst"]
     lines = []
     for each in found:
-        loaded, (worst, percent) = each.loaded, each.worst
+        loaded = each.loaded
+        worst, percent = each.worst
         variation = 100 * each.variation[loaded]
         rest = each.equilibrium.std(axis=0, ddof=1)[loaded]
         torque = 100 * each.torque.std(axis=0, ddof=1)[loaded] / np.abs(each.torque.mean(axis=0)).max()

@@ -183,7 +183,8 @@ class _Changes:
         for (joint, name), duration in product(CELLS, DURATIONS):
             rows.append((step * (np.arange(len(SPRINGS)) == joint), PHASES[name], duration == "every stride"))
         own, edges, self._lasts = (np.repeat(each, num, axis=0) for each in map(np.array, zip(*rows, strict=True)))
-        self._step, (self._begin, self._end) = own[:, None], edges.T[..., None]
+        self._step = own[:, None]
+        self._begin, self._end = edges.T[..., None]
 
     def added(self, phase: NDArray, stride: NDArray) -> NDArray:
         """Return the changes (N, 4) of the actions at `phase` (N, side) of the left foot's `stride` (N,), 0 the
