@@ -12,9 +12,10 @@ from springfoot.envs.physics.foot import LOCK, FootJoint
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import body_of
-from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts
+from springfoot.gait import GRAVITY
+from springfoot.gait.people.contacts import PERCENT
 
+from ..numbers.series import foot_contacts
 from ..recording.recording import TICK, Recording
 from ..report.animation import clip_of
 from ..report.exports import opensim_forces
@@ -39,7 +40,7 @@ def figure_data(recording: Recording) -> dict[str, Any]:
     series = {name: values[first:last] for name, values in whole.items()}
     slope = tan(radians(settings.slope_deg))
     forces = {name: values[first:last] for name, values in opensim_forces(recording).items()}
-    contacts = [_contacts_of(whole, side, body) for side in range(len(SIDES))]
+    contacts = foot_contacts(whole["force"][..., 1].sum(axis=2), body)
     percent = [_percent_of(each.heel_strikes, len(whole["phase"]))[first:last] for each in contacts]
     steps = np.unique(np.concatenate([each.heel_strikes for each in contacts]))
     phase = np.append(whole["phase"], whole["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
@@ -79,11 +80,6 @@ def figure_data(recording: Recording) -> dict[str, Any]:
         "step": shown_numbers(_percent_of(steps, len(whole["phase"]))[first:last]),
         "phase": shown_numbers(phase % 1.0),
     }
-
-
-def _contacts_of(series: dict[str, NDArray], side: int, body: Body) -> Contacts:
-    vertical = series["force"][:, side, :, 1].sum(axis=1)
-    return find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY, first=TICK / 2)
 
 
 def _percent_of(strikes: NDArray, ticks: int) -> NDArray:

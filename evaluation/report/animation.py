@@ -11,9 +11,10 @@ from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings.settings import body_of
 from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, find_contacts
+from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW
 
 from ..numbers.per_leg import differ, kinds_of
+from ..numbers.series import foot_contacts
 from ..recording.recording import TICK, WARM_UP, Recording
 
 SIZE = (460, 420)
@@ -59,9 +60,8 @@ def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
     episode = recording.example
     ticks = int(recording.ticks[episode])
     if not recording.fall_reason[episode]:
-        vertical = recording.series["force"][episode, :ticks, LEFT, :, 1].sum(axis=1)
-        contacts = find_contacts(vertical, TICK, CONTACT_THRESHOLD_BW * body.mass * GRAVITY)
-        strikes = np.round(contacts.heel_strikes / TICK).astype(int)
+        left, _ = foot_contacts(recording.series["force"][episode, :ticks, ..., 1].sum(axis=2), body)
+        strikes = np.round(left.heel_strikes / TICK).astype(int)
         strikes = strikes[strikes >= round(WARM_UP / TICK)]
         if len(strikes) > STRIDES:
             return episode, int(strikes[0]), int(strikes[STRIDES])

@@ -31,6 +31,13 @@ def test_a_name_means_one_thing_in_every_room():
     assert not [name for name, things in meanings.items() if len(things) > 1]
 
 
+def test_no_public_name_hides_a_module_beside_it():
+    for folder in (path.parent for room in ROOMS for path in (ROOT / room).rglob("__init__.py")):
+        package = import_module("springfoot." + ".".join(folder.relative_to(ROOT).parts))
+        modules = {path.stem for path in folder.iterdir() if path.suffix == ".py" or path.is_dir()}
+        assert modules.isdisjoint(getattr(package, "__all__", ())), folder
+
+
 def sources():
     """What readers copy: the examples, and the Python blocks of the pages."""
     for path in sorted((ROOT / "examples").glob("*.py")):

@@ -16,6 +16,7 @@ from springfoot.studies.feet.orthosis import (
     best_springs,
     directions,
     muscle_energy,
+    weak_text,
     weakest_cure,
 )
 
@@ -67,6 +68,17 @@ def test_the_best_spring_takes_least_energy_of_those_that_nobody_falls_with():
     assert best_springs(fast)[0]["fastest_Nm_deg"] == 4.0
     (none,) = best_springs(rows({0.0: 1.0, 2.0: 2.0}, falls=(0.0, 2.0)))
     assert none["best_Nm_deg"] is None
+
+
+def test_the_report_says_none_where_every_spring_falls():
+    walks = [
+        *rows({0.0: 1.0, 2.0: 2.0}, falls=(0.0, 2.0), strength=0.2),
+        *rows({0.0: 1.0, 2.0: 2.0}, strength=0.3),
+    ]
+    best = best_springs(walks)
+    lines = weak_text(walks, best, best, "One walk").splitlines()
+    assert [line for line in lines if line.startswith("| 20 %")] == ["| 20 % | 63 | none |"]
+    assert [line for line in lines if line.startswith("| 30 %")] == ["| 30 % | 63 | 0 (+100 %, 2) |"]
 
 
 def test_springs_are_compared_where_they_walk_equally_fast():
