@@ -9,6 +9,7 @@ counts as dead after ten minutes without a touch.
 import json
 import os
 import socket
+import stat
 import sys
 import threading
 import time
@@ -27,8 +28,14 @@ except ImportError:  # a system without such locks: every owner is taken as one 
 
 OWNER = ".owner"
 """File that names the owner of its folder."""
+MOST_OWNER_BYTES = 4096
+"""Most bytes that are read of an owner's file; chosen, tens of times a usual one."""
 BEAT, DEAD = 60.0, 600.0
 """Time between two touches, and time without a touch after which an owner on another host is dead [s]; chosen."""
+
+
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+"""Flags with which a link is not followed, and a pipe does not wait for its other end."""
 
 
 class TakenError(SpringfootError):
@@ -40,8 +47,9 @@ def owned(folder: Path) -> Iterator[None]:
     """Own `folder` until the block ends.
 
     A missing folder is made, and removed at the end if it is empty. A message on standard error says when the folder
-    comes from a dead owner. Raises `SpringfootError`, with nothing changed, if the folder cannot be made, and
-    `TakenError` if another process owns it.
+    comes from a dead owner. Raises `SpringfootError`, with nothing changed, if the folder cannot be made, and if the
+    folder or its owner's file is a link, or the latter no regular file. Raises `TakenError` if another process owns the
+    folder.
     """
     try:
         str(folder).encode()
@@ -54,7 +62,7 @@ def owned(folder: Path) -> Iterator[None]:
         mine = True
         over = threading.Event()
         try:
-            former = _read(path)
+            former = _read(handle)
             if former and (former.get("host") != socket.gethostname() or (not locked and _runs(former))):
                 silent = time.time() - path.stat().st_mtime
                 mine = silent >= DEAD
@@ -85,21 +93,32 @@ def owned(folder: Path) -> Iterator[None]:
 def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
     """Return a handle of the file at `path`, and whether it is locked, as it always is where file systems have locks.
 
-    Makes missing folders above it, and adds them to `made`.
+    Makes missing folders above it, and adds them to `made`. Links above the folder are followed, but neither the folder
+    nor the file may be one: whoever made it would have us write elsewhere.
     """
     while True:
+        if path.parent.is_symlink():
+            raise SpringfootError(f"{path.parent} is a link: name the folder itself")
         made += _make(path.parent)
         try:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | _NO_LINK, 0o644)
         except FileNotFoundError:  # the one before has just removed its folder
             continue
+        except OSError as error:
+            if path.is_symlink() or not path.is_file():
+                raise SpringfootError(f"{path} is not a file of springfoot's: remove it") from None
+            raise error
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            os.close(handle)
+            raise SpringfootError(f"{path} is not a file of springfoot's: remove it")
         locked = fcntl is not None
         try:
             if fcntl is not None:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            owner = _read(handle)
             os.close(handle)
-            raise TakenError(_taken(path.parent, _read(path))) from None
+            raise TakenError(_taken(path.parent, owner)) from None
         except OSError:  # a file system without locks
             locked = False
         if _same(handle, path):
@@ -129,16 +148,28 @@ def _live(path: Path, over: threading.Event) -> None:
     """Touch the owner's file every `BEAT` seconds until the event `over`."""
     while not over.wait(BEAT):
         with suppress(OSError):
-            os.utime(path)
+            os.utime(path, follow_symlinks=False)
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(handle: int) -> dict[str, Any]:
     """Return the record of the owner; empty if there is none, or if it has only just locked the file."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json.loads(os.pread(handle, MOST_OWNER_BYTES, 0))
+    except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def is_marked(folder: Path) -> bool:
+    """Tell whether a folder holds an owner's file as only a process of ours writes it."""
+    try:
+        handle = os.open(folder / OWNER, os.O_RDONLY | _NO_LINK)
+    except OSError:
+        return False
+    try:
+        return stat.S_ISREG(os.fstat(handle).st_mode) and {"pid", "host", "began"} <= _read(handle).keys()
+    finally:
+        os.close(handle)
 
 
 def _runs(owner: dict[str, Any]) -> bool:

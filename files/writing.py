@@ -16,7 +16,7 @@ from typing import Any
 
 from springfoot.errors import SpringfootError
 
-from .locks import OWNER, TakenError, owned
+from .locks import OWNER, TakenError, is_marked, owned
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -102,9 +102,12 @@ def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
 def _part(out: Path) -> Iterator[Path]:
     """Give the hidden folder that becomes `out`.
 
-    Raises `TakenError` if `out` exists or another process makes it.
+    Raises `TakenError` if `out` exists or another process makes it, and if the hidden folder is there but not ours: a
+    link, a file, or a folder with something in it and without an owner's file.
     """
     part = out.parent / f".{out.name}.part"
+    if not _is_ours(part):
+        raise TakenError(f"{part} is not of springfoot's making: remove it, or choose another folder than {out}")
     try:
         with owned(part):
             if out.exists():
@@ -119,6 +122,15 @@ def _part(out: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             part.rmdir()
+
+
+def _is_ours(part: Path) -> bool:
+    """Tell whether a hidden folder may be emptied: it does not exist, holds our mark, or has nothing to lose."""
+    if part.is_symlink():
+        return False
+    if not part.exists():
+        return True
+    return part.is_dir() and (is_marked(part) or all(path.name == OWNER for path in part.iterdir()))
 
 
 def _settle(part: Path, out: Path) -> None:

@@ -135,6 +135,57 @@ def test_what_a_killed_process_wrote_for_a_folder_is_removed(tmp_path, capsys):
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["mine"] and not part.exists()
 
 
+def test_a_folder_that_is_not_ours_is_left_alone(tmp_path):
+    """`.NAME.part` may be anybody's: a folder, a link to one, a file."""
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "theirs").write_text("x")
+    (tmp_path / ".eval-1.part").symlink_to(tmp_path / "home")
+    (tmp_path / ".eval-2.part").mkdir()
+    (tmp_path / ".eval-2.part" / "theirs").write_text("x")
+    (tmp_path / ".eval-3.part").write_text("x")
+    (tmp_path / ".eval-4.part").mkdir()
+    (tmp_path / ".eval-4.part" / OWNER).write_text("theirs")
+    (tmp_path / ".eval-4.part" / "theirs").write_text("x")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with whole_folder(None, tmp_path / "eval") as (folder, name):
+        (folder / "mine").touch()
+    assert name == tmp_path / "eval-5" and (name / "mine").exists()
+    for number in range(1, 5):
+        out = tmp_path / f"eval-{number}"
+        said = (
+            rf"\.{out.name}\.part is not of springfoot's making: remove it, or choose another folder than .*{out.name}"
+        )
+        with pytest.raises(TakenError, match=said), whole_folder(out, out):
+            raise AssertionError
+    assert {path: path.read_bytes() for path in before} == before
+
+
+@pytest.mark.parametrize("target", ["victim", "nowhere"])
+def test_no_owner_is_written_through_a_link(tmp_path, target):
+    (tmp_path / "victim").write_text("precious")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / OWNER).symlink_to(tmp_path / target)
+    said = r"run/\.owner is not a file of springfoot's: remove it"
+    with pytest.raises(SpringfootError, match=said), owned(tmp_path / "run"):
+        raise AssertionError
+    assert (tmp_path / "victim").read_text() == "precious" and not (tmp_path / "nowhere").exists()
+
+
+def test_a_pipe_in_the_place_of_an_owner_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / OWNER)
+    with pytest.raises(SpringfootError, match=r"\.owner is not a file of springfoot's: remove it"), owned(tmp_path):
+        raise AssertionError
+
+
+def test_a_folder_that_is_a_link_is_not_owned_one_above_it_may_be(tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "runs").symlink_to(tmp_path / "disk")
+    with pytest.raises(SpringfootError, match="runs is a link: name the folder itself"), owned(tmp_path / "runs"):
+        raise AssertionError
+    with owned(tmp_path / "runs" / "walk"):
+        assert (tmp_path / "disk" / "walk" / OWNER).is_file()
+
+
 @pytest.mark.slow
 def test_two_trainings_into_one_folder_are_one_training(tmp_path):
     words = ["--out", "run", "--timesteps", "512", "--num-envs", "4", "--update-steps", "256", "--threads", "1"]
