@@ -7,18 +7,20 @@ them, and all other numbers of people that the walk uses. Every function here ta
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from itertools import pairwise
 from math import sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, require_within
+from springfoot.errors import SpringfootError, quoted, require_within
 from springfoot.files.json_file import MOST_JSON_BYTES
 from springfoot.files.text_table import read_bytes
 
@@ -51,6 +53,22 @@ DIGITS = 7
 SPEED_RANGE = (0.01, 10.0)
 """Accepted speeds [m/s]; chosen. People's curves cover a part of them and are clamped outside."""
 
+CONDITION = {
+    "speed_m_s": (0.1, 4.0, "m/s"),
+    "stride_time_s": (0.4, 4.0, "s"),
+    "step_length_m": (0.05, 2.0, "m"),
+    "toe_off_percent": (30.0, 90.0, "% of the stride"),
+}
+"""Number of a condition -> least and largest accepted value, and unit; chosen."""
+LARGEST_COEFFICIENT = 1e3
+"""Largest magnitude of a series' coefficient, in the unit of its curve; chosen, hundreds of times people's."""
+HABITS = {
+    "plateaus": (10, (0.0, 1.0)),
+    "toe_flat": (2, (0.0, 1.0)),
+    "toe_off": (2, (0.0, 1.0)),
+    "ankle_quasi_stiffness": (5, (1.0, 1e4)),
+}
+"""Numbers for the foot's springs -> how many, and their range; chosen."""
 PEOPLE_FILE = Path(str(resources.files("springfoot.gait.people") / "human_harmonics.json"))
 """The package's own file."""
 
@@ -223,13 +241,63 @@ def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
     """Return a file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
     try:
         table = json.loads(read_bytes(Path(people), MOST_JSON_BYTES))
+        require_within("height_m", table["height_m"], HEIGHT_RANGE, "m")
+        _require_conditions(table["conditions"])
         for kind in ("mean", "sd"):
-            for name, rows in table[kind].items():
-                array = np.array(rows)
-                table[kind][name] = array[..., 0] + 1j * array[..., 1] if array.ndim == 3 else array
-        _ = table["height_m"], table["conditions"], table["cop"]["coefficients"], table["foot"]["plateaus"]
+            table[kind] = {name: _series(name, table[kind][name], len(table["conditions"])) for name in COLUMNS}
+        _require_numbers("cop: coefficient", table["cop"]["coefficients"], (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
+        _require_habits(table["foot"])
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(
             f"{people} must be a file of people's data as human_harmonics.json of springfoot.gait: {error}"
         ) from None
     return table
+
+
+def _require_conditions(conditions: Any) -> None:
+    """Raise `SpringfootError` unless there are two conditions or more, of ascending speed, with accepted numbers."""
+    if not isinstance(conditions, list) or len(conditions) < 2:
+        raise SpringfootError("conditions must be a list of two or more")
+    for condition in conditions:
+        if not isinstance(condition["name"], str):
+            raise SpringfootError(f"the name of a condition must be text, got {quoted(condition['name'])}")
+        for key, (low, high, unit) in CONDITION.items():
+            require_within(f"{condition['name']:.40}: {key}", condition[key], (low, high), unit)
+    if any(one["speed_m_s"] >= other["speed_m_s"] for one, other in pairwise(conditions)):
+        raise SpringfootError("the speeds of the conditions must ascend")
+
+
+def _series(name: str, rows: Any, conditions: int) -> NDArray:
+    """Return the series of a curve, (conditions, coefficients), checked."""
+    _require_numbers(name, list(_flat(rows)), (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
+    series = np.array(rows, float)
+    shape = (conditions, STANCE_TERMS) if name in FORCES else (conditions, HARMONICS + 1, 2)
+    if series.shape != shape:
+        raise SpringfootError(f"{name} must be {shape} numbers, is {series.shape}")
+    return series if name in FORCES else series[..., 0] + 1j * series[..., 1]
+
+
+def _flat(rows: Any) -> Iterator[Any]:
+    """Yield the entries of lists within lists."""
+    for row in rows:
+        yield from _flat(row) if isinstance(row, list) else (row,)
+
+
+def _require_habits(foot: Mapping[str, Any]) -> None:
+    """Raise `SpringfootError` for bad numbers of the foot's springs."""
+    require_within("foot: toe_swing_deg", foot["toe_swing_deg"], (-45.0, 90.0), "deg")
+    for name, (count, allowed) in HABITS.items():
+        values = foot[name]
+        _require_numbers(f"foot: {name}", values, allowed)
+        if len(values) != count:
+            raise SpringfootError(f"foot: {name} must be {count} numbers, got {len(values)}")
+        if allowed == (0.0, 1.0) and any(one > other for one, other in pairwise(values)):
+            raise SpringfootError(f"foot: the phases {name} must ascend")
+
+
+def _require_numbers(name: str, values: Any, allowed: tuple[float, float]) -> None:
+    """Raise `SpringfootError` unless `values` is a list of numbers in a range."""
+    if not isinstance(values, Sequence) or isinstance(values, str) or not values:
+        raise SpringfootError(f"{name} must be a list of numbers, got {quoted(values)}")
+    for value in values:
+        require_within(name, value, allowed)

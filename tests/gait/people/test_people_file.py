@@ -1,6 +1,7 @@
 """All that is people's is in one file, and another file may take its place."""
 
 import json
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -62,3 +63,67 @@ def test_a_file_of_another_kind_is_refused(tmp_path, text):
         BipedSettings(people_file=str(path))
     with pytest.raises(SpringfootError, match=r"missing\.json must be a file of people's data"):
         BipedSettings(people_file=str(tmp_path / "missing.json"))
+
+
+def _at(table, path):
+    for key in path[:-1]:
+        table = table[key]
+    return table, path[-1]
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), 1e200, -1e9, "1", None, [], True, 10**400])
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("height_m",),
+        ("conditions", 1, "speed_m_s"),
+        ("conditions", 0, "stride_time_s"),
+        ("conditions", 4, "step_length_m"),
+        ("conditions", 2, "toe_off_percent"),
+        ("mean", "knee", 3, 2, 1),
+        ("mean", "grf_vertical", 0, 27),
+        ("sd", "hip_moment", 1, 12),
+        ("cop", "coefficients", 6),
+        ("foot", "plateaus", 3),
+        ("foot", "ankle_quasi_stiffness", 0),
+        ("foot", "toe_flat", 1),
+        ("foot", "toe_swing_deg"),
+    ],
+)
+def test_a_number_that_no_person_has_is_refused_in_one_line(tmp_path, path, bad):
+    table = json.loads(PEOPLE_FILE.read_text(encoding="utf-8"))
+    holder, key = _at(table, path)
+    holder[key] = bad
+    file = tmp_path / "people.json"
+    file.write_text(json.dumps(table), encoding="utf-8")
+    with pytest.raises(SpringfootError, match=r"people\.json must be a file of people's data") as error:
+        BipedSettings(people_file=str(file))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("path", [("height_m",), ("conditions",), ("mean", "toe"), ("sd", "grf_forward"), ("foot",)])
+def test_a_part_that_is_missing_is_refused(tmp_path, path):
+    table = json.loads(PEOPLE_FILE.read_text(encoding="utf-8"))
+    holder, key = _at(table, path)
+    del holder[key]
+    file = tmp_path / "people.json"
+    file.write_text(json.dumps(table), encoding="utf-8")
+    with pytest.raises(SpringfootError, match=r"people\.json must be a file of people's data"):
+        BipedSettings(people_file=str(file))
+
+
+def test_conditions_and_phases_must_ascend(tmp_path):
+    whole = json.loads(PEOPLE_FILE.read_text(encoding="utf-8"))
+    swapped, alone, backward = deepcopy(whole), deepcopy(whole), deepcopy(whole)
+    swapped["conditions"] = swapped["conditions"][::-1]
+    alone["conditions"] = alone["conditions"][:1]
+    backward["foot"]["toe_off"] = [0.7, 0.62]
+    for table, said in (
+        (swapped, "the speeds of the conditions must ascend"),
+        (alone, "conditions must be a list of two or more"),
+        (backward, "foot: the phases toe_off must ascend"),
+    ):
+        file = tmp_path / f"{len(said)}.json"
+        file.write_text(json.dumps(table), encoding="utf-8")
+        with pytest.raises(SpringfootError, match=said):
+            BipedSettings(people_file=str(file))
