@@ -7,6 +7,7 @@ import io
 import json
 from math import prod
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
@@ -65,7 +66,10 @@ def _array(content: bytes) -> NDArray:
     read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))
     if read is None:
         raise ValueError("another version of the format")
-    shape, _, dtype = read(file)
+    try:
+        shape, _, dtype = read(file)
+    except (TokenError, SyntaxError, RecursionError) as error:
+        raise ValueError(f"its header is not Python's: {error}") from None
     if dtype.hasobject or prod(shape) * dtype.itemsize != len(content) - file.tell():
         raise ValueError("not the bytes that its shape says")
     return np.load(io.BytesIO(content))

@@ -67,7 +67,7 @@ def read_tensors(
         header = json.loads(text)
     except (SafetensorError, OSError, TypeError, AttributeError) as error:
         raise SpringfootError(f"{path} is not a .safetensors file: {error}") from None
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise SpringfootError(f"{path}: the springfoot entry of its header is not JSON: {error}") from None
     if not isinstance(header, dict):
         raise SpringfootError(f"{path}: the springfoot entry of its header is not a JSON object")

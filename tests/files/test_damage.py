@@ -232,6 +232,21 @@ def test_a_checkpoint_without_a_digest_is_passed_over(run, tmp_path, capsys):
     assert capsys.readouterr().err == said
 
 
+def test_a_number_of_too_many_digits_is_damage(run, tmp_path, capsys):
+    """Python reads no number of more than 4,300 digits."""
+    long = '{"timesteps": ' + 5000 * "1" + "}"
+    _, tensors = read_checkpoint(run / STATE)
+    policy = tmp_path / "best.safetensors"
+    policy.write_bytes(save(load((run / "best.safetensors").read_bytes()), {"springfoot": long}))
+    with pytest.raises(SpringfootError, match=r"best\.safetensors: the springfoot entry of its header is not JSON"):
+        read_policy(policy)
+    older = shutil.copyfile(run / STATE, tmp_path / STATE)
+    newer = tmp_path / "state-128.safetensors"
+    newer.write_bytes(save(tensors, {STATE_KEY: long}))
+    assert newest_checkpoint(tmp_path) is not None
+    assert capsys.readouterr().err.endswith(f"going on from {older.name}\n")
+
+
 def test_a_policy_of_an_earlier_version_has_no_digest_and_is_read(run, tmp_path):
     content = (run / "best.safetensors").read_bytes()
     with safe_open(run / "best.safetensors", framework="numpy") as file:

@@ -195,3 +195,13 @@ def test_an_archive_that_would_fill_the_memory_or_run_code_is_refused(tmp_path, 
         read_arrays(path, "recording")
     said = {"compressed": "is no recording: it is compressed", "no digest": "has no digest: another version"}
     assert str(caught.value).startswith(f"{path} {said.get(kind, 'is no recording')}")
+
+
+@pytest.mark.parametrize("header", [b"((((", b"{'descr': (((", b"\x00", b"1" * 5000])
+def test_an_array_whose_header_is_not_pythons_is_one_line(tmp_path, header):
+    path = tmp_path / "strides.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("phase.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header)
+    with pytest.raises(SpringfootError, match=r"strides\.npz is no recording") as caught:
+        read_arrays(path, "recording")
+    assert "\n" not in str(caught.value)
