@@ -69,7 +69,12 @@ class ForeignPolicy:
         """Actions (N, 4) in [-1, 1] for observations (N, D)."""
         rows = observation_rows(observation, self.width).astype(np.float32)
         batch = np.atleast_2d(rows)
-        returned = self.act(batch)
+        try:
+            returned = self.act(batch)
+        except SystemExit as error:
+            raise _ended(self.name, error) from None
+        if np.iscomplexobj(returned):
+            raise SpringfootError(f"{self.name} must return real actions, returned complex ones")
         try:
             actions = np.asarray(returned, np.float64)
         except (TypeError, ValueError):
@@ -135,6 +140,8 @@ def function_policy(name: str) -> ForeignPolicy:
         sys.path.append(os.getcwd())
     try:
         module = import_module(module_name)
+    except SystemExit as error:
+        raise _ended(name, error) from None
     except Exception as error:  # whatever the user's module raises
         raise SpringfootError(f"{name}: cannot import {module_name}: {one_line(error)}") from error
     function = getattr(module, function_name, None)
@@ -148,6 +155,11 @@ def function_policy(name: str) -> ForeignPolicy:
         except (SpringfootError, TypeError) as error:
             raise SpringfootError(f"{name}: its settings: {error}") from None
     return _probed(name, function, Biped(settings, 1))
+
+
+def _ended(name: str, error: SystemExit) -> SpringfootError:
+    """Return the error of a user's code that ends Python, which would end our command without a word."""
+    return SpringfootError(f"{name} calls sys.exit({error.code!r:.40}): a policy must return actions")
 
 
 def _asked_by(path: Path, inside: str | None) -> Biped:
@@ -187,6 +199,8 @@ def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPo
     ):
         try:
             found = np.shape(act(given))
+        except SystemExit as error:
+            raise _ended(name, error) from None
         except Exception as error:  # whatever the user's function raises
             failed = failed or f"{name} fails on observations {given.shape}: {one_line(error)}"
             continue

@@ -206,6 +206,23 @@ def light(observation):
 
 light.settings = {"mass": -1.0}
 number = 3
+
+
+def quits(observation):
+    raise SystemExit(0)
+
+
+def quits_later(observation):
+    quits_later.calls += 1
+    if quits_later.calls > 4:
+        raise SystemExit(0)
+    return np.zeros((len(observation), 4))
+
+quits_later.calls = 0
+
+
+def turned(observation):
+    return np.full((len(observation), 4), 0.5j)
 """
 
 
@@ -215,6 +232,7 @@ def module(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mine")
     (folder / "my_policies.py").write_text(FUNCTIONS.replace("43", str(D)))
     (folder / "broken_policies.py").write_text("raise RuntimeError('not\\ntoday')")
+    (folder / "quitting_policies.py").write_text("raise SystemExit(0)")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setattr(sys, "path", [*sys.path])
@@ -247,12 +265,20 @@ def test_a_function_of_a_module_is_a_policy(name, module):
         ),
         ("my_policies:nan", "my_policies:nan returned an action that is not finite"),
         ("my_policies:light", "my_policies:light: its settings: mass must be"),
+        ("my_policies:quits", "my_policies:quits calls sys.exit(0): a policy must return actions"),
+        ("quitting_policies:act", "quitting_policies:act calls sys.exit(0): a policy must return actions"),
+        ("my_policies:turned", "my_policies:turned must return real actions, returned complex ones"),
     ],
 )
 def test_a_function_that_is_no_policy_is_refused_with_one_line(name, said, module):
     with pytest.raises(SpringfootError) as refused:
         load_policy(name)
     assert str(refused.value).startswith(said) and "\n" not in str(refused.value)
+
+
+def test_a_function_that_ends_python_ends_an_evaluation_in_one_line(module, tmp_path, capsys):
+    assert evaluate_main(["my_policies:quits_later", "--episodes", "1", "--out", str(tmp_path / "out")]) == 2
+    assert "my_policies:quits_later calls sys.exit(0): a policy must return actions" in capsys.readouterr().err
 
 
 @pytest.mark.slow
