@@ -4,6 +4,7 @@ No OpenGL is needed here, as the browser draws. viser's threads put wishes into 
 walk and shows it.
 """
 
+import re
 import time
 from collections import deque
 from collections.abc import Callable
@@ -19,9 +20,10 @@ from viser import uplot
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import KINDS
 from springfoot.envs.settings.settings import SLOPE_RANGE_DEG
-from springfoot.errors import SpringfootError
+from springfoot.errors import printable
 from springfoot.gait.springs.stiffness import SPRINGS
 
+from .messages import accept_values_only
 from .origin import own_pages_only
 from .scene import LiveScene
 from .steered_walk import (
@@ -64,6 +66,7 @@ class LiveView:
         self._asked: SimpleQueue[dict[str, Any] | Callable[[], None]] = SimpleQueue()
         with redirect_stdout(StringIO()), own_pages_only(host):  # viser would print a table of addresses
             self._server = viser.ViserServer(host=host, port=port, label="springfoot live", verbose=False)
+        accept_values_only(self._server)
         self._gui = self._server.gui
         self._gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         self.address = f"http://{host}:{self._server.get_port()}"
@@ -111,18 +114,18 @@ class LiveView:
         """Apply the wishes since the last step; for an impossible wish tell the error and show the present value
         again."""
         wishes: dict[str, Any] = {}
-        while not self._asked.empty():
-            asked = self._asked.get()
-            if isinstance(asked, dict):
-                wishes |= asked
-            else:
-                asked()
         try:
+            while not self._asked.empty():
+                asked = self._asked.get()
+                if isinstance(asked, dict):
+                    wishes |= asked
+                else:
+                    asked()
             if wishes:
                 self._session.ask(**wishes)
-        except SpringfootError as error:
+        except Exception as error:  # a walk outlives whatever a message asks
             for client in self._server.get_clients().values():
-                client.add_notification("This cannot be", str(error), auto_close_seconds=8.0, color="red")
+                client.add_notification("This cannot be", printable(str(error)), auto_close_seconds=8.0, color="red")
             for name in wishes:
                 self._handles[name].value = _shown(getattr(self._session.wishes, name))
 
@@ -199,7 +202,7 @@ class LiveView:
         )
         state = f"**fell: {frame.fell}**" if frame.fell else f"{frame.speed:.2f} m/s"
         self._words.content = (
-            f"{session.name}: {frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
+            f"{_plain(session.name)}: {frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
             "| K that acts, N·m/rad | ankle | toe | ankle θ_eq, deg | toe θ_eq, deg |\n|-|-|-|-|-|\n" + rows
         )
         seconds = session.dt * np.arange(1 - len(self._history), 1)
@@ -209,6 +212,11 @@ class LiveView:
         curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)} | {"load": force[..., -1].T}
         for name, lines in (curves | {"speed": np.array([[each.speed for each in self._history]])}).items():
             self._curves[name].data = (seconds, *np.ascontiguousarray(lines))
+
+
+def _plain(name: str) -> str:
+    """Return a name as Markdown that shows it as it is: no link, no HTML."""
+    return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", name)
 
 
 def _shown(wish: Any) -> Any:

@@ -1,5 +1,6 @@
 """The live walk in a real browser: its sliders and buttons steer the simulation, and nothing else is loaded."""
 
+import asyncio
 import re
 import socket
 import threading
@@ -69,6 +70,59 @@ def test_in_a_browser_sliders_set_the_k_that_acts_and_buttons_push_and_restart(c
     tab.close()
     assert told == []
     assert {url.split("/")[2] for url in asked if url.startswith("http")} == {view.address.split("/")[2]}
+
+
+VALUES = [
+    *(0, 1, -1, 0.5, 1e300, 10**400, float("nan"), float("inf"), -0.0, True, False, None),
+    *("", "by hand", "policy", "rigid", "<img src=x onerror=alert(1)>", "\x00", 2000 * "x"),
+    *([], [1.0], {}, {"value": 1}, {"kind": "weak", "strength": 0.1}, b"bytes"),
+]
+
+
+def send(view, uuid, updates):
+    """Hand the server a message as its websocket does."""
+    from viser._messages import GuiUpdateMessage
+
+    handled = view._gui._websock_interface._handle_incoming_message(0, GuiUpdateMessage(uuid, updates))
+    asyncio.run_coroutine_threadsafe(handled, view._gui._event_loop).result(10)
+
+
+@pytest.mark.parametrize("count", [500, pytest.param(5000, marks=pytest.mark.slow)])
+def test_a_walk_outlives_any_message(view, count):
+    """Any property of any input, with values of any type, as any program that reaches the port may send them."""
+    random = np.random.default_rng(0)
+    handles = view._gui._gui_input_handle_from_uuid
+    properties = ["value", "value", "value", "gui_api", "min", "max", "update_cb", "removed", "props", "is_button", "x"]
+    before = {uuid: (vars(handle._impl).copy(), type(handle.value)) for uuid, handle in handles.items()}
+    for _ in range(count):
+        uuid = ["nobody", *handles][random.integers(1 + len(handles))]
+        names = random.choice(properties, random.integers(1, 3))
+        send(view, uuid, {str(name): VALUES[random.integers(len(VALUES))] for name in names})
+    session, shown = view._session, view.frames
+    assert reaches(lambda: view.frames > shown + 20)
+    changing = {"value", "update_timestamp", "props"}
+    for uuid, handle in handles.items():
+        now, (state, kind) = vars(handle._impl), before[uuid]
+        assert {name: now[name] for name in now if name not in changing} == {
+            name: state[name] for name in state if name not in changing
+        }
+        assert type(handle.value) is kind and (kind is not float or handle.min <= handle.value <= handle.max)
+    assert np.isfinite(session.frame.stiffness).all()
+    for name in ("height", "mass", "slope_deg", "left_foot", "right_foot", "ankle_source", "toe_source"):
+        default = getattr(session.wishes, name)
+        assert default is not None
+
+
+def test_no_message_opens_the_page_to_the_internet_or_uploads_a_file(view):
+    from viser import _messages
+
+    assert set(view._gui._websock_interface._incoming_handlers) == {_messages.GuiUpdateMessage}
+
+
+def test_a_policys_name_is_text(view):
+    from springfoot.evaluation.live.view import _plain
+
+    assert _plain("<b>[a](http://b.invalid)") == r"\<b\>\[a\]\(http\:\/\/b\.invalid\)"
 
 
 def test_only_this_machine_reaches_it_unless_told_otherwise(view):
