@@ -18,6 +18,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from .tensor_file import DIGEST, digest_of
+from .text_table import existing
 
 HEADER = "header"
 """Name of the array with the JSON text."""
@@ -34,7 +35,7 @@ def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArra
     """Return header and arrays of a file of `write_arrays`; raise `SpringfootError` for any other, calling it no
     `what`."""
     try:
-        with ZipFile(path) as archive:
+        with ZipFile(existing(path)) as archive:
             if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
                 raise SpringfootError(f"{path} is no {what}: it is compressed")
             arrays = {

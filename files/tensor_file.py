@@ -16,6 +16,7 @@ from safetensors.numpy import save as to_safetensors
 
 from springfoot.errors import SpringfootError, quoted
 
+from .text_table import existing
 from .writing import write_atomically
 
 DIGEST = "sha256"
@@ -51,7 +52,7 @@ def read_tensors(
     Raises `SpringfootError` for any other file.
     """
     try:
-        if (size := path.stat().st_size) > MOST_TENSOR_BYTES:
+        if (size := existing(path).stat().st_size) > MOST_TENSOR_BYTES:
             raise SpringfootError(f"{path} must have at most {MOST_TENSOR_BYTES:,} bytes, has {size:,}")
         with path.open("rb") as opened:
             if (header_size := int.from_bytes(opened.read(8), "little")) > MOST_HEADER:

@@ -22,6 +22,8 @@ from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.errors import SpringfootError
+from springfoot.files.json_file import MOST_JSON_BYTES
+from springfoot.files.text_table import read_bytes
 
 from .fingerprint import fingerprint, require_same
 from .onnx_process import INPUT_TYPES, one_line, onnx_session
@@ -169,7 +171,7 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
         return Biped(BipedSettings(), 1)
     name = beside if beside.is_file() else f"{path}: the contract inside it"
     try:
-        contract = json.loads(beside.read_text(encoding="utf-8") if beside.is_file() else inside or "")
+        contract = json.loads(read_bytes(beside, MOST_JSON_BYTES) if beside.is_file() else inside or "")
         biped = Biped(settings_from(**contract["settings"]), 1)
         stored = None if contract.get("fingerprint") is None else dict(contract["fingerprint"])
     except (KeyError, TypeError, ValueError, RecursionError) as error:

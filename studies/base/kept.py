@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from springfoot.files.json_file import read_object
 from springfoot.files.writing import write_atomically
 
 
@@ -14,8 +15,8 @@ class Kept:
     def __init__(self, path: Path | None):
         self._path = path
         self._known: dict[str, Any] = {}
-        if path is not None and path.is_file():
-            self._known = json.loads(path.read_text(encoding="utf-8"))
+        if path is not None and path.exists():
+            self._known = read_object(path, "file of a study's numbers")
 
     def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Return the kept answer to `question`, a JSON value, or `make` and keep it."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from springfoot.errors import SpringfootError
+from springfoot.files.json_file import read_object
 from springfoot.files.writing import write_atomically
 
 CONSTANTS = Path(str(resources.files("springfoot.envs.control") / "legs.json"))
@@ -27,10 +28,10 @@ def read_feet(path: Path) -> dict[str, Any]:
 def _read(path: Path, key: str, what: str) -> dict[str, Any]:
     """Return a JSON file with the entry `key`; raise `SpringfootError` for any other, calling it no `what`."""
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        table = None
-    if not isinstance(table, dict) or not isinstance(table.get(key), dict):
+        table = read_object(path, what)
+    except (OSError, SpringfootError):
+        table = {}
+    if not isinstance(table.get(key), dict):
         raise SpringfootError(f"{path} is not a file of {what}")
     return table
 

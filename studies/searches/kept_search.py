@@ -14,6 +14,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
+from springfoot.files.json_file import read_object
 from springfoot.files.writing import write_atomically
 
 from ..base.study import Study
@@ -47,14 +48,16 @@ def generations(
         asked: plain JSON values that describe the search. Raises `SpringfootError` if `kept` belongs to another search.
     """
     asked = json.loads(json.dumps(asked))
-    known = []
-    if kept is not None and kept.is_file():
+    known: list[NDArray] = []
+    if kept is not None and kept.exists():
+        table = read_object(kept, "file of a search's costs")
         try:
-            table = json.loads(kept.read_text(encoding="utf-8"))
             before = table["asked"]
             known = [np.array(paid, float) for paid in table["paid"]]
-        except (ValueError, TypeError, KeyError) as error:
-            raise SpringfootError(f"{kept} is not what a search paid: {error}") from None
+        except (ValueError, TypeError, KeyError, OverflowError) as error:
+            raise SpringfootError(f"{kept} is no file of a search's costs: {error}") from None
+        if any(paid.shape != (strategy.popsize,) or not np.isfinite(paid).all() for paid in known):
+            raise SpringfootError(f"{kept} is damaged: each generation must have {strategy.popsize} finite costs")
         if before != asked:
             raise SpringfootError(f"{kept} is of a search with other settings; choose another place")
     for generation in range(count):

@@ -61,7 +61,7 @@ def test_a_stopped_search_goes_on_with_the_same_bits(tmp_path):
     with pytest.raises(SpringfootError, match="is of a search with other settings"):
         searched(9, path, "another bowl")
     path.write_text("[]", encoding="utf-8")
-    with pytest.raises(SpringfootError, match="is not what a search paid"):
+    with pytest.raises(SpringfootError, match="is no file of a search's costs"):
         searched(9, path)
 
 

@@ -1,0 +1,84 @@
+"""Every reader of a file refuses pipes, endless devices, gigabytes, deep JSON and numbers that are none, in one line."""
+
+import json
+import os
+
+import cma
+import numpy as np
+import pytest
+
+from springfoot.agents.policies.policy import read_policy
+from springfoot.agents.training.checkpoint import read_checkpoint
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.recording.recording import load_recording
+from springfoot.files.json_file import read_object
+from springfoot.files.text_table import read_csv
+from springfoot.gait.people.human import harmonics
+from springfoot.gait.plan.walk_style import styles_of
+from springfoot.studies.base.kept import Kept
+from springfoot.studies.searches.constants_file import read_constants, read_feet
+from springfoot.studies.searches.kept_search import generations
+
+
+def search(path):
+    strategy = cma.CMAEvolutionStrategy(np.zeros(3), 0.5, {"popsize": 4, "seed": 1, "verbose": -9})
+    return list(generations(strategy, 2, lambda _, vectors: np.arange(len(vectors), dtype=float), path, "x"))
+
+
+READERS = {
+    "walk.safetensors": read_policy,
+    "state-64.safetensors": read_checkpoint,
+    "strides.npz": load_recording,
+    "table.csv": read_csv,
+    "record.json": lambda path: read_object(path, "record"),
+    "people.json": harmonics,
+    "styles.json": styles_of,
+    "kept.json": Kept,
+    "legs.json": read_constants,
+    "feet.json": read_feet,
+    "log.json": search,
+}
+TEXTS = [name for name in READERS if name.endswith((".json", ".csv"))]
+
+
+def refused(path):
+    with pytest.raises(SpringfootError) as caught:
+        READERS[path.name](path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_pipe_is_refused_at_once(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    refused(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_an_endless_device_is_refused_unread(tmp_path, name):
+    (tmp_path / name).symlink_to("/dev/zero")
+    refused(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", [name for name in READERS if name != "strides.npz"])
+def test_ten_gigabytes_are_refused_unread(tmp_path, name):
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(10 * 2**30)  # a hole on the disk
+    refused(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", [name for name in TEXTS if name.endswith(".json")])
+@pytest.mark.parametrize("text", [100_000 * "[", '{"a": ' * 50_000, "1" * 5000, "\xff", "[1]", "null"])
+def test_json_that_is_no_object_is_one_line(tmp_path, name, text):
+    (tmp_path / name).write_text(text, encoding="latin-1")
+    refused(tmp_path / name)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), "x", None, [1.0]])
+def test_a_search_takes_no_cost_that_is_no_number(tmp_path, bad):
+    path = tmp_path / "log.json"
+    first = search(path)
+    table = json.loads(path.read_text(encoding="utf-8"))
+    assert [vectors for _, vectors, _ in search(path)][1][0] == pytest.approx(first[1][1][0])
+    table["paid"][0][2] = bad
+    path.write_text(json.dumps(table), encoding="utf-8")
+    refused(path)
