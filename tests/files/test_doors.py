@@ -1,4 +1,4 @@
-"""Every reader of a file refuses pipes, endless devices, gigabytes, deep JSON and numbers that are none, in one line."""
+"""Every reader of a file refuses pipes, endless devices, gigabytes, deep JSON and absurd numbers, in one line."""
 
 import json
 import os
