@@ -39,7 +39,7 @@ class EvaluateFlags:
     schedule or a table of finite states, as an evaluation writes them. frozen:POLICY is a trained policy's mean
     stiffness over the stride, played open loop at the same equilibrium."""
     episodes: int = 20
-    """How many episodes."""
+    """Number of episodes."""
     seconds: float = 20.0
     """Length of each; --episode-seconds means the same."""
     seed: int = 0
@@ -56,9 +56,9 @@ class EvaluateFlags:
     """Write walk.mp4 too, the first 10 s as MuJoCo draws them; needs OpenGL (without a screen, MUJOCO_GL=egl) and the
     extra film."""
     json: bool = False
-    """Print, in place of the tables, one JSON object: `folder`, and as `metrics` what stands in each metrics.json."""
+    """Print, in place of the tables, one JSON object: `folder`, and as `metrics` the content of each metrics.json."""
     environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
-    """What to walk in. Each group says which of its settings a trained policy brings; all others have the defaults
+    """Settings of the environment. Each group says which of them a trained policy brings; all others have the defaults
     shown unless a flag says otherwise, whatever the policy was trained on."""
 
 

@@ -29,16 +29,16 @@ class LiveFlags:
     policy: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="POLICY")] = "pretrained"
     """Any policy of `springfoot evaluate`."""
     host: str = "127.0.0.1"
-    """Address to listen on. By default programs on this machine and the live page itself can steer, no other page that
-    a browser has open; of another address whoever reaches it."""
+    """Address to listen on. By default only programs on this machine and the live page itself can steer, no other page
+    in the browser; with another address everybody who reaches it."""
     port: int = 8080
     """Port to listen on, the next free one if it is taken; 0 for any."""
     seed: int = 0
-    """Of the walk."""
+    """Seed of the walk."""
     seconds: float | None = None
     """End after this time [s]; it goes on until Ctrl-C otherwise."""
     environment: tyro.conf.OmitArgPrefixes[LiveSettings]  # type: ignore[valid-type]
-    """What the sliders begin with, and all else that is set."""
+    """Initial values of the sliders, and all other settings."""
 
 
 def live_main(arguments: Sequence[str], program: str = "springfoot live") -> int:

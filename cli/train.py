@@ -48,7 +48,7 @@ class TrainFlags:
     training: tyro.conf.OmitArgPrefixes[TrainingFlags]  # type: ignore[valid-type]
     """How to train."""
     environment: tyro.conf.OmitArgPrefixes[EnvironmentFlags]  # type: ignore[valid-type]
-    """What to train on."""
+    """Settings of the environment."""
 
 
 def train_main(arguments: Sequence[str] | None = None, program: str = "train.py") -> int:

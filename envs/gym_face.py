@@ -33,7 +33,7 @@ class Face:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """What `gym.make` or `make_vec` made this of; its `max_episode_steps` are those of the settings."""
+        """Return the spec of `gym.make` or `make_vec`; its `max_episode_steps` are those of the settings."""
         return self._spec
 
     @spec.setter

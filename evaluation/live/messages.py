@@ -16,8 +16,8 @@ from springfoot.errors import as_float
 
 def accept_values_only(server: viser.ViserServer) -> None:
     """Drop all messages to `server` but those that give one of its inputs a value that the input can show."""
-    gui = server.gui
-    update = gui._handle_gui_updates  # viser has no argument for it
+    gui: Any = server.gui  # viser has no argument for it: these are parts of its own
+    update = gui._handle_gui_updates
 
     async def set_value(client: Any, message: GuiUpdateMessage) -> None:
         handle = gui._gui_input_handle_from_uuid.get(message.uuid)

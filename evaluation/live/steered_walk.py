@@ -150,11 +150,11 @@ class LiveSession:
         """Falls so far."""
         names = {item.name for item in fields(Wishes)}
         self.wishes = Wishes(**{name: value for name, value in (given or {}).items() if name in names})
-        """What is asked now."""
+        """Present wishes."""
         self._check(self.wishes)
         self._biped = self._make(self.wishes)
         self.frame: Frame
-        """What the last step told."""
+        """Numbers of the last step."""
         self.restart()
 
     @property

@@ -28,7 +28,7 @@ class AdaptAll(Study):
     """Run all searches of a file of adapted feet into another one, and compare."""
 
     feet: Annotated[Path, tyro.conf.arg(metavar="FILE")] = ADAPTED_FEET
-    """File whose commands are run, in its order."""
+    """File of the commands to run, in its order."""
     to: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("runs/feet/adapted.json")
     """File to write the results into; searches whose results it has are left out."""
     first: int | None = None
