@@ -101,7 +101,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
         import onnxruntime  # noqa: F401  # not above: an extra
     except ModuleNotFoundError as error:
         raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
-    session, fails = onnx_session(path, len(OBSERVATION))
+    session, fails = onnx_session(path, np.zeros((2, len(OBSERVATION))))
     inputs = session.get_inputs()
     outputs = [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
@@ -114,6 +114,8 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     width = len(biped.observation_names)
     if len(given.shape) not in (1, 2) or (isinstance(given.shape[-1], int) and given.shape[-1] != width):
         raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, given.shape))})")
+    if not fails:
+        session, fails = onnx_session(path, _first_observations(biped))
     if fails:
         raise SpringfootError(f"{path} fails on observations (2, {width}): {fails}")
     output = "action" if "action" in outputs else outputs[0]
@@ -182,14 +184,18 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
     return biped
 
 
+def _first_observations(biped: Biped) -> NDArray:
+    """Return the first observations (2, D) of two episodes, float32."""
+    found = []
+    for seed in range(2):
+        biped.reset(np.array([0]), [seed])
+        found.append(biped.observe()[0])
+    return np.stack(found)
+
+
 def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
     """Return the policy of `act`; two first observations show whether it takes (N, D), (1, D) or (D,)."""
-
-    def first(seed: int) -> NDArray:
-        biped.reset(np.array([0]), [seed])
-        return biped.observe()[0]
-
-    probe = np.stack([first(0), first(1)])
+    probe = _first_observations(biped)
     count = len(biped.action_names)
     width = probe.shape[1]
     wrong = ""

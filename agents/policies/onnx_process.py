@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, in_process
 
@@ -19,14 +20,16 @@ INPUT_TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
 
-def onnx_session(path: Path, width: int) -> tuple[Any, str]:
-    """Return onnxruntime's session of a file, and the reason why it takes no observations of `width` entries, else "".
+def onnx_session(path: Path, observations: NDArray) -> tuple[Any, str]:
+    """Return onnxruntime's session of a file, and the reason why it takes none of the `observations` (N, D), else "".
 
-    Raises `SpringfootError` for a file that onnxruntime does not open, or not within the bounds.
+    A child process opens the file and runs it on them first: the time and the memory that a graph takes may depend on
+    the numbers that it is given. Raises `SpringfootError` for a file that onnxruntime does not open, or not within the
+    bounds.
     """
     if (size := path.stat().st_size) > MOST_ONNX_BYTES:
         raise SpringfootError(f"{path} must have at most {MOST_ONNX_BYTES:,} bytes, has {size:,}")
-    said = in_process(_CHILD, str(path.absolute()), str(width))
+    said = in_process(_CHILD, str(path.absolute()), json.dumps(np.asarray(observations, float).tolist()))
     if said is None:
         raise SpringfootError(
             f"{path} is damaged: onnxruntime crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"
@@ -60,19 +63,19 @@ def main() -> None:
     except Exception as error:  # its classes have no common one
         found["refused"] = one_line(error)
     else:
-        found["fails"] = _fails(session, int(sys.argv[2]))
+        found["fails"] = _fails(session, np.array(json.loads(sys.argv[2])))
     os.write(out, json.dumps(found).encode())
 
 
-def _fails(session: Any, width: int) -> str:
-    """Return the reason why a session takes neither two observations nor one; "" if it does."""
+def _fails(session: Any, observations: NDArray) -> str:
+    """Return the reason why a session takes neither several observations nor one; "" if it does."""
     inputs = session.get_inputs()
     failed = ""
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:
         return failed  # the parent says so
-    for shape in ((2, width), (1, width), (width,)):
+    for rows in (observations, observations[:1], observations[0]):
         try:
-            session.run(None, {inputs[0].name: np.zeros(shape, INPUT_TYPES[inputs[0].type])})
+            session.run(None, {inputs[0].name: np.ascontiguousarray(rows, INPUT_TYPES[inputs[0].type])})
         except Exception as error:
             failed = failed or one_line(error)
         else:

@@ -134,6 +134,59 @@ def test_an_onnx_file_that_would_fill_the_memory_is_one_line(tmp_path):
     assert "\n" not in str(refused.value) and getrusage(RUSAGE_SELF).ru_maxrss < before + 300 * 1024
 
 
+def nodes_of_a_real_observation():
+    """Nodes that make `count`, 0 for an observation of zeros and huge for a real one, and `action` from `zero`."""
+    return [
+        helper.make_node("Abs", ["observation"], ["size"]),
+        helper.make_node("ReduceMax", ["size"], ["most"], keepdims=0),
+        constant("huge", [1e12], TensorProto.FLOAT),
+        helper.make_node("Mul", ["most", "huge"], ["scaled"]),
+        constant("bound", [2e9], TensorProto.FLOAT),
+        helper.make_node("Min", ["scaled", "bound"], ["bounded"]),
+        helper.make_node("Cast", ["bounded"], ["count"], to=TensorProto.INT64),
+        *(constant("ends", [4]), constant("begin", [0]), constant("axis", [1])),
+        helper.make_node("Slice", ["observation", "begin", "ends", "axis"], ["four"]),
+        helper.make_node("Add", ["four", "zero"], ["action"]),
+    ]
+
+
+def test_an_onnx_file_that_fills_the_memory_for_real_observations_alone_is_one_line(tmp_path):
+    *nodes, add = nodes_of_a_real_observation()
+    nodes += [helper.make_node("ConstantOfShape", ["count"], ["large"]), constant("one", [0.0], TensorProto.FLOAT)]
+    nodes += [helper.make_node("Concat", ["large", "one"], ["some"], axis=0)]
+    nodes += [helper.make_node("ReduceMax", ["some"], ["zero"], keepdims=0), add]
+    path, before = save_nodes(tmp_path / "mine.onnx", nodes), getrusage(RUSAGE_SELF).ru_maxrss
+    with pytest.raises(SpringfootError, match=r"mine\.onnx (is damaged|fails on)") as refused:
+        load_policy(path)
+    assert "\n" not in str(refused.value) and getrusage(RUSAGE_SELF).ru_maxrss < before + 300 * 1024
+
+
+def test_an_onnx_file_that_runs_for_ever_for_real_observations_alone_is_one_line(tmp_path, monkeypatch):
+    shorter = "import springfoot.files.bounded_process as bounds; bounds.MOST_SECONDS = 5; "
+    monkeypatch.setattr(onnx_process, "_CHILD", shorter + onnx_process._CHILD)
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["go"], ["on"]),
+            helper.make_node("Add", ["sum", "sum"], ["more"]),
+        ],
+        "body",
+        [
+            helper.make_tensor_value_info("turn", TensorProto.INT64, []),
+            helper.make_tensor_value_info("go", TensorProto.BOOL, [1]),
+            helper.make_tensor_value_info("sum", TensorProto.FLOAT, [1]),
+        ],
+        [
+            helper.make_tensor_value_info("on", TensorProto.BOOL, [1]),
+            helper.make_tensor_value_info("more", TensorProto.FLOAT, [1]),
+        ],
+    )
+    *nodes, add = nodes_of_a_real_observation()
+    nodes += [constant("start", [0.0], TensorProto.FLOAT), constant("true", [True], TensorProto.BOOL)]
+    nodes += [helper.make_node("Loop", ["count", "true", "start"], ["zero"], body=body), add]
+    with pytest.raises(SpringfootError, match=r"mine\.onnx is damaged: onnxruntime crashed on it, or took over 60 s"):
+        load_policy(save_nodes(tmp_path / "mine.onnx", nodes))
+
+
 def test_an_onnx_file_that_is_too_large_or_crashes_the_library_is_one_line(tmp_path, monkeypatch):
     path = tmp_path / "mine.onnx"
     with path.open("wb") as file:
