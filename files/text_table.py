@@ -86,6 +86,11 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     return content
 
 
+def has_content(path: Path, content: bytes) -> bool:
+    """Tell whether a file has exactly this content; it is read only if it has the size of it."""
+    return path.is_file() and path.stat().st_size == len(content) and read_bytes(path, len(content)) == content
+
+
 def read_csv(path: Path) -> Table:
     """Return a CSV file: header, then rows of as many cells. Raises `SpringfootError` for any other file."""
     try:

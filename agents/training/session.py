@@ -16,6 +16,8 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.files.provenance import source
+from springfoot.files.tensor_file import MOST_TENSOR_BYTES
+from springfoot.files.text_table import has_content, read_bytes
 from springfoot.files.writing import write_atomically
 
 from ..policies.fingerprint import fingerprint, require_same
@@ -127,7 +129,7 @@ class Session(BaseCallback):
             return {}
         header, arrays = self._found
         require_same(self._out, header["fingerprint"], self._fingerprint)
-        if self._best and not ((self._out / BEST).is_file() and (self._out / BEST).read_bytes() == self._best):
+        if self._best and not has_content(self._out / BEST, self._best):
             write_atomically(self._out / BEST, self._best)
         told = best_of(self._record)
         if told is not None:
@@ -222,7 +224,7 @@ class Session(BaseCallback):
         best = best_of(self._record)
         if best is None or entry["return_mean"] > best["return_mean"]:
             save_policy(self._out / BEST, self._policy)
-            self._best = (self._out / BEST).read_bytes()
+            self._best = read_bytes(self._out / BEST, MOST_TENSOR_BYTES)
         self._record["evaluations"].append(entry)
         for name in ("return_mean", "falls", "seconds_mean"):
             self.logger.record(f"evaluation/{name}", entry[name])

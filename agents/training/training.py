@@ -14,6 +14,7 @@ from typing import Any
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.files.locks import owned
+from springfoot.files.text_table import has_content
 from springfoot.files.writing import remove_temporary, require_new
 
 from ..policies.policy import BEST, LAST, RUN
@@ -99,5 +100,5 @@ def _in_order(out: Path, record: dict[str, Any], found: Checkpoint) -> bool:
     header, arrays = found
     told = all(record.get(name) == value for name, value in header["record"].items())
     evaluated = [entry["timesteps"] for entry in record["evaluations"]][-1:] == [header["timesteps"]]
-    best = (out / BEST).is_file() and (out / BEST).read_bytes() == arrays[BEST_FILE].tobytes()
+    best = has_content(out / BEST, arrays[BEST_FILE].tobytes())
     return told and evaluated and best and (out / LAST).is_file() and record.get("status") == "finished"

@@ -57,8 +57,7 @@ def without_person(foot: Mapping[str, Any]) -> dict[str, Any]:
 
 @cache
 def _file() -> dict[str, Any]:
-    file = resources.files("springfoot.envs.control").joinpath("adapted.json")
-    return json.loads(file.read_text(encoding="utf-8"))
+    return json.loads(resources.files("springfoot.envs.control").joinpath("adapted.json").read_text(encoding="utf-8"))
 
 
 def _number(text: str) -> float:

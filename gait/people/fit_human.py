@@ -10,6 +10,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
+from springfoot.files.text_table import text_lines
 
 from .human import COLUMNS, DIGITS, fourier_series, stance_series
 
@@ -97,8 +98,7 @@ def _read(path: Path) -> list[dict[str, str]]:
             f"no {path.name} in {path.parent}: give the folder that holds human_gait.csv, human_mtp.csv and "
             "human_cop.csv"
         )
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return list(csv.DictReader(text_lines(path)))
 
 
 def _of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:

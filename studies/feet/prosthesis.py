@@ -31,6 +31,7 @@ from springfoot.envs.settings import ADAPTED, committed_feet, without_person
 from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.text_table import read_bytes
 from springfoot.files.writing import csv_text
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.people import mean_sd
@@ -233,7 +234,7 @@ def _digest(policy: str, given: Mapping[str, Any]) -> str:
     path = Path(policy)
     foot = given.get("right_foot")
     name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
-    content = path.read_bytes() if path.is_file() else b""
+    content = read_bytes(path) if path.is_file() else b""
     return hashlib.sha256(content + json.dumps(committed_feet().get(name)).encode()).hexdigest()
 
 

@@ -30,6 +30,33 @@ def test_no_public_name_means_different_things_in_two_packages():
     assert {name: sorted(rooms) for name, rooms in rooms_of.items() if len(rooms) > 1} == {}
 
 
+def opened_in(path: Path) -> list[str]:
+    """Lines of a module that open or read a file by its path, but for resources of the package and writing."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Call):
+            continue
+        call = ast.unparse(node)
+        name = ast.unparse(node.func)
+        mode = next((each.value for each in node.args if isinstance(each, ast.Constant)), "r")
+        writes = isinstance(mode, str) and set(mode) & {"w", "x", "a"}
+        reads = name.endswith((".read_text", ".read_bytes", ".open")) or name in (
+            "open",
+            "np.load",
+            "json.load",
+            "ZipFile",
+        )
+        resource = "resources.files" in call or "folder.joinpath" in call or "BytesIO" in call
+        if reads and not writes and not resource:
+            found.append(f"{path.relative_to(REPOSITORY)}:{node.lineno}: {call}")
+    return found
+
+
+def test_files_is_the_only_room_that_opens_a_path():
+    elsewhere = [line for path in FILES if path.parts[-2] != "files" for line in opened_in(path)]
+    assert elsewhere == []
+
+
 SOURCES = sorted(path for room in ("package", "examples", "benchmarks") for path in (REPOSITORY / room).rglob("*.py"))
 SOURCES += [*FILES, *sorted(REPOSITORY.glob("*.py"))]
 LOADERS = {"torch.load", "PPO.load", "VecNormalize.load"}
