@@ -8,6 +8,8 @@ import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait, plan_walk
 from springfoot.gait.body.rockers import turned
+from springfoot.gait.plan.foot import ROCKER_MARGIN, feet_under_zmp
+from springfoot.gait.plan.foot_style import peoples_style
 from springfoot.gait.plan.plan import Cadence
 from springfoot.gait.plan.posture import leg_angles
 
@@ -262,3 +264,33 @@ def test_impossible_plans_are_refused_with_their_reason(arguments, settings, rea
     with pytest.raises(SpringfootError, match=reason) as caught:
         plan_walk(Body(), *arguments, **settings)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.03])
+@pytest.mark.parametrize("end", ["heel", "ball", "flat ball", "tip"])
+def test_the_zmp_of_single_support_lies_between_heel_and_ball_and_between_ball_and_tip(end, radius):
+    """A round heel touches the floor ahead of its back, by its radius."""
+    body = Body(1.5, 50.0)
+    heel = -body.heel_to_ankle + radius * body.length_scale
+    ball = body.ankle_to_toe_joint
+    flat_ball = ball + ROCKER_MARGIN * body.length_scale
+    tip = ball + body.toe_length
+    middle = {"start": (heel + ball) / 2, "end": (flat_ball + tip) / 2}
+    name, limit, outward = {
+        "heel": ("start", heel, -1.0),
+        "ball": ("start", ball, 1.0),
+        "flat ball": ("end", flat_ball, -1.0),
+        "tip": ("end", tip, 1.0),
+    }[end]
+    style = replace(peoples_style(0.66 / body.leg_length, 0.0, 0.1, 0.1), heel_radius=radius)
+
+    def feet(beyond):
+        own = middle | {name: limit + outward * beyond}
+        points = np.array([own["end"] - 1.0, own["start"], own["end"]])
+        return feet_under_zmp(body, 1.0, np.array([0.0, 0.1, 0.55]), points, style=style)
+
+    assert feet(-0.001).step_length == 1.0
+    low, high = (heel, ball) if name == "start" else (flat_ball, tip)
+    said = rf"ZMP at the {name} of single support must be in \({low:.3f}, {high:.3f}\) m .*: outside by 0\.002 m"
+    with pytest.raises(SpringfootError, match=said):
+        feet(0.002)

@@ -172,3 +172,10 @@ def test_axis_of_the_figures_is_not_the_stride():
 def test_refuses(call, message):
     with pytest.raises(SpringfootError, match=message):
         call()
+
+
+@pytest.mark.parametrize("derivative", [1, 2, 3])
+def test_each_derivative_of_the_height_is_the_rate_of_the_one_before(derivative):
+    walk, time, step = ThesisWalk(), np.linspace(0.55, 1.2, 40), 1e-6
+    before, after = (walk.com_height(time + shift, derivative - 1) for shift in (-step, step))
+    assert walk.com_height(time, derivative) == pytest.approx((after - before) / (2 * step), rel=1e-4, abs=1e-4)

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from springfoot.gait import SpringfootError
 from springfoot.gait.springs.identification import identify
 from springfoot.gait.springs.identification_by_pushes import (
+    BIN,
     REACTION_SHARE,
     REACTS,
     SPRING,
@@ -221,3 +222,18 @@ def test_bad_data_are_refused_with_one_line(change, word):
     with pytest.raises(SpringfootError, match=word) as caught:
         identify_pushed(**(walks(trials=2) | {"bounds": BOUNDS} | change))
     assert "\n" not in str(caught.value)
+
+
+def test_bins_begin_where_the_phase_does():
+    """Eight samples of each of twelve trials fill one bin, wherever its phase begins; none is lost to a neighbour."""
+    low, width = 0.1006, BIN
+    random = np.random.default_rng(1)
+    trial = np.repeat(np.arange(12), 8)
+    inside = low + width * np.tile(np.linspace(0.02, 0.98, 8), 12)
+    columns = {name: random.standard_normal(len(trial)) for name in ("torque", "angle", "velocity")}
+    (found,) = identify_pushed(**columns, phase=inside, trial=trial, bounds=(low, low + width))
+    assert (found.samples, found.trials) == (96, 12)
+    few = trial < 1  # eight samples in all: just enough for a bin
+    columns = {name: values[few] for name, values in columns.items()}
+    (found,) = identify_pushed(**columns, phase=inside[few], trial=trial[few], bounds=(low, low + width))
+    assert (found.samples, found.trials) == (8, 1)
