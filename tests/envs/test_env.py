@@ -160,10 +160,11 @@ def test_without_a_seed_the_generator_goes_on():
 
 def test_start_option_sets_the_phase_of_one_episode():
     env = SegmentedFootBiped()
-    phases = [env.reset(seed=0, options={"start": 0.25})[0], env.reset(seed=0)[0]]
-    index = env.biped.observation_names.index("phase_sin")
-    assert phases[0][index] == pytest.approx(1.0)
-    assert phases[1][index] != pytest.approx(1.0)
+    quarter, drawn, zero = (env.reset(seed=0, options=options)[0] for options in ({"start": 0.25}, None, {"start": 0}))
+    sine = env.biped.observation_names.index("phase_sin")
+    assert quarter[sine] == pytest.approx(1.0)
+    assert drawn[sine] != pytest.approx(1.0)
+    assert zero[sine] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_an_episode_ends_once_and_asks_for_reset():

@@ -38,6 +38,8 @@ def test_tensorboard_knows_terms_stiffness_falls_and_configuration(run):
     scalars = set(events.Tags()["scalars"])
     assert {f"reward/{term}" for term in TERMS} <= scalars
     assert {f"stiffness/{action}" for action in ACTIONS} <= scalars
+    alive = [event.value for event in events.Scalars("reward/alive")]
+    assert alive and all(0.9 < value <= 1.0 for value in alive)  # mean over a rollout's steps
     assert {"episode/falls_share", "episode/return", "evaluation/falls", "evaluation/return_mean"} <= scalars
     curve = [(event.step, event.value) for event in events.Scalars("evaluation/return_mean")]
     told = [(entry["timesteps"], pytest.approx(entry["return_mean"])) for entry in run[1]["evaluations"]]

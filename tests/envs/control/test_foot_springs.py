@@ -116,6 +116,27 @@ def test_the_works_add_up_to_the_change_of_the_springs_energy():
     assert not control[..., :2, :].any()  # hips and knees are not theirs
 
 
+def test_a_delayed_change_of_stiffness_does_work_on_its_own_spring_when_it_arrives():
+    feet, random = springs(), np.random.default_rng(4)
+    feet.feet.reset(np.arange(3), delay=1)
+    feet.angle[:] = 0.1 * random.normal(size=(3, 2, 4))
+    phase = np.array([[0.1, 0.6], [0.2, 0.7], [0.3, 0.8]])  # all feet on the ground: every spring acts
+    actions = random.uniform(-1, 1, (2, 3, 4))
+    feet.set_stiffness(actions[0], phase)
+    feet.move_equilibrium(phase)
+    feet.move_equilibrium(phase)
+    before = feet.stiffness.copy()
+    deflection = feet.equilibrium - feet.angle[..., 2:]
+    feet.set_stiffness(actions[1], phase)
+    np.testing.assert_array_equal(feet.stiffness, before)
+    assert not feet.work_stiffness.any()
+    feet.move_equilibrium(phase)
+    feet.move_equilibrium(phase)
+    acts = feet.rows["springs"]["acts"]
+    np.testing.assert_allclose(feet.work_stiffness, acts * 0.5 * (feet.stiffness - before) * deflection**2, atol=1e-12)
+    assert np.abs(feet.work_stiffness[acts > 0]).min() > 1e-6
+
+
 def test_phase_tables_are_linear_between_rows_and_each_environment_reads_its_own():
     rows = np.stack([np.stack([np.sin(2 * np.pi * GRID) * k, GRID + k], -1) for k in range(4)])
     place = np.zeros(3, PLACE)

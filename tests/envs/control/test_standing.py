@@ -8,19 +8,26 @@ import pytest
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.standing import (
+    LANDED,
     OFF_PHASE,
     SLOW_SPEED,
     STAND_COM,
     STAND_SECONDS,
     STANDING,
     STARTING,
+    STOP_KNEE,
+    STOP_PITCH,
     STOPPED,
+    STOPPING,
+    TRUNK_STIFFNESS,
     WALKING,
+    Standing,
     standing_posture,
     steady_walk,
 )
+from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
-from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE
+from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, TOE
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
@@ -106,6 +113,30 @@ def test_it_sets_off_walks_steadily_and_comes_to_rest():
     weight = settings.mass * GRAVITY
     np.testing.assert_allclose(both.sum(axis=1), weight, rtol=0.02)
     assert (both > 0.1 * weight).all()  # it stands on both feet
+
+
+def test_springs_of_a_body_that_stops_hold_its_posture_and_right_its_trunk():
+    settings = BipedSettings(start="standing", stop_at=3.0)
+    subjects = Subjects(settings, np.array([SLOW_SPEED, 1.2]), 1)
+    held = Standing(settings, subjects)
+    simulation = Simulation(Body(), 1)
+    pitch, everyone = 0.2, np.array([True])
+    angle = np.array([[[0.3, 0.1, 0.05, 0.2], [-0.2, 0.4, -0.1, 0.0]]])
+    simulation.reset(np.array([0]), np.array([[0.0, 1.5, pitch]]), np.zeros((1, 3)), angle, 0 * angle)
+    simulation.measure()
+    held.reset(np.array([0]), [np.random.default_rng(0)], np.zeros(1), standing=True)
+    subjects.rows["held"]["mode"] = STOPPING
+    subjects.rows["legs"]["phase"] = np.mean(LANDED)
+    subjects.speed[:] = SLOW_SPEED
+    held.switch(simulation.arrays, np.array([3.5]), everyone)
+    assert held.mode.tolist() == [STOPPED]
+    control = np.zeros((1, 2, 4, 2))
+    held.drive(simulation.arrays.bodies, control, everyone)
+    k, drive = control[0, ..., 0], control[0, ..., 1]
+    torque = drive - k * angle[0]
+    np.testing.assert_allclose(torque[:, HIP], -TRUNK_STIFFNESS * (pitch - Body().trunk_lean - STOP_PITCH), rtol=1e-9)
+    np.testing.assert_allclose(torque[:, KNEE], k[:, KNEE] * STOP_KNEE, rtol=1e-9)
+    np.testing.assert_allclose(torque[:, TOE], 0.0, atol=1e-9)
 
 
 def test_a_policy_acts_in_the_steady_walk_only():

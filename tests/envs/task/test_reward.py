@@ -107,10 +107,10 @@ def test_pose_takes_the_thigh_to_the_vertical(thesis_body):
 def test_costs_count_what_they_say(thesis_body):
     measured = thesis_body.measurement(PHASES)
     action = np.tile([0.1, -0.2, 0.3, 0.0], (len(PHASES), 1))
-    stiffness = np.tile([[600.0, 60.0], [300.0, 120.0]], (len(PHASES), 1, 1))
+    stiffness = np.tile([[600.0, 60.0], [300.0, 180.0]], (len(PHASES), 1, 1))
     terms = thesis_body.terms(measured, PHASES, action=action, stiffness=stiffness)
     np.testing.assert_allclose(terms["stiffness_rate"], 0.14)
-    np.testing.assert_allclose(terms["stiffness"], 0.5 * ((4 + 0.25) + (1 + 1)) / 1.25)
+    np.testing.assert_allclose(terms["stiffness"], 0.5 * ((4 + 1 / 4) + (1 + 9 / 4)) / 1.25)
 
 
 @pytest.mark.parametrize("height", [1.7, 1.3])
