@@ -1,12 +1,13 @@
 """Every reader of files, and small valid files for each to begin with."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cma import CMAEvolutionStrategy
 from safetensors.numpy import save
 
 from springfoot.agents.policies.foreign import contract_path, onnx_policy
@@ -15,6 +16,9 @@ from springfoot.agents.policies.schedules import schedule_file
 from springfoot.agents.training.checkpoint import STATE_KEY, read_checkpoint
 from springfoot.agents.training.config import TrainingConfig, config_to_json
 from springfoot.agents.training.run_record import read_record
+from springfoot.arrays import NDArray
+from springfoot.envs.control.constants import constants_from
+from springfoot.envs.control.reference_walk import reference_walks
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.recording.policies import prepare
@@ -23,9 +27,16 @@ from springfoot.evaluation.report.schedule_tables import finite_states, write_sc
 from springfoot.files.json_file import read_object
 from springfoot.files.tensor_file import DIGEST, read_tensors, write_tensors
 from springfoot.gait.people.contacts import PERCENT
-from springfoot.gait.people.human import COLUMNS, human_gait
+from springfoot.gait.people.fit_human import COP_TABLE, CURVES_TABLE, TOE_TABLE, fit
+from springfoot.gait.people.human import COLUMNS, PEOPLE_FILE, HumanGait, foot_habits, harmonics, human_gait
 from springfoot.gait.people.own_data import OwnGait, read_gait
+from springfoot.gait.plan.walk_style import STYLES, styles_of
 from springfoot.gait.springs.foot_file import read_foot
+from springfoot.studies.base.flags import read_json
+from springfoot.studies.base.kept import Kept
+from springfoot.studies.searches.constants_file import ADAPTED_FEET, CONSTANTS, read_constants, read_feet, read_styles
+from springfoot.studies.searches.kept_search import generations
+from springfoot.studies.walks.learning_curves import read_finished
 
 TASK = BipedSettings()
 
@@ -69,6 +80,18 @@ def readers(folder: Path) -> dict[str, Reader]:
             suffix=".json",
             bases=(json.dumps(settings_to_json(TASK) | {"human": own.to_json()}).encode(),),
         ),
+        "people": Reader(read=_people, suffix=".json", bases=(PEOPLE_FILE.read_bytes(),)),
+        "people's curves": Reader(read=_curves(folder), suffix=".csv", bases=(_reference_table(folder),)),
+        "plan": Reader(read=_plan, suffix=".json", bases=(_plan_file(),)),
+        "leg constants": Reader(read=_constants, suffix=".json", bases=(CONSTANTS.read_bytes(),)),
+        "adapted feet": Reader(read=_adapted, suffix=".json", bases=(ADAPTED_FEET.read_bytes(),)),
+        "styles of a search": Reader(read=_styles, suffix=".json", bases=(STYLES.read_bytes(),)),
+        "costs of a search": Reader(read=_search, suffix=".json", bases=(_searched(folder),)),
+        "numbers of a study": Reader(read=Kept, suffix=".json", bases=(b'{"[1, \\"a\\"]": {"falls": 0.0}}',)),
+        "setting in JSON": Reader(
+            read=_setting, suffix=".json", bases=tuple(json.dumps(foot).encode() for foot in _FEET)
+        ),
+        "run with curves of learning": Reader(read=_learning, suffix=".json", bases=(json.dumps(_run()).encode(),)),
         "ONNX": Reader(read=onnx_policy, suffix=".onnx", bases=_onnx(folder)),
         "contract of an ONNX file": Reader(
             read=_contract(folder), suffix=".json", bases=(contract_path(folder / "walk.onnx").read_bytes(),)
@@ -142,7 +165,8 @@ def _checkpoint(path: Path) -> None:
 
 def _run() -> dict[str, Any]:
     evaluation = {"timesteps": 64, "seconds": 1.0, "return_mean": 3.5, "return_sd": 0.5, "falls": 0, "episodes": 16}
-    return {"config": config_to_json(TrainingConfig()), "sessions": [{}], "evaluations": [evaluation], "seconds": 1.0}
+    timed = {"seconds": 1.0, "timesteps": 64}
+    return {"config": config_to_json(TrainingConfig()), "sessions": [{}], "evaluations": [evaluation]} | timed
 
 
 def _record(path: Path) -> None:
@@ -150,6 +174,48 @@ def _record(path: Path) -> None:
 
 
 # Schedules, own data, feet -----------------------------------------------------------------------------------
+
+
+def _people(path: Path) -> None:
+    harmonics.cache_clear()  # by name
+    foot_habits.cache_clear()
+    reference_walks(settings_from(people_file=str(path)))
+
+
+def _curves(folder: Path) -> Callable[[Path], Any]:
+    def read(path: Path) -> None:
+        (folder / CURVES_TABLE).write_bytes(path.read_bytes())
+        fit(folder)
+
+    return read
+
+
+def _reference_table(folder: Path) -> bytes:
+    """Write the other two files of a fit to people, and return the table of their curves at two speeds."""
+    phase = PERCENT / 100
+    slow, quick = (human_gait(speed) for speed in (0.9, 1.3))
+    toe = {COLUMNS["toe"] + end: np.degrees(values) for end, values in _both(slow, "toe", phase)}
+    (folder / TOE_TABLE).write_bytes(_table({"percent": PERCENT} | toe))
+    forward = [f"{0.002 * percent - 0.05:g}" if percent <= 60 else "" for percent in PERCENT.tolist()]
+    rows = [f"{percent},{cop}" for percent, cop in zip(PERCENT.tolist(), forward, strict=True)]
+    (folder / COP_TABLE).write_text("\n".join(["percent,cop_forward_from_ankle_m", *rows]), encoding="utf-8")
+    lines = []
+    for name, people in {"slow": slow, "quick": quick}.items():
+        numbers = {"speed_m_s": people.speed, "stride_time_s": people.stride_time}
+        numbers |= {"step_length_m": people.step_length, "toe_off_percent": 100 * people.toe_off}
+        columns = {"percent": PERCENT} | {key: value + 0 * PERCENT for key, value in numbers.items()}
+        for curve, column in COLUMNS.items():
+            columns |= {column + end: _shown(curve, values) for end, values in _both(people, curve, phase)}
+        head, *rows = _table(columns).decode().splitlines()
+        lines += (
+            [f"{row},{name}" for row in rows] if lines else [f"{head},condition", *(f"{row},{name}" for row in rows)]
+        )
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _both(people: HumanGait, name: str, phase: NDArray) -> Iterator[tuple[str, NDArray]]:
+    yield "", people.mean(name, phase)
+    yield "_sd", people.sd(name, phase)
 
 
 def _schedule_table(walk: Recording, folder: Path) -> bytes:
@@ -242,6 +308,50 @@ def _foot_table() -> bytes:
 
 def _foot(path: Path) -> None:
     settings_from(right_foot=read_foot(path))
+
+
+# Plans, constants, searches, studies -------------------------------------------------------------------------
+
+
+def _plan_file() -> bytes:
+    constants = {name: values for name, values in read_constants(CONSTANTS)["constants"].items() if "predicted" in name}
+    return json.dumps(read_object(STYLES, "styles") | {"constants": constants}).encode()
+
+
+def _plan(path: Path) -> None:
+    reference_walks(settings_from(guide="plan", plan_file=str(path)))
+
+
+def _constants(path: Path) -> None:
+    for values in read_constants(path)["constants"].values():
+        constants_from(values)
+
+
+def _adapted(path: Path) -> None:
+    settings_from(right_foot={"kind": "passive", "adapted": next(iter(read_feet(path)["feet"].values()))["adapted"]})
+
+
+def _styles(path: Path) -> None:
+    read_styles(path)
+    styles_of(path)
+
+
+def _searched(folder: Path) -> bytes:
+    _search(folder / "costs.json")
+    return (folder / "costs.json").read_bytes()
+
+
+def _search(path: Path) -> None:
+    strategy = CMAEvolutionStrategy(np.zeros(3), 0.5, {"popsize": 4, "seed": 1, "verbose": -9})
+    list(generations(strategy, 3, lambda _, vectors: np.array([float(x @ x) for x in vectors]), path, {"seed": 0}))
+
+
+def _setting(path: Path) -> None:
+    read_json([str(path)])
+
+
+def _learning(path: Path) -> None:
+    read_finished(_write(path.with_name(RUN), path.read_bytes()).parent)
 
 
 # ONNX --------------------------------------------------------------------------------------------------------

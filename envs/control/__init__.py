@@ -6,6 +6,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .constants import (
+        KNOTS,
         TUNED_SPEED,
         LegConstants,
         SlopeConstants,
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     )
     from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
     from .foot_springs import FEET, action_of, stiffness_of, stiffness_ranges
-    from .legs import KNOTS
     from .person import HELD_BY_SOUND, person_constants
     from .phase_table import GRID
     from .reference_walk import FED, reference_walk_at, tabulated_speeds
@@ -61,7 +61,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "FEET": "foot_springs",
             "GRID": "phase_table",
             "HELD_BY_SOUND": "person",
-            "KNOTS": "legs",
+            "KNOTS": "constants",
             "PLATEAUS": "equilibrium",
             "REFERENCE_STIFFNESS": "equilibrium",
             "SLOW_SPEED": "standing",

@@ -2,20 +2,29 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
-from springfoot.errors import SpringfootError
+from springfoot.errors import SpringfootError, require_within
 from springfoot.files.json_file import MOST_JSON_BYTES
 from springfoot.files.text_table import read_bytes
+from springfoot.gait.plan.plan import PLAN_SPEED_RANGE
 
 TUNED_SPEED = 1.2
 """Speed [m/s] at 1.70 m of the constants without a speed in their name."""
+KNOTS = np.arange(10) / 10
+"""Stride phases of the knots of the corrections to the target's curves, which are periodic cubic splines."""
+LARGEST_CONSTANT = 1e6
+"""Largest constant, in its unit."""
+LEAST_STIFFNESS = dict.fromkeys(("hip_stiffness", "knee_stiffness", "ankle_schedule", "toe_schedule"), 1.0)
+"""Lower bounds of constants [N m/rad]."""
+
+Constants = TypeVar("Constants", "LegConstants", "SlopeConstants")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,11 +32,11 @@ class LegConstants:
     """Tuned constants of the leg controller, for 1.70 m and 63 kg."""
 
     hip_knots_deg: tuple[float, ...]
-    """Added to the target's thigh angle at `envs.control.legs.KNOTS` [deg]."""
+    """Added to the target's thigh angle at `KNOTS` [deg]."""
     knee_knots_deg: tuple[float, ...]
-    """Added to the target's knee angle at `envs.control.legs.KNOTS` [deg]."""
+    """Added to the target's knee angle at `KNOTS` [deg]."""
     ankle_knots_deg: tuple[float, ...]
-    """Added to the target's ankle angle at `envs.control.legs.KNOTS` in the planned equilibrium [deg]."""
+    """Added to the target's ankle angle at `KNOTS` in the planned equilibrium [deg]."""
     hip_stiffness: tuple[float, float]
     """Stiffness of the hip in stance, in swing [N m/rad]."""
     knee_stiffness: tuple[float, float]
@@ -109,7 +118,9 @@ def leg_constants(
     `SpringfootError` for a setting without a set.
     """
     name = constants_name(equilibrium, cadence, feedforward=feedforward, follows_plan=follows_plan)
-    table = _committed() if file is None else _constants_of(file, name)
+    if file is not None:
+        return constants_at(_sets_of(file, name), speed)
+    table = _committed()
     if follows_plan and name not in table:
         raise SpringfootError(f"no leg constants walk with guide 'plan' at cadence {cadence!r}; it must be 'people'")
     if name not in table:
@@ -117,11 +128,18 @@ def leg_constants(
             f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s "
             "moments; equilibrium 'neutral' needs cadence 'people'"
         )
+    return constants_at(_sets(table, name), speed)
+
+
+def _sets(table: Mapping[str, Any], name: str) -> dict[float, LegConstants]:
+    """Return speed [m/s] -> constants of the sets `name` and `name, SPEED m/s` in a table."""
     prefix = f"{name}, "
     unit = " m/s"
     others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]
     names = {TUNED_SPEED: name} | {float(other.removeprefix(prefix).removesuffix(unit)): other for other in others}
-    return constants_at({each: constants_from(table[found]) for each, found in names.items()}, speed)
+    return {
+        require_within("speed", at, PLAN_SPEED_RANGE, "m/s"): constants_from(table[own]) for at, own in names.items()
+    }
 
 
 def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
@@ -140,9 +158,9 @@ def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstan
     return constants_from(values)
 
 
-def constants_from(values: dict[str, Any]) -> LegConstants:
-    """Return `LegConstants` from its JSON form (lists for tuples)."""
-    return LegConstants(**_tupled(values))
+def constants_from(values: Mapping[str, Any]) -> LegConstants:
+    """Return `LegConstants` from its JSON form (lists for tuples); raise `SpringfootError` for any other value."""
+    return _from_json(LegConstants, values)
 
 
 def slope_constants() -> SlopeConstants:
@@ -151,22 +169,42 @@ def slope_constants() -> SlopeConstants:
 
 
 def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
-    """Return `SlopeConstants` from its JSON form (lists for tuples)."""
-    return SlopeConstants(**_tupled(values))
+    """Return `SlopeConstants` from its JSON form (lists for tuples); raise `SpringfootError` for any other value."""
+    return _from_json(SlopeConstants, values)
 
 
-def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+def _from_json(kind: type[Constants], values: Any) -> Constants:
+    """Return constants of a kind; raise `SpringfootError` unless each has as many finite numbers as its field."""
+    required = [field.name for field in fields(kind) if field.default is MISSING]
+    known = {field.name for field in fields(kind)}
+    if not isinstance(values, Mapping) or not set(required) <= set(values) <= known:
+        raise SpringfootError(f"constants must be a dictionary with {', '.join(required)}")
+    found: dict[str, Any] = {}
+    for name, hint in get_type_hints(kind).items():
+        if name not in values:
+            continue
+        value = values[name]
+        if hint is float:
+            found[name] = _within(name, value)
+            continue
+        kinds = get_args(hint)
+        count = len(KNOTS) if Ellipsis in kinds else len(kinds)
+        if not isinstance(value, (list, tuple)) or len(value) != count:
+            raise SpringfootError(f"{name} must be {count} numbers")
+        found[name] = tuple(_within(name, each) for each in value)
+    return kind(**found)
 
 
-def _constants_of(file: Path, name: str) -> dict[str, dict]:
-    """Return name -> leg constants of a file; raise `SpringfootError` unless it has `name`."""
+def _within(name: str, value: Any) -> float:
+    return require_within(name, value, (LEAST_STIFFNESS.get(name, -LARGEST_CONSTANT), LARGEST_CONSTANT))
+
+
+def _sets_of(file: Path, name: str) -> dict[float, LegConstants]:
+    """Return speed [m/s] -> the constants `name` of a file; raise `SpringfootError` unless it has them."""
     try:
-        table = json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"]
-        _ = constants_from(table[name])
+        return _sets(json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"], name)
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(f"{file} has no leg constants {name!r}: {error}") from None
-    return table
 
 
 def _committed() -> dict[str, dict]:

@@ -18,14 +18,12 @@ from springfoot.gait.body.body import GRAVITY, REFERENCE_MASS
 from ..physics.kernel import kernel, part
 from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
 from ..physics.timing import CONTROL_WINDOW
-from .constants import LegConstants, SlopeConstants
+from .constants import KNOTS, LegConstants, SlopeConstants
 from .phase_table import GRID, PhaseTable, leg_phases, read
 from .reference_walk import ReferenceWalk
 from .state import GAINS, PLACE
 from .subjects import Subjects
 
-KNOTS = np.arange(10) / 10
-"""Stride phases of the knots of the corrections to the target's curves, which are periodic cubic splines."""
 STANCE_FALL = (0.5, 0.6)
 """Stride phases over which the trunk torque of a leg falls to zero as its stance ends; chosen, about double support."""
 TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)

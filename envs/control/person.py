@@ -5,7 +5,7 @@ linear between those speeds and constant outside them.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,13 @@ from springfoot.errors import SpringfootError
 from ..settings.adapted import ADAPTED, LEGS, committed_feet
 from ..settings.feet import FOOT_SETTINGS
 from ..settings.settings import BipedSettings, plan_file_of
-from .constants import TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
+from .constants import LEAST_STIFFNESS, TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
 
 HELD_BY_SOUND = (
     *("period_factor", "period_speed_gain", "trunk_pitch_deg", "trunk_stiffness", "trunk_damping", "speed_torque"),
     *("swing_speed_gain", "swing_place_gain"),
 )
 """Constants of phase, trunk and speed, which both legs take from the sound leg."""
-_LEAST = dict.fromkeys(("hip_stiffness", "knee_stiffness", "ankle_schedule", "toe_schedule"), 1.0)
 
 
 def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
@@ -57,10 +56,9 @@ def person_constants(settings: BipedSettings, speed: float, side: int) -> LegCon
 
 def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
     try:
-        return {leg: constants_from(dict(legs[leg])) for leg in LEGS}
-    except TypeError:
-        names = ", ".join(item.name for item in fields(LegConstants))
-        raise SpringfootError(f"adapted: each leg must have the constants {names}") from None
+        return {leg: constants_from(legs[leg]) for leg in LEGS}
+    except SpringfootError as error:
+        raise SpringfootError(f"adapted: {error}") from None
 
 
 def _moved(
@@ -81,6 +79,8 @@ def _moved(
         place = float(np.interp(speed, speeds, np.arange(len(speeds))))
         low = int(place)
         high = min(low + 1, len(speeds) - 1)
-        moved = np.maximum(here + away[low] + (place - low) * (away[high] - away[low]), _LEAST.get(name, -np.inf))
+        moved = np.maximum(
+            here + away[low] + (place - low) * (away[high] - away[low]), LEAST_STIFFNESS.get(name, -np.inf)
+        )
         values[name] = moved.tolist()
     return constants_from(values)

@@ -9,11 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError
-from springfoot.files.text_table import text_lines
+from springfoot.errors import SpringfootError, quoted, require_within
+from springfoot.files.text_table import LARGEST_VALUE, text_lines
 
 from .human import COLUMNS, DIGITS, fourier_series, stance_series
 
+CURVES_TABLE = "human_gait.csv"
+"""Table of curves over the stride, by condition."""
+TOE_TABLE = "human_mtp.csv"
+"""Table of the toe's curve over the stride."""
+COP_TABLE = "human_cop.csv"
+"""Table of the centre of pressure over the stride."""
 ANGLES = {name: COLUMNS[name] for name in ("thigh", "hip", "knee", "ankle")}
 KINETICS = {name: column for name, column in COLUMNS.items() if name.endswith(("_moment", "_power"))}
 FORCES = {name: column for name, column in COLUMNS.items() if name.startswith("grf_")}
@@ -45,17 +51,20 @@ COP_SOURCE = (
 
 
 def fit(reference: Path) -> dict:
-    """Return the series of every curve, as `human.py` reads them, from the CSV files in folder `reference`."""
-    rows = _read(reference / "human_gait.csv")
-    toe_rows = _read(reference / "human_mtp.csv")
-    names = sorted({row["condition"] for row in rows}, key=lambda name: float(_of(rows, name)[0]["speed_m_s"]))
+    """Return the series of every curve, as `human.py` reads them, from the CSV files in folder `reference`.
+
+    Raises `SpringfootError` for files without a curve, or with a cell in it that is no finite number.
+    """
+    rows = _read(reference / CURVES_TABLE)
+    toe_rows = _read(reference / TOE_TABLE)
+    names = sorted({_text(row, "condition") for row in rows}, key=lambda name: _number(_of(rows, name)[0], "speed_m_s"))
     conditions = []
     table = {"mean": {}, "sd": {}}
     for condition in names:
         own = _of(rows, condition)
         keys = ("speed_m_s", "stride_time_s", "step_length_m", "toe_off_percent")
-        conditions.append({"name": condition} | {key: float(own[0][key]) for key in keys})
-        stance = float(own[0]["toe_off_percent"]) / 100
+        conditions.append({"name": condition} | {key: _number(own[0], key) for key in keys})
+        stance = _number(own[0], "toe_off_percent") / 100
         for kind, suffix in (("mean", ""), ("sd", "_sd")):
             series = table[kind]
             for name, column in ANGLES.items():
@@ -77,7 +86,7 @@ def fit(reference: Path) -> dict:
         "cop": {
             "source": COP_SOURCE,
             "units": "forward of the ankle, of the foot's length; a_k of sum a_k u^k, k from 0, u = phase / toe_off",
-            "coefficients": _centre_of_pressure(_read(reference / "human_cop.csv")),
+            "coefficients": _centre_of_pressure(_read(reference / COP_TABLE)),
         },
         "foot": SPRING_HABITS,
     }
@@ -85,9 +94,13 @@ def fit(reference: Path) -> dict:
 
 def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
     """Fit a polynomial over stance, which ends at the first row without a centre of pressure, by least squares."""
-    stance = [row for row in rows if row["cop_forward_from_ankle_m"]]
-    ends = min(float(row["percent"]) for row in rows if not row["cop_forward_from_ankle_m"])
-    forward = _column(stance, "cop_forward_from_ankle_m")
+    column = "cop_forward_from_ankle_m"
+    stance = [row for row in rows if _text(row, column)]
+    swing = [row for row in rows if not _text(row, column)]
+    if len(stance) <= COP_DEGREE or not swing:
+        raise SpringfootError(f"{COP_TABLE}: {column} must have numbers in stance, and none in swing")
+    ends = min(_column(swing, "percent"))
+    forward = _column(stance, column)
     powers = (_column(stance, "percent") / ends)[:, None] ** np.arange(COP_DEGREE + 1)
     return np.round(np.linalg.lstsq(powers, forward / np.ptp(forward), rcond=None)[0], DIGITS).tolist()
 
@@ -95,10 +108,12 @@ def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
 def _read(path: Path) -> list[dict[str, str]]:
     if not path.is_file():
         raise SpringfootError(
-            f"no {path.name} in {path.parent}: give the folder that holds human_gait.csv, human_mtp.csv and "
-            "human_cop.csv"
+            f"no {path.name} in {path.parent}: give the folder that holds {CURVES_TABLE}, {TOE_TABLE} and {COP_TABLE}"
         )
-    return list(csv.DictReader(text_lines(path)))
+    try:
+        return list(csv.DictReader(text_lines(path)))
+    except csv.Error as error:
+        raise SpringfootError(f"{path.name} is not a CSV file: {error}") from None
 
 
 def _of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
@@ -106,7 +121,22 @@ def _of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
 
 
 def _column(rows: list[dict[str, str]], name: str) -> NDArray:
-    return np.array([float(row[name]) for row in rows])
+    return np.array([_number(row, name) for row in rows])
+
+
+def _number(row: dict[str, str], name: str) -> float:
+    text = _text(row, name)
+    try:
+        return require_within(name, float(text), (-LARGEST_VALUE, LARGEST_VALUE))
+    except ValueError:
+        raise SpringfootError(f"{name} must be a finite number, got {quoted(text)}") from None
+
+
+def _text(row: dict[str, str], name: str) -> str:
+    text = row.get(name)
+    if text is None:
+        raise SpringfootError(f"each row must have a cell of column {name}")
+    return text
 
 
 def main() -> int:

@@ -266,7 +266,8 @@ def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolato
     """Return a table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic, which does not overshoot."""
     edge = 4
     padded = np.concatenate([values[-edge:] - shift, values, values[: edge + 1] + shift])
-    return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)
+    with np.errstate(over="ignore"):  # a slope next to none has an infinite weight, which makes the knot's slope 0
+        return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)
 
 
 def _named(columns: NDArray) -> dict[str, NDArray]:

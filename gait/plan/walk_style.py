@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
-from math import isfinite
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from springfoot.errors import SpringfootError, as_float
+from springfoot.errors import SpringfootError, as_float, quoted
 from springfoot.files.json_file import MOST_JSON_BYTES
 from springfoot.files.text_table import read_bytes
 
@@ -27,6 +26,10 @@ STYLES = Path(str(resources.files("springfoot.gait.plan") / "least_work.json"))
 """The package's own file of styles."""
 PAIR = tuple[float, float]
 """Type of a pair of numbers."""
+LARGEST_NUMBER = 10.0
+"""Largest number of a style, in its unit: rad, m and fractions of a step alike are about 1."""
+POWERS = ("toe_rocker_power", "roll_power")
+"""Numbers of a foot that must be positive."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,21 +71,24 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
             value = getattr(part, name)
             kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
             if not any(_is_a(kind, value) for kind in kinds):
-                what = (
-                    "a finite number" if float in kinds else "2 finite numbers" if PAIR in kinds else "finite numbers"
-                )
-                raise ValueError(f"{name} must be {what}, got {value!r}")
+                what = "a number" if float in kinds else "2 numbers" if PAIR in kinds else "numbers"
+                raise ValueError(f"{name} must be {what} within ±{LARGEST_NUMBER:g}, got {quoted(value)}")
+    for name in POWERS:
+        if getattr(style.foot, name) <= 0.0:
+            raise ValueError(f"{name} must be > 0, got {getattr(style.foot, name):g}")
+    if style.foot.heel_radius < 0.0:
+        raise ValueError(f"heel_radius must be >= 0 m, got {style.foot.heel_radius:g}")
     if len({len(each) for each in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:
         raise ValueError("via_forward, via_up and via_pitch must be equally many")
     return style
 
 
 def _is_a(kind: Any, value: Any) -> bool:
-    """Tell whether a value has a field's type, and finite numbers."""
+    """Tell whether a value has a field's type, and its numbers are at most `LARGEST_NUMBER`."""
     if get_origin(kind) is tuple:
         own = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
-        return own and all(isfinite(as_float(each)) for each in value)
-    return isfinite(as_float(value)) if kind is float else isinstance(value, kind)
+        return own and all(abs(as_float(each)) <= LARGEST_NUMBER for each in value)
+    return abs(as_float(value)) <= LARGEST_NUMBER if kind is float else isinstance(value, kind)
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:

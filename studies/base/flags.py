@@ -36,7 +36,7 @@ def field_help(settings: type) -> dict[str, str]:
     }
 
 
-def _read_json(words: list[str]) -> dict[str, Any]:
+def read_json(words: list[str]) -> dict[str, Any]:
     """Return a dictionary from JSON text, or from the JSON file of that name."""
     text = words[0]
     if not text.lstrip().startswith("{"):
@@ -67,12 +67,12 @@ def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
 
 
 def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | None:
-    return None if may_be_none and words == ["None"] else _read_json(words)
+    return None if may_be_none and words == ["None"] else read_json(words)
 
 
 def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
     """Return a dictionary from JSON text, or the word itself, which may name a file."""
-    return _read_json(words) if words[0].lstrip().startswith("{") else words[0]
+    return read_json(words) if words[0].lstrip().startswith("{") else words[0]
 
 
 def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:

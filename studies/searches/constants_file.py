@@ -1,4 +1,5 @@
-"""Read and write the files of constants that searches start from and write: leg constants and adapted feet."""
+"""Read and write the files of constants that searches start from and write: leg constants, adapted
+feet, styles of walks."""
 
 import json
 from importlib import resources
@@ -25,13 +26,19 @@ def read_feet(path: Path) -> dict[str, Any]:
     return _read(path, "feet", "adapted feet") if path.exists() else {"found_by": {}, "feet": {}}
 
 
+def read_styles(path: Path) -> dict[str, Any]:
+    """Return a file of styles of walks; an empty table if there is no file."""
+    return _read(path, "styles", "styles of walks") if path.exists() else {"found_by": {}, "styles": {}}
+
+
 def _read(path: Path, key: str, what: str) -> dict[str, Any]:
-    """Return a JSON file with the entry `key`; raise `SpringfootError` for any other, calling it no `what`."""
+    """Return a JSON file with the entry `key`, and `found_by`; raise `SpringfootError` for any other, calling it no
+    `what`."""
     try:
         table = read_object(path, what)
     except (OSError, SpringfootError):
         table = {}
-    if not isinstance(table.get(key), dict):
+    if not isinstance(table.get(key), dict) or not isinstance(table.setdefault("found_by", {}), dict):
         raise SpringfootError(f"{path} is not a file of {what}")
     return table
 

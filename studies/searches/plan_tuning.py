@@ -19,7 +19,6 @@ from tqdm import tqdm
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, require_count, require_number
-from springfoot.files.json_file import read_object
 from springfoot.files.writing import csv_text, write_atomically
 from springfoot.gait.body import HEEL_RADIUS, Body
 from springfoot.gait.people import human_gait
@@ -40,6 +39,7 @@ from springfoot.gait.plan import (
 )
 
 from ..base.study import Answer, OnProgress, Study
+from .constants_file import read_styles
 from .kept_search import asked_of, generations
 from .prediction_table import numbers_of, prediction_table
 
@@ -222,7 +222,7 @@ class PlanTuning(Study):
         """Write the best style so far and this command into the file of styles; with --quick nothing."""
         if self.quick:
             return
-        table = read_object(self.styles, "file of styles of walks") if self.styles.exists() else {}
-        table.setdefault("styles", {})[f"{self.speed:g}"] = style.to_json()
-        table.setdefault("found_by", {})[f"{self.speed:g}"] = self.command
+        table = read_styles(self.styles)
+        table["styles"][f"{self.speed:g}"] = style.to_json()
+        table["found_by"][f"{self.speed:g}"] = self.command
         write_atomically(self.styles, (json.dumps(table, indent=1) + "\n").encode())

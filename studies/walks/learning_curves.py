@@ -14,11 +14,11 @@ import tyro
 from matplotlib.figure import Figure
 
 from springfoot.agents.policies import RUN
-from springfoot.errors import SpringfootError
+from springfoot.agents.training import read_record
+from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.evaluation.numbers import WALKS, measure, unmet
 from springfoot.evaluation.recording import prepare, record
 from springfoot.evaluation.report import STYLE
-from springfoot.files.json_file import read_object
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 
@@ -79,7 +79,7 @@ class LearningCurves(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Evaluate every run."""
-        runs = {folder.name: _read(folder) for folder in self.runs}
+        runs = {folder.name: read_finished(folder) for folder in self.runs}
         lines = []
         walks = []
         for folder, (name, run) in zip(self.runs, runs.items(), strict=True):
@@ -104,13 +104,14 @@ class LearningCurves(WalkingStudy):
         return Answer(text=text, files=files)
 
 
-def _read(folder: Path) -> dict[str, Any]:
+def read_finished(folder: Path) -> dict[str, Any]:
     """Return the record of a finished run, with the time of every evaluation."""
-    record_of_run = read_object(folder / RUN, "record of a run") if (folder / RUN).is_file() else {}
     try:
-        numbers = [entry[key] for entry in record_of_run["evaluations"] for key in KEYS]
-        float(sum(numbers) + record_of_run["seconds"] + record_of_run["timesteps"])
-    except (ValueError, KeyError, TypeError, OverflowError):
+        record_of_run = read_record(folder)
+        for timed in (record_of_run, *record_of_run["evaluations"]):
+            require_number("seconds", timed["seconds"], 0.0, unit="s")
+            require_count("timesteps", timed["timesteps"], 0)
+    except (SpringfootError, KeyError):
         raise SpringfootError(
             f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"
         ) from None

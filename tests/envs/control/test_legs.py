@@ -1,6 +1,7 @@
 """The leg constants and the phase."""
 
 import json
+import re
 from dataclasses import replace
 from importlib import resources
 
@@ -63,6 +64,28 @@ def test_a_setting_without_constants_is_refused():
         "no leg constants walk with equilibrium 'neutral' at cadence 'thesis' and people's moments; "
         "equilibrium 'neutral' needs cadence 'people'"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("trunk_pitch_deg", float("nan"), "trunk_pitch_deg must be in [-1e+06, 1e+06], got nan"),
+        ("hip_knots_deg", [0.0] * 9, "hip_knots_deg must be 10 numbers"),
+        ("ankle_schedule", [0.0] * 5, "ankle_schedule must be in [1, 1e+06], got 0"),
+        ("toe_schedule", "x", "toe_schedule must be in [1, 1e+06], got 'x'"),
+        ("speed_torque", 1e200, "speed_torque must be in [-1e+06, 1e+06], got 1e+200"),
+        ("unknown", 1.0, "constants must be a dictionary with hip_knots_deg"),
+    ],
+)
+def test_constants_of_a_file_that_cannot_be_are_refused_in_one_line(tmp_path, name, value, said):
+    table = json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
+    for speed in ("", ", 0.9 m/s"):  # another speed's are read too
+        constants = {key: values for key, values in table["constants"].items() if key.startswith("predicted")}
+        constants[f"predicted{speed}"] = constants[f"predicted{speed}"] | {name: value}
+        path = tmp_path / "plan.json"
+        path.write_text(json.dumps({"constants": constants}), encoding="utf-8")
+        with pytest.raises(SpringfootError, match=re.escape(f"plan.json has no leg constants 'predicted': {said}")):
+            leg_constants("planned", "people", 1.2, follows_plan=True, file=path)
 
 
 def test_knots_are_met_and_periodic():

@@ -97,7 +97,7 @@ def test_what_is_no_person_is_refused_in_one_line(adapted, told):
 
 def test_legs_without_all_constants_two_people_and_other_springs_are_refused():
     short = {"1.2": {"sound": {"hip_stiffness": [1.0, 2.0]}, "other": asdict(OTHER)}}
-    with pytest.raises(SpringfootError, match="adapted: each leg must have the constants hip_knots_deg, "):
+    with pytest.raises(SpringfootError, match="adapted: constants must be a dictionary with hip_knots_deg, "):
         Biped(settings_from(right_foot={"kind": "rigid", ADAPTED: short}), 1)
     with pytest.raises(SpringfootError, match="a person adapts to one foot"):
         Biped(settings_from(right_foot=FOOT, left_foot=FOOT), 1)

@@ -111,11 +111,14 @@ def test_the_zmp_of_a_style_goes_as_far_along_a_longer_foot():
 @pytest.mark.parametrize(
     ("place", "name", "value", "said"),
     [
-        ("walk", "lean", "x", "lean must be a finite number, got 'x'"),
-        ("walk", "rise", float("nan"), "rise must be a finite number, got nan"),
-        ("walk", "knee", None, "knee must be a finite number, got None"),
-        ("walk", "rise_again", [1.0], r"rise_again must be 2 finite numbers, got \(1.0,\)"),
-        ("foot", "via_pitch", 0.5, "via_pitch must be finite numbers, got 0.5"),
+        ("walk", "lean", "x", "lean must be a number within ±10, got 'x'"),
+        ("walk", "rise", float("nan"), "rise must be a number within ±10, got nan"),
+        ("walk", "knee", None, "knee must be a number within ±10, got None"),
+        ("walk", "rise_again", [1.0], r"rise_again must be 2 numbers within ±10, got \(1.0,\)"),
+        ("foot", "via_pitch", 0.5, "via_pitch must be numbers within ±10, got 0.5"),
+        ("walk", "knee", 1e308, r"knee must be a number within ±10, got 1e\+308"),
+        ("foot", "roll_power", 0.0, "roll_power must be > 0, got 0"),
+        ("foot", "heel_radius", -0.1, "heel_radius must be >= 0 m, got -0.1"),
         ("foot", "via_up", [0.1], "via_forward, via_up and via_pitch must be equally many"),
     ],
 )
