@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet docs clean
+.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet docs lock clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -28,16 +28,29 @@ help:
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
 	@echo "make feet     what feet are worth, from committed people and policies; goes on after a stop; FULL=1: searches, trains"
-	@echo "make install  only $(VENV), from constraints.txt; the others do it by themselves"
+	@echo "make install  only $(VENV), from requirements.lock; the others do it by themselves"
+	@echo "make lock     requirements.lock anew: the versions of constraints.txt with the hash of every file"
 	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
 install: $(VENV)/installed
 
-$(VENV)/installed: pyproject.toml constraints.txt
+# A CPU build of torch that is there already stays.
+$(VENV)/installed: pyproject.toml constraints.txt requirements.lock
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --disable-pip-version-check --constraint constraints.txt --editable ".[train,dev]"
+	$(BIN)/pip install --disable-pip-version-check --require-hashes --no-deps --requirement requirements.lock
+	$(BIN)/pip install --disable-pip-version-check --constraint constraints.txt torch
+	$(BIN)/pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
+
+# What .[train,dev] and torch need, without torch, whose builds differ, and its CUDA.
+lock:
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/pip install --disable-pip-version-check --constraint constraints.txt uv
+	printf '%s\n' filelock fsspec jinja2 networkx sympy typing-extensions | UV_CUSTOM_COMPILE_COMMAND="make lock" \
+	  build/lock/bin/uv pip compile pyproject.toml - --extra train --extra dev --constraint constraints.txt \
+	  --override <(echo "torch ; sys_platform == 'never'") --no-emit-package torch \
+	  --generate-hashes --universal --python-version 3.11 --no-annotate --quiet --output-file requirements.lock
 
 # runs/walk is the first, runs/walk-2 the next: train.py refuses a folder that already holds a run.
 walk: install

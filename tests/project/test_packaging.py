@@ -27,6 +27,8 @@ from springfoot.extras import EXTRA_OF
 ROOT = Path(__file__).parents[2]
 ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+EXTRAS = ("evaluate", "train", "dev")
+"""Extras of `make install`."""
 
 
 def files(*folders):
@@ -227,10 +229,33 @@ def test_a_type_checker_finds_a_users_mistake(users_python, tmp_path):
     assert any('"height"' in line for line in verdict(wrong, "strict", users_python, tmp_path))
 
 
-def test_constraints_pin_every_requirement_inside_its_range():
+@pytest.fixture(scope="module")
+def pins():
+    """Name -> version of `constraints.txt`."""
     lines = re.findall(r"^([\w.-]+)==([\w.]+)", (ROOT / "constraints.txt").read_text(), re.MULTILINE)
-    pins = {canonicalize_name(name): pin for name, pin in lines}
-    assert len(pins) == len(lines)
+    found = {canonicalize_name(name): pin for name, pin in lines}
+    assert len(found) == len(lines)
+    return found
+
+
+def test_the_lock_has_the_pinned_version_and_the_hashes_of_all_but_torch(pins):
+    text = (ROOT / "requirements.lock").read_text()
+    entry = r"^([\w.-]+)==([\w.]+)(?: ; (.+))? \\\n((?:    --hash=sha256:[0-9a-f]{64}(?: \\)?\n)+)"
+    entries = re.findall(entry, text, re.MULTILINE)
+    assert re.sub(entry, "", text, flags=re.MULTILINE).count("\n") == 2  # the command that made it
+    versions = {canonicalize_name(name): version for name, version, system, _ in entries if "win32" not in system}
+    assert versions == {name: pins[name] for name in versions}
+    extras = PROJECT["project"]["optional-dependencies"]
+    lines = [*PROJECT["project"]["dependencies"], *(line for extra in EXTRAS for line in extras[extra])]
+    names = {canonicalize_name(Requirement(line).name) for line in lines}
+    assert names - versions.keys() == {"torch", "springfoot"}
+
+
+def test_the_backend_that_builds_is_the_pinned_one(pins):
+    assert PROJECT["build-system"]["requires"] == [f"setuptools=={pins['setuptools']}"]
+
+
+def test_constraints_pin_every_requirement_inside_its_range(pins):
     extras = PROJECT["project"]["optional-dependencies"].values()
     for line in [*PROJECT["project"]["dependencies"], *(line for extra in extras for line in extra)]:
         requirement = Requirement(line)
