@@ -51,6 +51,7 @@ def flagged(*words: str) -> dict:
 def test_flags_that_were_not_given_are_not_given():
     assert flagged() == {}
     assert flagged("--height", "1.8", "--start", "random") == {"height": 1.8, "start": "random"}
+    assert flagged("--stop-at", "None", "--height-range", "None") == {"stop_at": None, "height_range": None}
 
 
 def test_help_groups_the_settings_by_theme_and_says_what_a_trained_policy_brings(monkeypatch, capsys):
@@ -76,6 +77,8 @@ def test_flags_take_the_place_of_the_preset():
     assert config.environment.height == 1.8
     assert config.environment.ankle_stiffness_range == (30.0, 300.0)
     assert config.environment.push_newton == preset.environment.push_newton
+    assert PRESETS["any-body"].environment.height_range is not None
+    assert train_command.configured(PRESETS["any-body"], {}, {"height_range": None}).environment.height_range is None
 
 
 def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):

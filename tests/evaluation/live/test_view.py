@@ -2,10 +2,12 @@
 
 import asyncio
 import re
+import resource
 import socket
 import threading
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,6 +89,12 @@ def send(view, uuid, updates):
     asyncio.run_coroutine_threadsafe(handled, view._gui._event_loop).result(10)
 
 
+def megabytes():
+    """Memory of this process that lies in RAM [MB]."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
 @pytest.mark.parametrize("count", [500, pytest.param(5000, marks=pytest.mark.slow)])
 def test_a_walk_outlives_any_message(view, count):
     """Any property of any input, with values of any type, as any program that reaches the port may send them."""
@@ -94,12 +102,16 @@ def test_a_walk_outlives_any_message(view, count):
     handles = view._gui._gui_input_handle_from_uuid
     properties = ["value", "value", "value", "gui_api", "min", "max", "update_cb", "removed", "props", "is_button", "x"]
     before = {uuid: (vars(handle._impl).copy(), type(handle.value)) for uuid, handle in handles.items()}
-    for _ in range(count):
+    used = []
+    for number in range(count):
+        if number in (count // 5, count - 1):
+            used.append(megabytes())
         uuid = ["nobody", *handles][random.integers(1 + len(handles))]
         names = random.choice(properties, random.integers(1, 3))
         send(view, uuid, {str(name): VALUES[random.integers(len(VALUES))] for name in names})
     session, shown = view._session, view.frames
     assert reaches(lambda: view.frames > shown + 20)
+    assert used[1] - used[0] < 20.0, used
     changing = {"value", "update_timestamp", "props"}
     for uuid, handle in handles.items():
         now, (state, kind) = vars(handle._impl), before[uuid]
