@@ -189,6 +189,7 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     for index in reversed(range(len(LEG_SEGMENTS))):
         mass, inertia = _inertial(body)[index]
         com, acceleration = _com(body, motion, joints, index)
+        # Newton and Euler about the segment's CoM, less the ground's push and the loads at the joint below.
         below = force, turning
         force = mass * (acceleration - gravity(slope)) + below[0]
         turning = inertia * motion.acceleration[..., index] + below[1]
@@ -240,8 +241,9 @@ def _inertial(body: Body) -> tuple[tuple[float, float], ...]:
 def _com(body: Body, motion: LegMotion, joints: list[NDArray], index: int) -> tuple[NDArray, NDArray]:
     """Return the CoM (..., 2) [m] of a segment and its acceleration [m/s^2], along the chain from the hip."""
     forward, below = body.foot_com
-    own = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
-    com = joints[index] + np.stack(turned(motion.turn[..., index], *own[index]), -1)
+    com_from_joint = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
+    com = joints[index] + np.stack(turned(motion.turn[..., index], *com_from_joint[index]), -1)
+    # From the hip down, each segment adds its tangential and centripetal acceleration.
     acceleration = motion.hip_acceleration
     for segment, (start, end) in enumerate(zip(joints[: index + 1], [*joints[1 : index + 1], com], strict=True)):
         across = end - start

@@ -10,7 +10,7 @@ from .body import Body
 
 
 def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:
-    """Return the vector (forward, up) of a flat foot, in a foot at `pitch`."""
+    """Turn a vector (forward, up) of a flat foot by `pitch` [rad], toes up positive."""
     return forward * np.cos(pitch) - up * np.sin(pitch), forward * np.sin(pitch) + up * np.cos(pitch)
 
 
@@ -20,23 +20,25 @@ def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float 
     The `shape` is a power; or, for a polynomial of 2nd to 4th order, the fraction of `top` half-way and the rate at the
     end over the mean rate.
     """
-    lasts = end - start
-    done = np.maximum((np.asarray(phase) - start) / lasts, 0.0)
+    duration = end - start
+    done = np.maximum((np.asarray(phase) - start) / duration, 0.0)
     if isinstance(shape, tuple):
         half, fast = shape
         # a + b + c = 1, 4 a + 2 b + c = 16 half, 2 a + 3 b + 4 c = fast
         a = 16 * half - 5 + fast
         b = 14 - 32 * half - 3 * fast
-        way = Polynomial([0.0, 0.0, a, b, 1 - a - b])
-        return top * np.stack([way.deriv(n)(done) / lasts**n for n in range(3)])
+        curve = Polynomial([0.0, 0.0, a, b, 1 - a - b])
+        return top * np.stack([curve.deriv(n)(done) / duration**n for n in range(3)])
     power = shape
-    rate = top * power / lasts * done ** (power - 1)
-    return np.stack([top * done**power, rate, top * power * (power - 1) / lasts**2 * done ** (power - 2)])
+    rate = top * power / duration * done ** (power - 1)
+    return np.stack([top * done**power, rate, top * power * (power - 1) / duration**2 * done ** (power - 2)])
 
 
 def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
-    """Return (3, 3, ...): x, z, pitch of an ankle whose foot turns about a point of its flat place, two phase
-    derivatives."""
+    """Return (3, 3, ...): x, z, pitch of the ankle while a foot turns about a fixed `pivot`, and two phase derivatives.
+
+    `pitch` (3, ...) [rad] has two phase derivatives too; `pivot` (x, z) [m] is in the frame of the flat foot.
+    """
     ankle = turning(pitch, -pivot[0], body.ankle_height - pivot[1])
     ankle[0, 0] += pivot[0]
     ankle[0, 1] += pivot[1]
