@@ -19,13 +19,13 @@ from springfoot.arrays import NDArray
 from ..body.body import gravity
 
 STEP_SAMPLES = 240
-"""Knots of the tabulated CoM path in a step; with quintics between them its error stays that of the integration."""
+"""Knots of the tabulated CoM path in a step; quintics between the knots add no error to that of the integration."""
 
 
 def zmp(
     x: ArrayLike, z: ArrayLike, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0
 ) -> NDArray:
-    """Return the ZMP [m] by equation (1) of a CoM at `x`, `z` [m] with accelerations [m/s^2]; broadcasts.
+    """Compute the ZMP [m] by equation (1) from a CoM at `x`, `z` [m] with accelerations [m/s^2]; broadcasts.
 
     On a `slope` [rad], uphill positive, x is along the ground and z at right angles to it.
     """
@@ -37,21 +37,21 @@ def zmp(
 class HyperbolicPath:
     """x(t) of a CoM at constant height over a piecewise polynomial ZMP, in closed form; made by `closed_form`.
 
-    In each piece x is a polynomial plus a cosh and a sinh. These two are kept as exp(-rate (t - start)) and exp(rate (t
-    - end)), which lose no digits in a long piece.
+    In each piece x is a polynomial plus a cosh and a sinh, kept as exp(-rate (t - start)) and exp(rate (t - end)):
+    both are at most 1, so a long piece loses no digits.
     """
 
     polynomial: PPoly
     """The particular solution [m], which follows the ZMP."""
     rate: float
-    """sqrt(g cos a / z) [1/s]."""
+    """sqrt(g cos a / z) [1/s], a the slope."""
     fading: NDArray
     """(pieces,) coefficients of exp(-rate (t - start)) [m]."""
     growing: NDArray
     """(pieces,) coefficients of exp(rate (t - end)) [m]."""
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """Return the position [m] at `time` [s] in the range of the ZMP, or a time derivative of it."""
+        """Return the position [m] at `time` [s] in the range of the ZMP, or a time derivative of the position."""
         time = np.asarray(time, float)
         knots = self.polynomial.x
         piece = np.clip(np.searchsorted(knots, time, "right") - 1, 0, len(knots) - 2)
@@ -90,7 +90,10 @@ class Bob:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComMotion:
-    """A CoM that repeats itself every step, one step further on; times [s] within a step, made by `periodic_com`."""
+    """Motion of a CoM that repeats every step, one step length further on; made by `periodic_com`.
+
+    Times [s] are within a step.
+    """
 
     step_time: float
     """Duration of a step [s]."""
@@ -99,7 +102,7 @@ class ComMotion:
     bob: Bob
     """Rise and fall of the CoM."""
     slope: float = 0.0
-    """Slope of the ground [rad], uphill positive: x is along it, z at right angles to it."""
+    """Slope of the ground [rad], uphill positive: x is along the ground, z at right angles to it."""
     path: PPoly | HyperbolicPath = field(repr=False)
     """Forward position x [m] over time [s]; `path(time, n)` is its n-th derivative."""
     ahead: PPoly | None = field(default=None, repr=False)
@@ -136,12 +139,12 @@ def periodic_com(
     slope: float = 0.0,
     ahead: PPoly | None = None,
 ) -> ComMotion:
-    """Return the one CoM motion over a ZMP that repeats itself every step.
+    """Compute the only periodic CoM motion over a ZMP that repeats every step.
 
     The ZMP p [m] runs straight between `zmp_points` at `zmp_times` [s] (first 0, last the step time T). The height
-    is z = height - amplitude cos(2 pi (t - lowest_at) / T) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a
-    the `slope` [rad], with x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `amplitude` is 0,
-    else with an error below 1e-9 m. `ahead` [m] over time [s] is that of `ComMotion`: it stands beside x on the right.
+    is z = height + bob(t) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a the `slope` [rad], with
+    x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `bob.amplitude` is 0, else with an error below
+    1e-9 m. With `ahead` [m] over time [s] (`ComMotion`) x + ahead replaces x on the right-hand side.
     """
     if ahead is not None:
         path = _stepped(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
@@ -161,9 +164,9 @@ def periodic_com(
 
 
 def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.0) -> HyperbolicPath:
-    """Return the CoM path at constant `height` [m] over a ZMP of any degree and number of pieces, repeating with it.
+    """Solve for the periodic CoM path at constant `height` [m] over a piecewise polynomial ZMP of any degree.
 
-    `zmp` [m] over the time of one step [s] starts again `step_length` further on; it may jump. The polynomial
+    `zmp` [m] over the time of one step [s] starts again `step_length` [m] further on; jumps are allowed. The polynomial
     p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
     exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
     """
@@ -175,21 +178,23 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     coefficients[-1] += height * back / down
     polynomial = PPoly(coefficients, zmp.x)
 
-    # What the polynomials lack at the end of each piece to go on as the next one does, in x and in x' / rate.
-    lasts = np.diff(zmp.x)
+    # Jumps of the polynomials, in x and in x' / rate, from the end of each piece to the start of the next: the
+    # exponentials have to close them.
+    durations = np.diff(zmp.x)
     velocity = polynomial.derivative().c
-    jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, lasts)
+    jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, durations)
     jump[-1] += step_length
-    kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, lasts)) / rate
-    # Their sum determines the growing exponentials alone, their difference the fading ones.
-    decay = np.exp(-rate * lasts)
-    this = np.eye(len(lasts))
-    following = np.roll(this, 1, axis=1)
+    kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, durations)) / rate
+    # The sum of both jumps involves the growing exponentials alone, the difference the fading exponentials: one linear
+    # system each, over all pieces, the last one followed by the first.
+    decay = np.exp(-rate * durations)
+    this_piece = np.eye(len(durations))
+    next_piece = np.roll(this_piece, 1, axis=1)
     return HyperbolicPath(
         polynomial=polynomial,
         rate=rate,
-        fading=np.linalg.solve(this * decay - following, (jump - kick) / 2),
-        growing=np.linalg.solve(this - following * decay, (jump + kick) / 2),
+        fading=np.linalg.solve(this_piece * decay - next_piece, (jump - kick) / 2),
+        growing=np.linalg.solve(this_piece - next_piece * decay, (jump + kick) / 2),
     )
 
 
@@ -201,7 +206,7 @@ def _integrated(
     bob: Bob,
     slope: float,
 ) -> PPoly:
-    """Return the path of `periodic_com` as the sum of one particular and two homogeneous solutions that is periodic."""
+    """Return the path of `periodic_com`: the periodic sum of one particular and two homogeneous solutions."""
     step_time = zmp_times[-1]
     back, down = -gravity(slope)
 
@@ -229,6 +234,7 @@ def _integrated(
     t = np.append(np.concatenate(times), step_time)
     x, v = np.column_stack([*states, state]).reshape(2, 3, -1)
 
+    # Weights of the homogeneous solutions, x(0) and x'(0), that make x and x' periodic.
     ends = np.array([x[:, -1], v[:, -1]])
     start_state = np.linalg.solve(ends[:, 1:] - np.eye(2), np.array([step_length, 0.0]) - ends[:, 0])
     weights = np.array([1.0, *start_state])
@@ -250,7 +256,8 @@ def _stepped(
 ) -> PPoly:
     """Return the path of `periodic_com` with a pivot `ahead` of the CoM, by Runge-Kutta steps of `STEP_SAMPLES` a step.
 
-    The equation is linear, so each step is a matrix on (x, x', 1), and the product of all has the periodic start.
+    The equation is linear, so each Runge-Kutta step is a matrix on (x, x', 1). The product of all matrices over a step
+    of the walk gives the periodic start.
     """
     step_time = zmp_times[-1]
     back, down = -gravity(slope)
@@ -261,6 +268,7 @@ def _stepped(
     t = np.append(np.concatenate(pieces), step_time)
 
     def equation(time: NDArray) -> NDArray:
+        # rate of change of (x, x', 1) as a matrix, (times, 3, 3)
         z = height + bob(time)
         pull = (down + bob(time, 2)) / z
         matrix = np.zeros((len(time), 3, 3))
@@ -270,14 +278,14 @@ def _stepped(
         return matrix
 
     at = equation(t)
-    lasts = np.diff(t)[:, None, None]
+    tick = np.diff(t)[:, None, None]
     unit = np.eye(3)
     middle = equation(0.5 * (t[1:] + t[:-1]))
     first = at[:-1]
-    second = middle @ (unit + lasts / 2 * first)
-    third = middle @ (unit + lasts / 2 * second)
-    fourth = at[1:] @ (unit + lasts * third)
-    steps = unit + lasts / 6 * (first + 2 * second + 2 * third + fourth)
+    second = middle @ (unit + tick / 2 * first)
+    third = middle @ (unit + tick / 2 * second)
+    fourth = at[1:] @ (unit + tick * third)
+    steps = unit + tick / 6 * (first + 2 * second + 2 * third + fourth)
     through = [unit]
     for step in steps:
         through.append(step @ through[-1])
@@ -288,6 +296,7 @@ def _stepped(
     v = state[:, 1]
     a = (at @ state[..., None])[:, 1, 0]
     h = np.diff(t)
+    # Quintics by position, velocity and acceleration at their ends, as Bernstein coefficients.
     bernstein = [x[:-1], x[:-1] + h * v[:-1] / 5, x[:-1] + 2 * h * v[:-1] / 5 + h**2 * a[:-1] / 20]
     bernstein += [x[1:] - 2 * h * v[1:] / 5 + h**2 * a[1:] / 20, x[1:] - h * v[1:] / 5, x[1:]]
     return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))

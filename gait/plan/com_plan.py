@@ -1,8 +1,8 @@
 """Plan a CoM over one step, without legs; and the CoM over people's zero-moment point (ZMP).
 
-The planned legs of `plan_walk` stand on a flat toe to the end of a double support shorter than people's: under an
-upright trunk people's ZMP would take them from people's angles. A body on people's legs (`envs`) follows this CoM
-instead: same steps, time and height, over people's ZMP.
+In `plan_walk` the toe stays flat until the end of a double support shorter than people's: under an upright trunk
+people's ZMP would take the legs away from people's angles. A body on people's legs (`envs`) follows the CoM of this
+module instead: the same steps, time and height, over people's ZMP.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ LOWEST = 0.065
 class ComPlan:
     """The CoM of a periodic walk.
 
-    Step phase 0..1 runs from the heel strike of the leading foot to that of the other foot. Its frame has x [m] forward
+    Step phase 0..1 runs from the heel strike of the leading foot to that of the other foot. The frame has x [m] forward
     of the leading (stance) foot's ankle when flat, z [m] up from the floor. Phases may have any shape and are taken
     modulo 1. On a slope x is along the ground and z at right angles to it.
     """
@@ -76,7 +76,7 @@ class ComPlan:
 
     def pivot(self, step_phase: ArrayLike) -> Point:
         """Return the point (x, z) [m] to which the ground reaction force points: the CoM, or with swinging legs a point
-        ahead of it."""
+        ahead of the CoM."""
         return self.motion.pivot(self._time(step_phase))
 
     def zmp(self, step_phase: ArrayLike) -> NDArray:
@@ -84,13 +84,14 @@ class ComPlan:
         return self.motion.zmp(self._time(step_phase))
 
     def _time(self, step_phase: ArrayLike) -> NDArray:
+        """Return the time [s] within a step."""
         return np.mod(np.asarray(step_phase, float), 1.0) * self.step_time
 
 
 def over_peoples_zmp(plan: ComPlan) -> ComPlan:
-    """Return the steps, height, rise and slope of `plan`, its CoM over people's ZMP.
+    """Plan the CoM over people's ZMP for the steps, height, rise and slope of `plan`.
 
-    Double support lasts `PEOPLES_SHARE` of that of `plan.human`; in single support the ZMP runs straight along
+    Double support lasts `PEOPLES_SHARE` of that of `plan.human`. In single support the ZMP runs straight along
     `PEOPLES_ZMP`.
     """
     double_support = PEOPLES_SHARE * (2 * plan.human.toe_off - 1) * plan.step_time

@@ -1,6 +1,6 @@
 """Compute the effort of a stride, planned or simulated: work and muscle excitation of its moments, joint accelerations.
 
-It uses no walk of people's. All terms are dimensionless, so that they keep their weights with body and speed.
+Effort uses no data of people's walks. All terms are dimensionless, so the same prices suit every body and speed.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "t
 rounded: the order of the maximal voluntary moments of young adults on dynamometers; of the toe a guess."""
 VOLUME = {"hip": (0.25, 0.13), "knee": (0.25, 0.10), "ankle": (0.15, 0.033), "toe": (0.02, 0.015)}
 """Volume of the muscles that extend and that flex each joint, over the volume of all the leg's muscles [-]; rounded,
-after Handsfield et al., J. Biomech. 47 (2014) 631-638; of the toe a guess. Activation is weighted by it: a small
-muscle tires, but costs little."""
+after Handsfield et al., J. Biomech. 47 (2014) 631-638; of the toe a guess. The volume weighs the
+squared activation: a small muscle tires, but costs little."""
 ACTIVATION_TIME = 0.05
 """Time constant with which a muscle's activation follows its excitation [s]; chosen, as models of muscles have it."""
 _ANKLE = JOINTS.index("ankle")
@@ -35,7 +35,7 @@ Orthopaedic Surgeons (1965)."""
 
 PRICES = (1.0, 1.0, 1.0, 3.0)
 """Price of a unit of work, activation, its rate, and acceleration; chosen: energy and squared excitation weigh alike,
-and acceleration no more than they. Without acceleration a foot may swing up and down for nothing."""
+and acceleration no more than either. Without a price on acceleration a foot may swing up and down for nothing."""
 PER_DEGREE = 0.1
 """Effort of a joint beyond its range, in a search [1/deg]; chosen."""
 
@@ -83,7 +83,7 @@ AS_IS = Muscle()
 
 
 def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
-    """Return the effort of a plan."""
+    """Compute the effort of a planned stride, with moments by inverse dynamics."""
     body = plan.body
     phase = np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
     motion, load = planned_leg(plan, phase)
@@ -102,30 +102,33 @@ def effort_of_stride(
     distance: float,
     muscle: Muscle = AS_IS,
 ) -> Effort:
-    """Return the effort of a stride of `distance` [m] in `stride_time` [s] with equal legs, half a stride apart.
+    """Compute the effort of a stride of `distance` [m] in `stride_time` [s] with equal legs, half a stride apart.
 
-    `angle`, `rate` and `moment` (S, 4) are one leg's at hip (thigh to the vertical), knee, ankle and toe, evenly over
-    the stride: flexion and dorsiflexion positive [rad], [rad/s], extension and plantarflexion positive [N m]. Without a
-    `rate` it is derived from the angle.
+    Columns of `angle`, `rate` and `moment` (S, 4) are hip (thigh to the vertical), knee, ankle and toe of one leg, rows
+    even samples of the stride. Flexion and dorsiflexion [rad], [rad/s] are positive; in moments [N m] extension and
+    plantarflexion. Without a `rate` the angle is differentiated.
     """
     tick = stride_time / len(angle)
     toe = JOINTS.index("toe")
     rate = _change(angle, tick) if rate is None else rate
     acceleration = _change(rate[:, :toe], tick)
+    # Muscles supply the moments beyond those of passive tissue.
     moment = moment - muscle.tissue * passive_moments(body, angle)
     power = (-moment * rate)[:, :toe]
+    # Calf fibres also supply the rate of the tendon's elastic energy, pull^2 / (2 K).
     pull = np.maximum(moment[:, _ANKLE], 0.0)
     power[:, _ANKLE] += muscle.tendon * pull * _change(pull, tick) / (TENDON * body.stiffness_scale)
+    # metabolic energy [J] of one leg
     spent = (
         np.maximum(power, 0.0).sum() / MUSCLE_EFFICIENCY[0] + np.maximum(-power, 0.0).sum() / MUSCLE_EFFICIENCY[1]
     ) * tick
     activation = moment / _strength(body, moment)
     change = _change(activation, tick)
-    bent = np.degrees(angle)
+    angle_deg = np.degrees(angle)
     beyond = 0.0
     for joint, (least, most) in MOTION_RANGE_DEG.items():
-        own = bent[:, JOINTS.index(joint)]
-        beyond += max(0.0, float(own.max()) - most) + max(0.0, least - float(own.min()))
+        curve = angle_deg[:, JOINTS.index(joint)]
+        beyond += max(0.0, float(curve.max()) - most) + max(0.0, least - float(curve.min()))
     weight = _of_groups(VOLUME, moment) / np.mean(list(VOLUME.values()))
     return Effort(
         work=float(2 * spent / (body.total_mass * GRAVITY * distance)),
@@ -137,23 +140,25 @@ def effort_of_stride(
 
 
 def _change(values: NDArray, tick: float) -> NDArray:
-    """Return the time derivative of values that repeat every stride."""
+    """Return the time derivative, by central differences, of values (S, ...) that repeat every stride."""
     return (np.roll(values, -1, 0) - np.roll(values, 1, 0)) / (2 * tick)
 
 
 def _joints(turns: NDArray) -> NDArray:
-    """Return (..., 4) hip, knee, ankle and toe, flexion and dorsiflexion positive, from turns of thigh, shank, foot,
-    toe."""
+    """Return joint angles or rates (..., 4) of hip, knee, ankle, toe from those of segments (`LEG_SEGMENTS`).
+
+    Flexion and dorsiflexion are positive; the hip's is the thigh to the vertical.
+    """
     thigh, shank, foot, toe = np.moveaxis(turns, -1, 0)
     return np.stack([thigh, thigh - shank, foot - shank, toe - foot], -1)
 
 
 def _strength(body: Body, moment: NDArray) -> NDArray:
-    """Return the strength [N m] of the muscles that make each of the moments (..., 4)."""
+    """Return the strength (..., 4) [N m] of the muscles that make the moments (..., 4), by their signs."""
     return body.mass * GRAVITY * body.height * _of_groups(STRENGTH, moment)
 
 
 def _of_groups(table: dict[str, tuple[float, float]], moment: NDArray) -> NDArray:
-    """Return (..., 4) the table's number of the muscles that make each of the moments (..., 4)."""
+    """Return the table's number (..., 4) for extensors where the moment (..., 4) is positive, else for flexors."""
     extending, flexing = np.array([table[joint] for joint in JOINTS]).T
     return np.where(moment > 0.0, extending, flexing)

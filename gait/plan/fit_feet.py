@@ -34,7 +34,7 @@ STANDARD = Body()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """A walk with a given CoM, up to its height."""
+    """Walk at one speed for the fit; the CoM follows the plan, except for the height."""
 
     plan: WalkPlan
     zmp_times: NDArray
@@ -45,6 +45,7 @@ class Case:
         """Return the weighted errors of the joints [deg] with the present constants, and the cost of the floor."""
         path = feet_under_zmp(STANDARD, self.plan.step_length, self.zmp_times, self.zmp_points, self.plan.feet.roll)
         motion = self.plan.motion
+        # Three rounds settle the CoM height at which the straightest knee has its least flexion.
         for _ in range(3):
             legs = legs_under_com(STANDARD, motion, path, self.plan.human)
             lacking = float(legs.reach.max()) - full_reach(STANDARD, STRAIGHTEST_KNEE)
@@ -72,7 +73,7 @@ def case(speed: float) -> Case:
 
 
 def constants() -> NDArray:
-    """Return the constants at a roll of 1, in the order of `use`."""
+    """Return the constants at a roll of 1, as an array in the order of `use`."""
     return np.array(
         [
             *(foot_style.TOE_ROCKER_POWER[1], foot_style.ROLL_POWER),
@@ -82,7 +83,7 @@ def constants() -> NDArray:
 
 
 def use(values: NDArray) -> None:
-    """Replace the constants at a roll of 1."""
+    """Replace the constants at a roll of 1 in `foot_style` by `values`, in the order of `constants`."""
     toe_power, roll_power, *via = map(float, values)
     foot_style.TOE_ROCKER_POWER = (foot_style.TOE_ROCKER_POWER[0], toe_power)
     foot_style.ROLL_POWER = roll_power
@@ -96,7 +97,7 @@ def main() -> None:
 
     def errors(values: NDArray) -> NDArray:
         use(values)
-        return np.concatenate([each.errors() for each in cases])
+        return np.concatenate([walk.errors() for walk in cases])
 
     start = constants()
     least = np.full(start.shape, -np.inf)

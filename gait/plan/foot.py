@@ -22,14 +22,14 @@ from ..body.rockers import rising, rolling, turned, turning
 from .foot_style import FootStyle, peoples_style
 
 ROCKER_MARGIN = 0.005
-"""Travel of the ZMP by which foot flat comes earlier, and heel-off later, than needed [m at 1.70 m]; chosen."""
+"""Travel of the ZMP by which foot flat is earlier, and heel-off later, than necessary [m at 1.70 m]; chosen."""
 QUICKEST_FOOT_FLAT = 0.02
 """Earliest stride phase of foot flat; chosen: in very short steps the ZMP starts ahead of the landing heel."""
 HEEL_ROCKER_POWER = 2
-"""Power with which the pitch falls over the rest of the heel rocker; chosen: it ends without a jump of its rate."""
+"""Power with which the pitch falls over the rest of the heel rocker; chosen: the rate ends without a jump."""
 
 MID_SWING = (0.3, 0.7)
-"""Parts of the swing between which ball and heel must clear the floor."""
+"""Fractions of the swing between which ball and heel must clear the floor."""
 FLOOR_TOLERANCE = 0.003
 """Largest depth of a swing foot in the floor [m]; chosen: a landing heel slides in at a shallow angle."""
 
@@ -62,8 +62,8 @@ class FootPath:
         return self._jet(stride_phase)[2]
 
     def toe_pitch(self, stride_phase: ArrayLike) -> NDArray:
-        """Return the toe's pitch to the ground [rad] from foot flat to toe-off: 0, and negative as it rolls over its
-        tip."""
+        """Return the toe's pitch to the ground [rad] from foot flat to toe-off: 0, then negative as the toe rolls
+        over its tip."""
         return self._roll(np.clip(np.mod(np.asarray(stride_phase, float), 1.0), self.tip_off, self.toe_off))[0]
 
     def ankle(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -84,8 +84,8 @@ class FootPath:
         )
 
     def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Return the lowest point of the heel (x, z) [m], its back at the sole unless it is round; on the floor until
-        heel-off."""
+        """Return the lowest point of the heel (x, z) [m]: the back of the sole, or a point of a round heel; on the
+        floor until heel-off."""
         x, z, pitch = self._jet(stride_phase)
         back, down = turned(pitch, self.flat_heel, self._heel_radius - self.body.ankle_height)
         return x + back, z + down - self._heel_radius
@@ -97,6 +97,7 @@ class FootPath:
 
     @property
     def _heel_radius(self) -> float:
+        """Return the radius of the heel [m]."""
         return self.style.heel_radius * self.body.length_scale
 
     def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
@@ -144,7 +145,7 @@ class FootPath:
         return self.body.ankle_height - self.body.toe_joint_height
 
     def _jet(self, stride_phase: ArrayLike) -> NDArray:
-        """Return (x, z, pitch) of the ankle at any phases."""
+        """Return (3, ...): x, z [m] and pitch [rad] of the ankle at any phases of the stride."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         heel = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]
         toe = self._toe_rocker(np.clip(phase, self.heel_off, self.toe_off))[0]
@@ -160,6 +161,7 @@ class FootPath:
         rate = -self.heel_strike_pitch * power / self.foot_flat * left ** (power - 1)
         curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * left ** (power - 2)
         jet = rolling(np.stack([pitch, rate, curvature]), (self.flat_heel, self._heel_radius), self.body)
+        # A round heel rolls along the floor as the pitch falls.
         jet[:, 0] -= self._heel_radius * jet[:, 2]
         return jet
 
@@ -170,6 +172,7 @@ class FootPath:
         shape = self.style.heel_rise or self.style.toe_rocker_power
         pitch = rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)
         jet = rolling(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
+        # The toe's roll over its tip moves the toe joint.
         about_tip = turning(self._roll(phase), -body.toe_length, body.toe_joint_height)
         about_tip[0, 0] += body.toe_length
         about_tip[0, 1] -= body.toe_joint_height
@@ -177,7 +180,7 @@ class FootPath:
         return jet
 
     def _roll(self, phase: ArrayLike) -> NDArray:
-        """Return (3, ...): toe to ground over its tip [rad] and two phase derivatives."""
+        """Return (3, ...): pitch of the toe as it rolls over its tip [rad], negative, and two phase derivatives."""
         if self.roll_pitch == 0:
             return np.zeros((3, *np.shape(phase)))
         return rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
@@ -189,10 +192,11 @@ class FootPath:
         start = self._toe_rocker(self.toe_off)
         end = self._heel_rocker(0.0)
         end[0, 0] += 2 * self.step_length
-        way, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
-        forward = start[0, 0] + way * (end[0, 0] - start[0, 0])
+        travelled, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
+        forward = start[0, 0] + travelled * (end[0, 0] - start[0, 0])
         via = np.stack([forward, up * self.body.length_scale + self.lift, pitch], -1)
-        knots = self.toe_off + np.linspace(0.0, 1.0, len(way) + 2) * (1 - self.toe_off)
+        knots = self.toe_off + np.linspace(0.0, 1.0, len(travelled) + 2) * (1 - self.toe_off)
+        # Velocity and acceleration at both ends are those of the rockers.
         ends = ([(1, start[1]), (2, start[2])], [(1, end[1]), (2, end[2])])
         return make_interp_spline(knots, np.stack([start[0], *via, end[0]]), k=5, bc_type=ends)
 
@@ -206,11 +210,11 @@ def feet_under_zmp(
     clearance: float | None = None,
     style: FootStyle | None = None,
 ) -> FootPath:
-    """Return feet whose rockers follow the ZMP, so that the ZMP stays within the feet's parts on the ground.
+    """Plan feet with rockers that follow the ZMP, so that the ZMP stays within the feet's parts on the ground.
 
     The ZMP runs straight between points [m from the stance ankle] at times [s]: heel strike, the other foot's toe-off,
-    perhaps more, the next heel strike. `roll` is that of `FootPath`. `clearance` [m]: as in `plan_walk`. `style` takes
-    the place of people's. Raises `SpringfootError` for a ZMP off the feet and for a step shorter than its travel.
+    perhaps more, the next heel strike. `roll`: see `FootPath`. `clearance` [m]: see `plan_walk`. `style` replaces
+    people's style. Raises `SpringfootError` for a ZMP off the feet, or a step shorter than the ZMP's travel.
     """
     margin = ROCKER_MARGIN * body.length_scale
     heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)
@@ -229,9 +233,11 @@ def feet_under_zmp(
             f"step of {step_length:.3f} m must be longer than the ZMP travel, {zmp_to - zmp_from:.3f} m, "
             f"is {first - zmp_from:.3f} m too short"
         )
+    # Foot flat before the ZMP passes the heel, heel-off after the ZMP has passed the toe joint.
     stride_time = 2 * zmp_times[-1]
     flat, heel_off = np.interp([heel - margin, ball + margin], zmp_points, zmp_times) / stride_time
     toe_off = float(0.5 + zmp_times[1] / stride_time)
+    # A style can only delay heel-off and hasten foot flat: the ZMP stays on the sole.
     if style is not None and style.heel_off is not None:
         heel_off = max(heel_off, 0.5 - 0.5 * style.heel_off)
     if style is not None and style.flat is not None:
@@ -256,10 +262,10 @@ def feet_under_zmp(
     )
     if clearance is not None:
         clearance = require_within("clearance", clearance, (0.0, body.leg_length), "m")
-        flattest = feet.swing_heights(MID_SWING)
-        # The swing is linear in its via points: what each of its points gains by a lift of 1 m.
-        gain = replace(feet, lift=1.0).swing_heights(MID_SWING) - flattest
-        feet = replace(feet, lift=float(((clearance - flattest) / gain).max()))
+        # Heights are linear in the lift of the via points, with the gain at a lift of 1 m as slope.
+        without_lift = feet.swing_heights(MID_SWING)
+        gain = replace(feet, lift=1.0).swing_heights(MID_SWING) - without_lift
+        feet = replace(feet, lift=float(((clearance - without_lift) / gain).max()))
     return feet
 
 

@@ -1,7 +1,7 @@
-"""Describe how a foot rolls off the ground and swings: its pitches at the events, and the shape of its path between
-them.
+"""Describe how a foot rolls off the ground and swings: pitches at the events, and the shape of the path in between.
 
-People's style is chosen and fitted near their curves; a walk predicted from its body alone has another (`walk_style`).
+People's style is chosen and fitted near people's curves; a walk predicted from a body alone has another
+style (`walk_style`).
 """
 
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-# Pairs of constants: over a flat toe (roll 0), and with people's roll over the tip (roll 1); in between along the
-# straight line. Pitches of the latter are people's; the rest was found by least squares against people's thigh, knee
+# Pairs of constants: over a flat toe (roll 0), and with people's roll over the tip (roll 1); linear in between. Pitches
+# at roll 1 are people's; the other constants were found by least squares against people's thigh, knee
 # and, weighing less, ankle curves at 0.8 to 1.7 m/s; at roll 1 by `python -m springfoot.gait.plan.fit_feet`.
 HEEL_STRIKE_PITCH = ((0.293, 2), (0.336, 1))
 """Foot to ground at heel strike: a [rad] and n of a (step length / leg length)^n; the thesis's q_f = 0.13 at its 0.6 m,
@@ -28,7 +28,7 @@ ROLL_POWER = 2.22
 # The swing passes two via points, a third and two thirds through it, and leaves and lands at the rockers' position,
 # velocity and acceleration.
 VIA_FORWARD = ((0.237, 0.693), (0.319, 0.633))
-"""Travel of the ankle at the via points of the swing, as a fraction of its travel from toe-off to heel strike."""
+"""Travel of the ankle at the via points of the swing, as a fraction of the travel from toe-off to heel strike."""
 VIA_UP = ((0.225, 0.104), (0.175, 0.090))
 """Height of the ankle above the floor at the via points [m at 1.70 m]."""
 VIA_PITCH = ((-1.0, -0.183), (-0.746, -0.039))
@@ -56,7 +56,7 @@ class FootStyle:
     roll_power: float
     """Power of the time since the ZMP left the toe tip with which the toe joint rises."""
     via_forward: tuple[float, ...]
-    """Travel of the ankle at the via points of the swing, as a fraction of its travel from toe-off to heel strike."""
+    """Travel of the ankle at the via points of the swing, as a fraction of the travel from toe-off to heel strike."""
     via_up: tuple[float, ...]
     """Height of the ankle above the floor at the via points [m at 1.70 m]."""
     via_pitch: tuple[float, ...]
@@ -65,23 +65,23 @@ class FootStyle:
     """Fraction of the toe-off pitch that the foot has half-way from heel-off, and the rate of its pitch at toe-off over
     the mean rate; None: `toe_rocker_power`."""
     flat: float | None = None
-    """Part of double support after which the landed foot is flat; None: when the ZMP passes its heel."""
+    """Fraction of double support after which the landed foot is flat; None: when the ZMP passes the foot's heel."""
     heel_radius: float = 0.0
-    """Radius of the heel on which the foot rolls as it lands [m at 1.70 m]; 0: it turns about the heel's back."""
+    """Radius of the heel on which the landing foot rolls [m at 1.70 m]; 0: the foot turns about the heel's back."""
     heel_off: float | None = None
-    """Part of the step over which the heel rises before the other foot lands, unless the ZMP passes the toe joint
+    """Fraction of the step over which the heel rises before the other foot lands, unless the ZMP passes the toe joint
     later; None: from the moment at which the ZMP passes."""
     toe_swing: float | None = None
     """Angle of the toe joint in swing [rad]; None: people's curve."""
 
 
 def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: float) -> FootStyle:
-    """Return the style that comes near people's curves.
+    """Return the style with which the legs come near people's curves.
 
     Args:
         stride: step length over leg length.
         roll: roll of the toe over its tip late in stance: 0 for none, 1 for people's.
-        heel_rocker, tip_rocker: duration of the foot's turn about its heel, and of the toe's about its tip [strides].
+        heel_rocker, tip_rocker: durations [strides] of the foot's turn about the heel and the toe's roll over the tip.
     """
     return FootStyle(
         heel_strike_pitch=min(pitch_at(HEEL_STRIKE_PITCH, stride, roll), HEEL_ROCKER_RATE * heel_rocker),
@@ -96,12 +96,12 @@ def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: fl
 
 
 def between(pair: tuple, roll: float) -> NDArray:
-    """Return a constant given at a roll of 0 and of 1."""
+    """Interpolate a constant between its values at a roll of 0 and of 1."""
     return (1 - roll) * np.array(pair[0]) + roll * np.array(pair[1])
 
 
 def pitch_at(pair: tuple, stride: float, roll: float) -> float:
-    """Return a pitch at an event [rad], positive, for a step length over leg length."""
+    """Return a pitch at an event [rad], positive: a stride^n, with `stride` the step length over leg length."""
     return float(between(tuple(a * stride**n for a, n in pair), roll))
 
 

@@ -34,7 +34,7 @@ ZMP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class ProjectionError:
-    """Difference of GRF projection and inverse dynamics, of one joint in one part of the stride."""
+    """Difference between GRF projection and inverse dynamics at one joint, in stance or in swing."""
 
     joint: str
     part: Literal["stance", "swing"]
@@ -43,7 +43,7 @@ class ProjectionError:
     peak: float
     """Largest difference [N m/kg], positive."""
     r: float | None
-    """Pearson's r of the two; None where either does not vary: the projection is 0 in swing."""
+    """Pearson's r of projection and inverse dynamics; None where one is constant: the projection is 0 in swing."""
 
 
 def ground_reaction(mass: float, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0) -> NDArray:
@@ -57,13 +57,13 @@ def ground_reaction(mass: float, x_acceleration: ArrayLike, z_acceleration: Arra
 
 
 def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Divide the total ground reaction between two feet: return forces (..., 2) [N] on the rear and the front one.
+    """Divide the total ground reaction between two feet: return forces (..., 2) [N] on the rear and front foot.
 
     `force` (..., 2) [N] acts through the CoM `com` (..., 2) [m], so that it meets the ground at the ZMP p. Each foot's
     force points from its centre of pressure, p1 and p2 [m], through the CoM; its upward part is (p2 - p)/(p2 - p1) of
-    the total for the rear foot, the rest for the front one. Both together are then `force` at p exactly. In steps
-    shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` if a foot would have to pull: a ZMP that is not
-    between p1 and p2, a force that does not point up.
+    the total on the rear foot, the rest on the front foot. The two forces then add up to `force` at p exactly. In steps
+    shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` if a foot would have to pull: for a ZMP that is
+    not between p1 and p2, or a force that does not point up.
     """
     if not np.all(force[..., 1] > 0):
         raise SpringfootError("the ground can only push: the upward force must be > 0 N")
@@ -88,14 +88,14 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     """Return the ground reaction (..., 2) [N] on one foot of a plan, and its centre of pressure (...) [m], in that
     foot's frame.
 
-    In single support the force is all of equation (2), at the ZMP; in double support `share_forces` gives it. There the
-    centre of pressure of the front foot waits at the heel until the foot is flat, and then goes to the ZMP's place at
-    the other foot's toe-off. That of the rear foot goes on from the ZMP's last place to the tip of the toe, and waits
-    there while the toe rolls over it. So the force of each foot starts and ends at zero. In swing the force is 0, and
-    the centre of pressure stays at the tip of the toe.
+    In single support the stance foot bears the whole force of equation (2) at the ZMP. In double support `share_forces`
+    divides it. The front CoP waits at the heel until foot flat, and then moves to the ZMP's position at the other
+    foot's toe-off. The rear CoP moves from the ZMP's position at heel strike to the tip of the toe, and waits there
+    while the toe rolls over its tip. So the force of each foot starts and ends at zero. In swing the force is 0,
+    and the CoP stays at the tip of the toe.
 
-    In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat: there the rear foot
-    bears all of the force until then, and both centres of pressure stand still while the load passes over.
+    In steps of about a foot's length the ZMP is ahead of the landed heel before the foot is flat. There the rear
+    foot bears the whole force until foot flat, and both CoPs stand still while the load passes over.
     """
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
     second = phase >= 0.5
@@ -103,25 +103,28 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     pivot = np.stack(plan.pivot(step_phase), -1)
     force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
     zmp = plan.zmp(step_phase)
-    shared = step_phase <= 2 * plan.feet.toe_off - 1
+    double_support = step_phase <= 2 * plan.feet.toe_off - 1
     rear, front = _double_support_cops(plan, step_phase)
-    # In single support the stance foot bears all of it at the ZMP, as front foot.
-    on_rear, on_front = share_forces(force, pivot, np.where(shared, rear, zmp - 1.0), np.where(shared, front, zmp))
-    own = np.where(second[..., None], np.where(shared[..., None], on_rear, 0.0), on_front)
+    # In single support the stance foot is the front foot and bears the whole force, at the ZMP.
+    on_rear, on_front = share_forces(
+        force, pivot, np.where(double_support, rear, zmp - 1.0), np.where(double_support, front, zmp)
+    )
+    on_this_foot = np.where(second[..., None], np.where(double_support[..., None], on_rear, 0.0), on_front)
     tip = plan.body.ankle_to_toe_joint + plan.body.toe_length
-    on_foot = np.where(shared, front, zmp)
-    return own, np.where(second, np.where(shared, rear + plan.step_length, tip), on_foot)
+    on_foot = np.where(double_support, front, zmp)
+    return on_this_foot, np.where(second, np.where(double_support, rear + plan.step_length, tip), on_foot)
 
 
 def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
     """Return the centres of pressure [m] of the rear and the front foot in double support, in the front foot's
     frame."""
     body = plan.body
+    # Events in step phases: foot flat, and the end of double support.
     flat = 2 * plan.feet.foot_flat
     end = 2 * plan.feet.toe_off - 1
     heel = plan.feet.flat_heel
     tip = body.ankle_to_toe_joint + body.toe_length - plan.step_length
-    at_start, at_flat, at_end = (float(plan.zmp(each)) for each in (0.0, flat, end))
+    at_start, at_flat, at_end = (float(plan.zmp(event)) for event in (0.0, flat, end))
     if at_flat > heel or tip >= at_end:  # a step of about a foot's length: both centres stand still
         return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
     rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)
@@ -131,7 +134,7 @@ def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, 
 
 
 def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, FootLoad]:
-    """Return one leg of a plan over its stride, in its foot's frame: motion and load, for the functions above.
+    """Return motion and load of one leg of a plan over its stride, in the frame of its foot, for inverse dynamics.
 
     The plan is differentiated as a Fourier series of `PLAN_HARMONICS`; forces by `foot_force`.
     """
@@ -153,7 +156,7 @@ def planned_moments(plan: WalkPlan, stride_phase: ArrayLike) -> dict[str, NDArra
 
 
 def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> list[ProjectionError]:
-    """Return how far the GRF projection (Wells 1981) is from inverse dynamics: per joint, in stance and in swing.
+    """Compare the GRF projection (Wells 1981) with inverse dynamics: per joint, in stance and in swing.
 
     Stance is where the ground bears on the foot. For a plan take `planned_leg(plan, phase)` and its slope.
     Samples weigh alike, so take phases evenly. Parts that do not occur are left out.
@@ -165,17 +168,17 @@ def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float
     parts: tuple[tuple[Literal["stance", "swing"], NDArray], ...] = (("stance", stance), ("swing", ~stance))
     for joint in JOINTS:
         for part, where in parts:
-            ours = projection[joint][where] / body.mass
+            projected = projection[joint][where] / body.mass
             exact = dynamics[joint][where] / body.mass
-            if not len(ours):
+            if not len(projected):
                 continue
             rows.append(
                 ProjectionError(
                     joint=joint,
                     part=part,
-                    rms=float(np.sqrt(np.mean((ours - exact) ** 2))),
-                    peak=float(np.abs(ours - exact).max()),
-                    r=correlation(ours, exact),
+                    rms=float(np.sqrt(np.mean((projected - exact) ** 2))),
+                    peak=float(np.abs(projected - exact).max()),
+                    r=correlation(projected, exact),
                 )
             )
     return rows

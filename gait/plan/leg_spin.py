@@ -1,8 +1,8 @@
 """Compute the effect of swinging legs on the ground reaction force.
 
-The cart-table's force points from the ZMP to the CoM: nothing turns. Legs that swing do: their angular momentum L about
-the CoM changes by dL/dt = (p - x) F_z + z F_x, so that the force points from the ZMP p to a pivot, dL/dt / F_z ahead of
-the CoM. With it the hip moments of inverse dynamics are those that keep the trunk upright.
+In the cart-table model nothing turns: the force points from the ZMP to the CoM. Swinging legs turn: their angular
+momentum L about the CoM changes by dL/dt = (p - x) F_z + z F_x, so that the force points from the ZMP p to a pivot,
+dL/dt / F_z ahead of the CoM. With this pivot the hip moments of inverse dynamics keep the trunk upright.
 """
 
 from collections.abc import Callable
@@ -34,19 +34,20 @@ def spinning_legs(
     height: float | None = None,
     lean: float = 0.0,
 ) -> tuple[ComMotion, LegPostures]:
-    """Return the CoM motion that accounts for the legs' angular momentum, and its legs.
+    """Find the CoM motion, and the legs, that agree with the legs' angular momentum.
 
-    The CoM is as high as leaves every knee flexed by `knee` [rad]. `legs_at` plans for a CoM `height` [m], which may be
-    given, and a pivot; `still` is the pivot of legs that do not turn; `lean` [rad] is that of the trunk. Raises
-    `SpringfootError` if the rounds do not settle.
+    The mean CoM is at `height` [m], or without a `height` where the straightest knee is flexed by `knee` [rad].
+    `legs_at` plans for a CoM height [m] and a pivot ahead of the CoM [m] over time [s]; `still` is the pivot of legs
+    that do not turn. The trunk leans by `lean` [rad]. Raises `SpringfootError` if the rounds do not settle.
     """
     reach = full_reach(body, knee)
-    given = height
-    height = 1.05 * body.leg_length if given is None else given
+    fixed_height = height
+    height = 1.05 * body.leg_length if fixed_height is None else fixed_height
     ahead = still
+    # Fixed point: the legs under a CoM and a pivot give the next pivot, and the next height.
     for _ in range(ROUNDS):
         motion, legs = legs_at(height, ahead)
-        lacking = float(legs.reach.max()) - reach if given is None else 0.0
+        lacking = float(legs.reach.max()) - reach if fixed_height is None else 0.0
         before = ahead
         ahead = pivot_ahead(body, motion, legs, step_length, lean)
         moved = float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
@@ -65,15 +66,17 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     half = POSTURE_SAMPLES // 2
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     angles = {name: getattr(legs, name) for name in ("thigh", "knee", "ankle", "toe")}
-    still = legs.hip - np.outer(phase, [2 * step_length, 0.0])
-    samples = np.concatenate([segment_turns(angles, motion.slope), still], -1)
+    # The hip without its mean progress repeats every stride, so a Fourier series can differentiate it.
+    hip = legs.hip - np.outer(phase, [2 * step_length, 0.0])
+    samples = np.concatenate([segment_turns(angles, motion.slope), hip], -1)
     leg = motion_of(*fourier_jet(samples, PLAN_HARMONICS, phase, stride_time))
     com = np.stack(motion.position(np.mod(2 * phase, 1.0) * motion.step_time), -1)
     com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)
-    own = spin_rate(body, leg, com)
+    # Rate of change of angular momentum about the CoM [N m]: both legs, half a stride apart, and then the trunk.
+    one_leg = spin_rate(body, leg, com)
     upright = motion.slope + lean
     upper = hypot(*body.upper_moment) * np.array([sin(upright), cos(upright)])
-    turning = own + np.roll(own, -half)
+    turning = one_leg + np.roll(one_leg, -half)
     mass = body.trunk_mass + body.carried_mass
     lever = mass * (leg.hip - com) + upper
     turning += lever[:, 0] * leg.hip_acceleration[:, 1] - lever[:, 1] * leg.hip_acceleration[:, 0]

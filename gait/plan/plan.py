@@ -40,23 +40,24 @@ STEP_TIME_RANGE = (0.25, 1.2)
 THESIS_STEP_TIME = 0.5
 """Step time of the thesis (T_c) [s], at 1.70 m."""
 DOUBLE_SUPPORT = 0.12
-"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. The toe lies flat to its end; in a longer given one
-the toe rolls over its tip, the further the longer, as people's does in their 0.26 at 1.2 m/s."""
+"""Double support over step time [-]: the thesis's 0.06 s of 0.5 s. The toe stays flat until double support ends. In a
+longer double support the toe rolls over its tip, further with its length, as people's toe does in their 0.26 at 1.2
+m/s."""
 LEAST_FULL_ROLL = 0.18
-"""Least double support over step time with people's whole roll [-]; above it the whole roll takes a double support of
-`PEOPLES_SHARE`; chosen: people's own at the fastest, 1.96 m/s."""
+"""Least double support over step time at which the toe rolls as far as people's [-]; otherwise the whole roll takes
+`PEOPLES_SHARE` of people's double support; chosen: people's double support at their fastest, 1.96 m/s."""
 ROLLING_STEP = (1.0, 1.5)
 """Step lengths without a roll and with a whole roll [foot lengths]; chosen: in short steps the tip of the rear foot
 lies beside the front foot."""
 ZMP_TRAVEL = ((-0.020, 0.140), PEOPLES_ZMP)
 """ZMP forward of the stance ankle at the start and end of single support [m at 1.70 m], over a flat toe and at a whole
-roll; in between along the straight line. That of a flat toe is chosen: of the travels tried, it brings the knee
-nearest to people's at 1.2 m/s."""
+roll; linear in between. The travel over a flat toe is chosen: of the travels tried, it brings the knee nearest to
+people's at 1.2 m/s."""
 RISE = 0.65
 """Rise and fall of the CoM over that of the stiff-legged compass gait, step_length^2 / (8 leg_length) [-]; chosen: 39
 mm at 1.2 m/s, where people's is 36 to 39 mm."""
 MOST_UNLOADING = 0.75
-"""Largest part of the weight that rise and fall may take from the feet [-]; chosen; it limits the rise at high
+"""Largest fraction of the weight that rise and fall may take from the feet [-]; chosen; it limits the rise at high
 speeds."""
 
 
@@ -76,14 +77,16 @@ class WalkPlan(ComPlan):
     """Hip x, z [m] in the foot's frame over stride phase, a little beyond 0..1."""
 
     def support(self, step_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Return the rear and front end [m] of the hull of both feet's parts on the ground, in the step's frame."""
+        """Return the rear and front end [m] of the base of support, the hull of all parts of the feet on the ground.
+
+        x is forward of the leading (stance) foot's ankle when flat."""
         phase = np.mod(np.asarray(step_phase, float), 1.0) / 2
         rear, front = self.feet.on_ground(phase)
         rear_of_trailing, front_of_trailing = self.feet.on_ground(phase + 0.5)
-        both = phase + 0.5 <= self.feet.toe_off
+        two_feet = phase + 0.5 <= self.feet.toe_off
         return (
-            np.where(both, np.minimum(rear, rear_of_trailing - self.step_length), rear),
-            np.where(both, np.maximum(front, front_of_trailing - self.step_length), front),
+            np.where(two_feet, np.minimum(rear, rear_of_trailing - self.step_length), rear),
+            np.where(two_feet, np.maximum(front, front_of_trailing - self.step_length), front),
         )
 
     def joint_angles(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
@@ -125,16 +128,16 @@ def plan_walk(
             1.2 m/s, 1.70 m); outside their data both change with the square root of speed. "thesis": 0.5 s a step at
             every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m.
         step_time: [s] in place of the cadence's; the step length follows from the speed.
-        double_support: [s] in place of `DOUBLE_SUPPORT`. In a longer one the toe rolls over its tip, the further the
-            longer, and the default `zmp_travel` lies further forward.
+        double_support: [s] in place of `DOUBLE_SUPPORT`. In a longer double support the toe rolls further over its tip,
+            and the default `zmp_travel` lies further forward.
         com_height: mean [m]; by default the greatest that leaves the knees `STRAIGHTEST_KNEE`.
         com_amplitude: half of rise and fall [m]; 0 keeps the height constant, solved in closed form.
         zmp_travel: ZMP at the start and end of single support, from the stance ankle [m].
         clearance: least height of the swing foot in mid-swing [m] (`FootPath.clearance`; 17 mm at 1.70 m by default).
         slope: [rad], uphill positive. Step time and length, rockers and swing stay those of level ground unless given,
-            so the knees bend more than people's, who change them.
+            so the knees bend more than people's: people change step and swing on a slope.
         human: gait in place of people's (`human_gait`): its step length and time, and its toe in swing.
-        style: choices in place of those by people's curves (`walk_style`); other arguments win over it.
+        style: choices in place of those by people's curves (`walk_style`); the other arguments override the style.
 
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM is
     accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. With a double support
@@ -156,7 +159,7 @@ def plan_walk(
     if double_support is None:
         double_support = (DOUBLE_SUPPORT if style is None else style.double_support) * step_time
     double_support = require_within("double_support", double_support, (0.02, 0.4 * step_time), "s")
-    # Beyond, the feet would have to pull the body down at mid-stance.
+    # The amplitude that takes all weight off the feet at mid-stance; above it they would have to pull the body down.
     weightless = GRAVITY * cos(slope) * (step_time / (2 * pi)) ** 2
     if com_amplitude is None:
         rise = RISE if style is None else style.rise
@@ -166,14 +169,16 @@ def plan_walk(
         com_height = require_within("com_height", com_height, (0.5 * body.height, 0.7 * body.height), "m")
 
     roll = _roll(body, human, double_support, step_time, step_length) if style is None else 1.0
-    # Along a foot that is longer than its body's share the ZMP of a style goes as far as along that share.
-    along = between(ZMP_TRAVEL, roll) if style is None else np.array(style.zmp_travel) * body.foot_ratio
-    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, along)
-    way = [] if style is None or style.zmp_way is None else style.zmp_way
-    on_way = double_support + np.arange(1, len(way) + 1) / (len(way) + 1) * (step_time - double_support)
-    zmp_times = np.array([0.0, double_support, *on_way, step_time])
-    passed = zmp_from + np.array(way) * (zmp_to - zmp_from)
-    zmp_points = np.array([zmp_to - step_length, zmp_from, *passed, zmp_to])
+    # The ZMP travel of a style is for a foot of average length: it scales with the foot's length.
+    default_travel = between(ZMP_TRAVEL, roll) if style is None else np.array(style.zmp_travel) * body.foot_ratio
+    zmp_from, zmp_to = _zmp_travel(body, zmp_travel, default_travel)
+    # Corners of the ZMP's course over a step: heel strike, toe-off of the other foot, the style's points within single
+    # support (none without a style), the next heel strike.
+    covered = [] if style is None or style.zmp_way is None else style.zmp_way
+    times_between = double_support + np.arange(1, len(covered) + 1) / (len(covered) + 1) * (step_time - double_support)
+    zmp_times = np.array([0.0, double_support, *times_between, step_time])
+    points_between = zmp_from + np.array(covered) * (zmp_to - zmp_from)
+    zmp_points = np.array([zmp_to - step_length, zmp_from, *points_between, zmp_to])
     feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance, style and style.foot)
     lean = 0.0 if style is None else style.lean
 
@@ -183,6 +188,7 @@ def plan_walk(
         lowest_at=double_support * (0.5 if style is None else style.lowest),
         second=(0.0, 0.0) if style is None else style.rise_again,
     )
+    # Each search with a pivot starts from the postures of the search before.
     last: list[LegPostures] = []
 
     def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
@@ -217,40 +223,40 @@ def plan_walk(
 
 
 def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
-    """Return step time [s] and length [m]."""
+    """Return step time [s] and step length [m] of a cadence at `speed` [m/s]."""
     if cadence == "thesis":
         step_time = THESIS_STEP_TIME * sqrt(body.length_scale)
         return step_time, speed * step_time
-    # Step length and rate share what is left between people's data and the speed asked for.
-    share = sqrt(speed * human.stride_time / (2 * human.step_length))
-    return human.stride_time / 2 / share, human.step_length * share
+    # Outside the speeds of people's data step length and step rate both change by the same factor.
+    factor = sqrt(speed * human.stride_time / (2 * human.step_length))
+    return human.stride_time / 2 / factor, human.step_length * factor
 
 
 def _roll(body: Body, human: HumanGait, double_support: float, step_time: float, step_length: float) -> float:
-    """Return the `FootPath.roll` of a double support [s]."""
+    """Return the roll of the toe over its tip (`FootPath.roll`, 0 to 1) for a double support [s]."""
     full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
     roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
     return roll * float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
 
 
-def _zmp_travel(body: Body, given: tuple[float, float] | None, otherwise: ArrayLike) -> tuple[float, float]:
-    """Return the ZMP [m] from the stance ankle at the start and end of single support: `given`, or `otherwise` [m at
-    1.70 m]."""
-    if given is None:
-        zmp_from, zmp_to = np.asarray(otherwise) * body.length_scale
+def _zmp_travel(body: Body, travel: tuple[float, float] | None, default: ArrayLike) -> tuple[float, float]:
+    """Return the ZMP [m] from the stance ankle at the start and end of single support: `travel` [m], or without a
+    `travel` the `default` [m at 1.70 m]."""
+    if travel is None:
+        zmp_from, zmp_to = np.asarray(default) * body.length_scale
         return float(zmp_from), float(zmp_to)
-    if not isinstance(given, Sequence | np.ndarray) or len(given) != 2:
-        raise SpringfootError(f"zmp_travel must be 2 numbers (start, end of single support) [m], got {given!r}")
+    if not isinstance(travel, Sequence | np.ndarray) or len(travel) != 2:
+        raise SpringfootError(f"zmp_travel must be 2 numbers (start, end of single support) [m], got {travel!r}")
     bounds = (-body.foot_length, body.foot_length)
-    return require_within("zmp_travel start", given[0], bounds, "m"), require_within(
-        "zmp_travel end", given[1], bounds, "m"
+    return require_within("zmp_travel start", travel[0], bounds, "m"), require_within(
+        "zmp_travel end", travel[1], bounds, "m"
     )
 
 
 def _refuse_zmp_outside(plan: WalkPlan) -> None:
-    """Raise `SpringfootError` for a plan whose ZMP leaves the feet on the ground."""
+    """Raise `SpringfootError` if the ZMP of a plan leaves the feet on the ground."""
     feet = plan.feet
-    # What is on the ground changes at the events: both sides of each are looked at.
+    # The parts of the feet on the ground change at the events: check just before and just after each event.
     events = 2 * np.array([feet.foot_flat, feet.heel_off, feet.tip_off - 0.5, feet.toe_off - 0.5])
     phase = np.concatenate([np.arange(2000) / 2000, events - 1e-9, events + 1e-9])
     rear, front = plan.support(phase)
@@ -271,4 +277,5 @@ def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolato
 
 
 def _named(columns: NDArray) -> dict[str, NDArray]:
+    """Return the columns (..., 4) by the names of `ANGLES`."""
     return dict(zip(ANGLES, np.moveaxis(columns, -1, 0), strict=True))

@@ -1,6 +1,4 @@
-"""Describe a plan as a gait: its own angles, moments and forces in the place of people's, to be followed as a
-target.
-"""
+"""Describe a plan as a gait: the plan's angles, moments and forces replace people's, as a target to follow."""
 
 import numpy as np
 
@@ -23,8 +21,8 @@ FLAT_SHARE = 0.5
 def gait_of(plan: WalkPlan) -> HumanGait:
     """Return the gait of a plan, computed from body, plan and inverse dynamics alone.
 
-    Curves are Fourier series of as many terms as people's are. Moments and powers are for body mass and height as
-    people's are [N m/kg at 1.70 m]. The spread is 0: a plan has none.
+    Curves are Fourier series with as many terms as people's. Moments [N m/kg at 1.70 m] and powers are normalised as
+    people's. The spread is 0: a plan has none.
     """
     body = plan.body
     phase = np.arange(SERIES_SAMPLES) / SERIES_SAMPLES
@@ -61,17 +59,18 @@ def _foot(plan: WalkPlan) -> FootHabits:
     """Return the phases of the schedule of K: the plan's own events, and the other foot's toe-off and landing."""
     feet = plan.feet
     flat = feet.foot_flat
-    off = feet.heel_off
-    leaves = feet.toe_off
-    middle = flat + FLAT_SHARE * (off - flat)
-    begins = max(off, middle + 2 * RAMP)
-    plateaus = (0.0, flat, flat + RAMP, middle, middle + RAMP, begins, begins + RAMP, leaves, leaves + RAMP, 0.95)
+    heel_off = feet.heel_off
+    toe_off = feet.toe_off
+    middle = flat + FLAT_SHARE * (heel_off - flat)
+    push_off = max(heel_off, middle + 2 * RAMP)
+    # start and end of loading, early stance, late stance, push-off and swing
+    plateaus = (0.0, flat, flat + RAMP, middle, middle + RAMP, push_off, push_off + RAMP, toe_off, toe_off + RAMP, 0.95)
     swing = 0.0 if feet.style.toe_swing is None else float(np.degrees(feet.style.toe_swing))
     return FootHabits(
         plateaus=plateaus,
         ankle_quasi_stiffness=None,
         toe_flat=(0.0, flat),
-        toe_off=(leaves, leaves + RAMP),
+        toe_off=(toe_off, toe_off + RAMP),
         toe_swing_deg=swing,
     )
 

@@ -1,6 +1,4 @@
-"""Compute the posture under a planned CoM: leg inverse kinematics, and the hip that puts the body's CoM in its
-place.
-"""
+"""Compute the posture under a planned CoM: leg inverse kinematics, and the hip that puts the body's CoM on the plan."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,9 +32,9 @@ DEEPEST_KNEE_DEG = 135.0
 def leg_angles(
     forward: ArrayLike, down: ArrayLike, thigh_length: float, shank_length: float
 ) -> tuple[NDArray, NDArray]:
-    """Return (thigh to the vertical, knee) [rad], flexion positive, by leg inverse kinematics.
+    """Return thigh (to the vertical) and knee angle [rad], flexion positive, by leg inverse kinematics.
 
-    `forward`, `down` [m]: the ankle from the hip. An ankle out of reach gets a straight knee.
+    The ankle is `forward` of and `down` from the hip [m]. An ankle out of reach gets a straight knee.
     """
     square = np.square(forward) + np.square(down)
     cosine = (square - thigh_length**2 - shank_length**2) / (2 * thigh_length * shank_length)
@@ -47,14 +45,20 @@ def leg_angles(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegPostures:
-    """One leg over its stride, sampled: hip (x, z) and hip to ankle [m], joint angles [rad]."""
+    """One leg's postures; `legs_under_com` samples them over the stride. Flexion, dorsiflexion, toe up positive."""
 
     hip: NDArray
+    """(..., 2) hip (x, z) [m]."""
     thigh: NDArray
+    """(...) thigh to the vertical [rad]."""
     knee: NDArray
+    """(...) [rad]."""
     ankle: NDArray
+    """(...) [rad]."""
     toe: NDArray
+    """(...) [rad]."""
     reach: NDArray
+    """(...) distance from hip to ankle [m]."""
 
 
 def legs_under_com(
@@ -65,13 +69,14 @@ def legs_under_com(
     near: LegPostures | None = None,
     lean: float = 0.0,
 ) -> LegPostures:
-    """Return the postures whose whole-body CoM is the planned one, the trunk upright, or leaning under a load.
+    """Find one leg's postures over the stride that put the whole-body CoM on the planned CoM.
 
-    The search starts at the postures `near`, if given. `lean` [rad] is that of `ComPlan`. Positions are in the frame of
-    the ground; trunk and thigh angles are to the true vertical, whatever the slope.
+    The trunk is upright, or leans under a load. The search starts at the postures `near`, if given. `lean` [rad]: see
+    `ComPlan`. Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, on slopes too.
     """
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)
+    # The foot's frame stays for the whole stride, the CoM's frame moves on with each step.
     com = np.stack([x + feet.step_length * (phase >= 0.5), z])
     ankle, pitch, toe = _feet_over_stride(feet, human)
     half = POSTURE_SAMPLES // 2
@@ -90,8 +95,8 @@ def legs_under_com(
 
 @lru_cache(maxsize=2)
 def _feet_over_stride(feet: FootPath, human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
-    """Return ankle (2, samples), foot pitch and toe angle (samples,); cached, as one plan asks for them a dozen
-    times."""
+    """Return ankle (2, samples), foot pitch and toe angle (samples,); cached: one plan needs the same arrays a
+    dozen times."""
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     return np.stack(feet.ankle(phase)), feet.pitch(phase), toe_angle(feet, human, phase)
 
@@ -107,15 +112,15 @@ def legs_under(
     near: NDArray | None = None,
     lean: float = 0.0,
 ) -> LegPostures:
-    """Return the posture whose whole-body CoM is `com` (2, ...) [m].
+    """Find the hip, and so the legs, that put the whole-body CoM at `com`, over given ankles and feet.
 
     Args:
-        body: of the posture.
+        body: lengths and masses.
         com: (2, ...) CoM (x, z) [m].
-        ankle: (2, ...) [m]; with `pitch` and `toe` it may have an axis of legs where `com` has one of length 1.
-        pitch: (...) of the foot [rad].
+        ankle: (2, ...) ankle (x, z) [m]. `ankle`, `pitch` and `toe` may have an axis of legs where `com` has length 1.
+        pitch: (...) pitch of the foot [rad].
         toe: (...) angle of the toe [rad].
-        both: sums a leg's values over both legs, in the shape of `com`.
+        both: function that sums a leg's values over both legs, in the shape of `com`.
         slope: of the ground [rad].
         near: (2, ...) hip at which the search starts [m].
         lean: pitch of the trunk off the posture with its CoM, and that of a load, upright over the hip [rad].
@@ -125,13 +130,15 @@ def legs_under(
     foot_and_toe = _foot_moment(body, pitch, toe)
     hip = com - np.array([0.0, 0.1 * body.leg_length])[:, *[None] * (com.ndim - 1)] if near is None else near
     trunk = hypot(*body.upper_moment) / body.total_mass
-    # The legs' masses move the hip by a third of what the hip moves them: this contracts quickly.
+    # Fixed point: place the legs below the hip, then move the hip so that the CoM is right. A shift of the hip moves
+    # the legs' masses, which shift the hip by a third as much the next time: the search converges quickly.
     for _ in range(60):
         forward = ankle[0] - hip[0]
         down = hip[1] - ankle[1]
         thigh, knee = leg_angles(forward, down, body.thigh_length, body.shank_length)
         knee_joint = body.thigh_length * np.stack([np.sin(thigh), -np.cos(thigh)])
         shank = np.stack([np.sin(thigh - knee), -np.cos(thigh - knee)])
+        # first mass moment of one leg about the hip [kg m]
         leg = (
             body.thigh_mass * body.thigh_com / body.thigh_length * knee_joint
             + body.shank_mass * (knee_joint + body.shank_com * shank)
@@ -165,20 +172,20 @@ def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
 
 
 def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
-    """Return the toe joint's angle [rad]: flat on the ground in stance, then on its tip; in swing the style's, else
-    people's.
+    """Return the toe joint's angle (samples,) [rad]: flat on the ground in stance, then on the tip, then in swing.
 
-    As the foot goes flat, the toe is laid down with it.
+    The swing angle is the style's, or people's curve. From heel strike to foot flat the toe goes down in proportion to
+    the foot's pitch.
     """
-    swing = feet.style.toe_swing
-    at_toe_off = human.mean("toe", feet.toe_off) if swing is None else swing
-    people = human.mean("toe", phase) if swing is None else np.full(phase.shape, swing)
-    landing = people * feet.pitch(phase) / feet.heel_strike_pitch
+    style_angle = feet.style.toe_swing
+    at_toe_off = human.mean("toe", feet.toe_off) if style_angle is None else style_angle
+    in_air = human.mean("toe", phase) if style_angle is None else np.full(phase.shape, style_angle)
+    landing = in_air * feet.pitch(phase) / feet.heel_strike_pitch
     rolling = feet.toe_pitch(phase) - feet.pitch(phase)
-    # The toe is back in its posture a third of swing after toe-off.
-    left = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
-    swinging = people + left**2 * (feet.toe_off_pitch - feet.roll_pitch - at_toe_off)
-    # The tip stays above the floor, under which people's posture would take it early in swing.
+    # The bend at toe-off fades within the first third of swing.
+    remaining = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
+    swinging = in_air + remaining**2 * (feet.toe_off_pitch - feet.roll_pitch - at_toe_off)
+    # Early in swing people's angle would take the tip into the floor: bend the toe up until its tip is at floor level.
     lifted = feet.ball_clearance(phase) + feet.body.toe_joint_height * (1 - cos(feet.roll_pitch))
     level = np.arcsin(np.clip(lifted / feet.body.toe_length, 0.0, 1.0))
     swinging = np.maximum(swinging, -feet.pitch(phase) - level)
@@ -188,7 +195,7 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
 
 
 def full_reach(body: Body, knee: float) -> float:
-    """Return the distance of hip and ankle [m] at a knee flexion [rad]."""
+    """Return the distance from hip to ankle [m] at a knee flexion [rad]."""
     a = body.thigh_length
     b = body.shank_length
     return sqrt(a**2 + b**2 + 2 * a * b * cos(knee))
@@ -197,7 +204,10 @@ def full_reach(body: Body, knee: float) -> float:
 def highest_legs(
     body: Body, legs_at: Callable[[float], tuple[ComMotion, LegPostures]]
 ) -> tuple[ComMotion, LegPostures]:
-    """Return the highest CoM, and its legs, at which no knee is straighter than `STRAIGHTEST_KNEE`."""
+    """Find the highest CoM at which no knee is straighter than `STRAIGHTEST_KNEE`: return its motion, and the legs.
+
+    `legs_at` plans for a mean CoM height [m]. Raises `SpringfootError` for a CoM lower than `LOWEST_COM`.
+    """
     reach = full_reach(body, STRAIGHTEST_KNEE)
     height = 1.08 * body.leg_length
     for _ in range(50):
@@ -205,7 +215,7 @@ def highest_legs(
         lacking = float(legs.reach.max()) - reach
         if abs(lacking) < 1e-6:
             return motion, legs
-        # A leg leans little, so lowering the CoM by what it lacks leaves it a tenth of that.
+        # Legs are nearly vertical: lowering the CoM by the lacking length leaves a tenth of that length lacking.
         height -= lacking
         if height < LOWEST_COM * body.leg_length:
             break
@@ -216,7 +226,7 @@ def highest_legs(
 
 
 def refuse_impossible_legs(body: Body, legs: LegPostures) -> None:
-    """Raise `SpringfootError` for legs that would have to be longer, or bend further, than is possible."""
+    """Raise `SpringfootError` for legs too short, a hip lower than `LOWEST_HIP`, a knee beyond `DEEPEST_KNEE_DEG`."""
     too_far = float(legs.reach.max()) - full_reach(body, 0.0)
     if too_far > 0:
         phase = int(legs.reach.argmax()) / POSTURE_SAMPLES

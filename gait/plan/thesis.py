@@ -106,8 +106,8 @@ class ThesisWalk:
     def __post_init__(self) -> None:
         require_count("k", self.k, least=0)
         for name, choices in (("interpolation", Interpolation), ("division", Division)):
-            if (given := getattr(self, name)) not in get_args(choices):
-                raise SpringfootError(f"{name} must be one of {', '.join(get_args(choices))}, got {given!r}")
+            if (choice := getattr(self, name)) not in get_args(choices):
+                raise SpringfootError(f"{name} must be one of {', '.join(get_args(choices))}, got {choice!r}")
 
     # Knots, at k T_c, + T_d, + T_m, (k+1) T_c, + T_d, + T_m ---------------------------------------------------
 
@@ -285,6 +285,7 @@ class ThesisWalk:
 
     @cached_property
     def _splines(self) -> dict[str, CubicSpline]:
+        """Paths (x, z) [m] of ankle and toe joint over time [s]."""
         knots = {"ankle": self.ankle_knots, "toe": self.toe_joint_knots}
         return {joint: CubicSpline(self.knot_times, np.stack(xz, -1)) for joint, xz in knots.items()}
 

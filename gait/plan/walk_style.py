@@ -1,8 +1,7 @@
-"""Describe the choices of a plan with given steps: course and timing of the ZMP, bob of the CoM, roll and swing of
-feet.
+"""Describe the choices of a plan at given steps: travel and timing of the ZMP, bob of the CoM, roll and swing of feet.
 
-People's choice is the default of `plan_walk`; `least_work.json` has the choices of least effort, which use no curve of
-people's (`springfoot study plan-tuning`).
+The default of `plan_walk` is people's choice. `least_work.json` has the choices of least effort, found without people's
+curves (`springfoot study plan-tuning`).
 """
 
 import json
@@ -48,11 +47,11 @@ class WalkStyle:
     """Fractions of its travel that the ZMP has covered after one and two thirds of single support; None: one and two
     thirds."""
     lowest: float = 0.5
-    """Part of double support after which the CoM is lowest."""
+    """Fraction of double support after which the CoM is lowest."""
     rise_again: tuple[float, float] = (0.0, 0.0)
     """Second harmonic of the CoM's height (`cart_table.Bob`): cosine and sine over half of `rise` [-]."""
     lean: float = 0.0
-    """Pitch of the trunk [rad], forward positive, 0 with its CoM upright over the hip."""
+    """Pitch of the trunk [rad], forward positive; at 0 the trunk's CoM is upright over the hip."""
     foot: FootStyle
     """Style of the feet's roll and swing."""
 
@@ -62,47 +61,47 @@ class WalkStyle:
 
 
 def style_from(values: Mapping[str, Any]) -> WalkStyle:
-    """Return the style of JSON values (lists for tuples); raise `ValueError`, `TypeError` or `KeyError` for other
+    """Build a style from JSON values (lists for tuples); raise `ValueError`, `TypeError` or `KeyError` for other
     values."""
-    own = dict(values)
-    style = WalkStyle(**_tupled(own | {"foot": FootStyle(**_tupled(own["foot"]))}))
+    fields = dict(values)
+    style = WalkStyle(**_tupled(fields | {"foot": FootStyle(**_tupled(fields["foot"]))}))
     for part in (style, style.foot):
         for name, hint in get_type_hints(type(part)).items():
             value = getattr(part, name)
             kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
             if not any(_is_a(kind, value) for kind in kinds):
-                what = "a number" if float in kinds else "2 numbers" if PAIR in kinds else "numbers"
-                raise ValueError(f"{name} must be {what} within ±{LARGEST_NUMBER:g}, got {quoted(value)}")
+                allowed = "a number" if float in kinds else "2 numbers" if PAIR in kinds else "numbers"
+                raise ValueError(f"{name} must be {allowed} within ±{LARGEST_NUMBER:g}, got {quoted(value)}")
     for name in POWERS:
         if getattr(style.foot, name) <= 0.0:
             raise ValueError(f"{name} must be > 0, got {getattr(style.foot, name):g}")
     if style.foot.heel_radius < 0.0:
         raise ValueError(f"heel_radius must be >= 0 m, got {style.foot.heel_radius:g}")
-    if len({len(each) for each in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:
+    if len({len(via) for via in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:
         raise ValueError("via_forward, via_up and via_pitch must be equally many")
     return style
 
 
 def _is_a(kind: Any, value: Any) -> bool:
-    """Tell whether a value has a field's type, and its numbers are at most `LARGEST_NUMBER`."""
+    """Tell whether a value has the type `kind` of a field, with numbers of at most `LARGEST_NUMBER`."""
     if get_origin(kind) is tuple:
-        own = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
-        return own and all(abs(as_float(each)) <= LARGEST_NUMBER for each in value)
+        right_length = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
+        return right_length and all(abs(as_float(number)) <= LARGEST_NUMBER for number in value)
     return abs(as_float(value)) <= LARGEST_NUMBER if kind is float else isinstance(value, kind)
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:
-    """Return the style of least cost at `speed` [m/s at 1.70 m], the committed one or that of `file`.
+    """Return the style of least effort at `speed` [m/s at 1.70 m], from `file` or else from the package.
 
     Linear between the speeds of the searches; outside them the nearest style. Raises `SpringfootError` for a file
     without styles.
     """
     table = _committed() if file is None else styles_of(file)
     speeds = sorted(table)
-    place = float(np.interp(speed, speeds, np.arange(len(speeds))))
-    low = table[speeds[int(place)]]
-    high = table[speeds[min(int(place) + 1, len(speeds) - 1)]]
-    return style_from(_mixed(low.to_json(), high.to_json(), place - int(place)))
+    position = float(np.interp(speed, speeds, np.arange(len(speeds))))  # 1.25: a quarter from speed 1 to speed 2
+    low = table[speeds[int(position)]]
+    high = table[speeds[min(int(position) + 1, len(speeds) - 1)]]
+    return style_from(_mixed(low.to_json(), high.to_json(), position - int(position)))
 
 
 def _mixed(low: Any, high: Any, weight: float) -> Any:
@@ -115,21 +114,23 @@ def _mixed(low: Any, high: Any, weight: float) -> Any:
 
 
 def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values with tuples for lists."""
     return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
 
 
 @cache
 def _committed() -> dict[float, WalkStyle]:
+    """Return the styles of the package's own file."""
     return styles_of(STYLES)
 
 
 def styles_of(file: Path) -> dict[float, WalkStyle]:
-    """Return speed [m/s at 1.70 m] -> style, from a file; raise `SpringfootError` for a file without styles."""
+    """Read speed [m/s at 1.70 m] -> style from a file; raise `SpringfootError` for a file without styles."""
     try:
         styles = json.loads(read_bytes(file, MOST_JSON_BYTES))["styles"]
-        found = {float(speed): style_from(values) for speed, values in styles.items()}
+        by_speed = {float(speed): style_from(values) for speed, values in styles.items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(f"{file} is not a file of styles of walks: {error}") from None
-    if not found:
+    if not by_speed:
         raise SpringfootError(f"{file} has no style of any walk")
-    return found
+    return by_speed
