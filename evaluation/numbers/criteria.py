@@ -30,10 +30,10 @@ class Criterion:
 
     def value(self, values: dict[str, Any]) -> float | None:
         """Return the number; None if it could not be measured."""
-        place: Any = values
+        found: Any = values
         for key in self.path:
-            place = place[key]
-        return place
+            found = found[key]
+        return found
 
     def holds(self, values: dict[str, Any]) -> bool:
         """Tell whether the number was measured and lies in the range."""
@@ -51,7 +51,7 @@ class Criterion:
 
     @property
     def text(self) -> str:
-        """The range in words."""
+        """Return the range in words, with its unit."""
         low, high = (format(end, self.pattern) for end in (self.low, self.high))
         if self.low == -inf or self.high == inf:
             return (f"≤ {high}" if self.low == -inf else f"≥ {low}") + self.unit
@@ -65,14 +65,14 @@ def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
     cadence = metrics["cadence_steps_min"]
     support = metrics["double_support_s"]
 
-    def share(value: float | None, planned: float) -> float | None:
+    def percent_off(value: float | None, planned: float) -> float | None:
         return None if value is None else 100 * abs(value / planned - 1)
 
     speed = metrics["speed_m_s"]["mean"]
     off = {
         "speed_m_s": None if speed is None else abs(speed - settings.speed),
-        "step_length_percent": share(metrics["step_length_m"], plan.step_length),
-        "cadence_percent": share(cadence, 60 / plan.step_time),
+        "step_length_percent": percent_off(metrics["step_length_m"], plan.step_length),
+        "cadence_percent": percent_off(cadence, 60 / plan.step_time),
     }
     percent = None if support is None or not cadence else 100 * support * cadence / 120
     return metrics | {"off": off, "double_support_percent": percent}

@@ -110,37 +110,40 @@ def add_episode(
     """
     weight = body.mass * GRAVITY
     com = series["com"]
-    begin, end = (round(min(time / TICK, len(com))) for time in steady)
-    if end > begin:
-        distance = com[end - 1, 0] - com[begin - 1, 0]
-        seconds = (end - begin) * TICK
+    # Distance, work and speed of the whole steady span, by ticks.
+    first_tick, last_tick = (round(min(time / TICK, len(com))) for time in steady)
+    if last_tick > first_tick:
+        distance = com[last_tick - 1, 0] - com[first_tick - 1, 0]
+        seconds = (last_tick - first_tick) * TICK
         tally.distance += distance
-        tally.work += float(series["joint_work"][begin:end, ..., 0].sum())
+        tally.work += float(series["joint_work"][first_tick:last_tick, ..., 0].sum())
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
 
+    # Curves and numbers of each foot's strides, cut at its heel strikes.
     vertical = series["force"][..., 1].sum(axis=2)
     contacts = foot_contacts(vertical, body)
     material = contact_material(body, series["contact"], series["base"], series["angle"])
     for side, foot in enumerate(contacts):
         strides = strides_within(foot, steady)
-        heel_strike, toe_off, end = strides.T
+        heel_strike, toe_off, next_heel_strike = strides.T
         curves = stride_curves(series, side, body, strides)
         tally.feet[side].add(curves)
         tally.both.add(curves)
         tally.strides_of_falls += fell * len(strides)
         tally.stride_sides += [side] * len(strides)
-        tally.stride_time += list(end - heel_strike)
-        tally.toe_off += list((toe_off - heel_strike) / (end - heel_strike) * 100)
-        tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, end) / body.mass)
-        tally.energy += list(_energies(series["energy"], heel_strike, end) / body.mass)
+        tally.stride_time += list(next_heel_strike - heel_strike)
+        tally.toe_off += list((toe_off - heel_strike) / (next_heel_strike - heel_strike) * 100)
+        tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, next_heel_strike) / body.mass)
+        tally.energy += list(_energies(series["energy"], heel_strike, next_heel_strike) / body.mass)
         contact = series["contact"][:, side]
         load = series["force"][:, side, :, 1]
+        # Largest force, slip in stance and clearance in mid-swing of each stride, by ticks.
         for start, leave, stop in np.floor(strides / TICK).astype(int):
             tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
             stance = slice(start, leave + 1)
             tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
-            first, last = (round(leave + share * (stop - leave)) for share in CLEARANCE_SWING)
+            first, last = (round(leave + part * (stop - leave)) for part in CLEARANCE_SWING)
             tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
     _add_steps(tally, series, contacts, steady)
 
@@ -174,17 +177,19 @@ def _add_steps(
 
 
 def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """Return (S, ...) sums of values per tick (T, ...) from `begin` to `end` (S,) [s]; a tick cut by an end counts in
-    part."""
-    total = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
+    """Sum values per tick (T, ...) over S strides, from `begin` to `end` (S,) [s]; return (S, ...).
 
-    def at(time: NDArray) -> NDArray:
-        place = time / TICK
-        index = np.minimum(place.astype(int), len(per_tick) - 1)
-        share = (place - index).reshape(-1, *[1] * (total.ndim - 1))
-        return total[index] + share * (total[index + 1] - total[index])
+    A tick that a stride's end cuts counts by the fraction of it that lies within the stride.
+    """
+    sum_before = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
 
-    return at(end) - at(begin)
+    def sum_until(time: NDArray) -> NDArray:
+        ticks = time / TICK
+        whole = np.minimum(ticks.astype(int), len(per_tick) - 1)
+        fraction = (ticks - whole).reshape(-1, *[1] * (sum_before.ndim - 1))
+        return sum_before[whole] + fraction * (sum_before[whole + 1] - sum_before[whole])
+
+    return sum_until(end) - sum_until(begin)
 
 
 def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
@@ -199,7 +204,7 @@ def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
     """Return (T,) the forward CoP of both feet at the middle of each tick [m]; NaN in flight."""
     load = series["force"][..., 1]
-    place = mid_tick(series["contact"][..., 0])
+    forward = mid_tick(series["contact"][..., 0])
     total = load.sum(axis=(1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return (load * place).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)
+        return (load * forward).sum(axis=(1, 2)) / np.where(total > 0.0, total, np.nan)

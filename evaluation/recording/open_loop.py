@@ -68,24 +68,31 @@ def decided(
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """Fit a periodic curve (MEAN_KNOTS, C), linear between knots, to `values` (n, C) at `phase` (n,) by least
-    squares."""
-    normal = np.zeros((MEAN_KNOTS, MEAN_KNOTS))
-    circle = np.arange(MEAN_KNOTS)
+    """Fit a periodic curve, linear between `MEAN_KNOTS` even knots, to `values` (n, C) at `phase` (n,) in [0, 1).
+
+    Returns the curve's values at the knots (MEAN_KNOTS, C), by least squares with a price on curvature.
+    """
+    # Each value lies between two knots, whose weights are 1 - fraction and fraction.
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
-    following = (knot + 1) % MEAN_KNOTS
-    way = phase * MEAN_KNOTS - knot
-    normal[circle, circle] = np.bincount(knot, (1 - way) ** 2, MEAN_KNOTS) + np.bincount(following, way**2, MEAN_KNOTS)
-    beside = np.bincount(knot, (1 - way) * way, MEAN_KNOTS)
-    normal[circle, (circle + 1) % MEAN_KNOTS] = beside
-    normal[(circle + 1) % MEAN_KNOTS, circle] = beside
-    curvature = (
-        np.roll(np.eye(MEAN_KNOTS), 1, axis=1) + np.roll(np.eye(MEAN_KNOTS), -1, axis=1) - 2 * np.eye(MEAN_KNOTS)
+    next_knot = (knot + 1) % MEAN_KNOTS
+    fraction = phase * MEAN_KNOTS - knot
+    # Normal equations: products of the weights, summed over the values; a knot meets itself and its two neighbours.
+    circle = np.arange(MEAN_KNOTS)
+    normal = np.zeros((MEAN_KNOTS, MEAN_KNOTS))
+    normal[circle, circle] = np.bincount(knot, (1 - fraction) ** 2, MEAN_KNOTS) + np.bincount(
+        next_knot, fraction**2, MEAN_KNOTS
     )
-    sums = [
-        np.bincount(knot, (1 - way) * v, MEAN_KNOTS) + np.bincount(following, way * v, MEAN_KNOTS) for v in values.T
+    neighbours = np.bincount(knot, (1 - fraction) * fraction, MEAN_KNOTS)
+    normal[circle, (circle + 1) % MEAN_KNOTS] = neighbours
+    normal[(circle + 1) % MEAN_KNOTS, circle] = neighbours
+    right_side = [
+        np.bincount(knot, (1 - fraction) * column, MEAN_KNOTS) + np.bincount(next_knot, fraction * column, MEAN_KNOTS)
+        for column in values.T
     ]
-    return np.linalg.solve(normal + SMOOTHING * curvature.T @ curvature, np.stack(sums, -1))
+    # Second differences of the knots around the circle: the curvature.
+    one = np.eye(MEAN_KNOTS)
+    curvature = np.roll(one, 1, axis=1) + np.roll(one, -1, axis=1) - 2 * one
+    return np.linalg.solve(normal + SMOOTHING * curvature.T @ curvature, np.stack(right_side, -1))
 
 
 def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:

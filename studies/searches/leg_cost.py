@@ -118,38 +118,45 @@ def cost(
         impact: price of impact over that of effort, where walks pay for effort (`walk_effort`).
     """
     springs, pushed_springs = foreign_springs(settings)
-    walks = SCHEDULED + len(springs)
+    count = len(candidates)
     settings = replace(settings, unevenness_m=UNEVENNESS)
-    total = np.zeros(len(candidates))
-    seeds = [seed + index % walks for index in range(walks * len(candidates))]
+    total = np.zeros(count)
+
+    # Undisturbed: each candidate walks SCHEDULED times with its schedule, then once with each foreign spring.
+    walks = SCHEDULED + len(springs)
+    seeds = [seed + index % walks for index in range(walks * count)]
     walked = walk(settings, candidates, seeds, threads, ease, springs)
     missing = walked.missing
-    scheduled = np.arange(walks * len(candidates)) % walks < SCHEDULED
-    for index in range(walks * len(candidates)):
+    for index in range(walks * count):
         candidate = index // walks
-        if not scheduled[index]:
+        if index % walks >= SCHEDULED:
             total[candidate] += foreign * FOREIGN_SHARE * _paid_with_foreign(walked, index, missing[index])
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
             paid = _paid(walked.episode(index), walked.biped, pays, impact)
             total[candidate] += (FALL_COST if paid is None else paid) / SCHEDULED
+
+    # The thesis's constant springs, which only people's guide walks with.
     if settings.equilibrium == "planned" and not settings.follows_plan:
-        lines = replace(settings, **own_settings("thesis", settings))
-        walked = walk(lines, candidates, [seed] * len(candidates), threads, foreign=())
+        thesis = replace(settings, **own_settings("thesis", settings))
+        walked = walk(thesis, candidates, [seed] * count, threads, foreign=())
         total += [foreign * _paid_with_foreign(walked, index, lost) for index, lost in enumerate(walked.missing)]
-    if settings.speed <= SLOW_SPEED:  # the slowest set alone carries a body off that starts standing
-        seeds = [seed + index % SET_OFF for index in range(SET_OFF * len(candidates))]
+
+    # Standing starts: the slowest set alone carries a body off.
+    if settings.speed <= SLOW_SPEED:
+        seeds = [seed + index % SET_OFF for index in range(SET_OFF * count)]
         standing = replace(settings, start="standing")
         missing = walk(standing, candidates, seeds, threads, foreign=()).missing
-        total += FALL_COST * missing.reshape(len(candidates), SET_OFF).mean(1)
+        total += FALL_COST * missing.reshape(count, SET_OFF).mean(1)
     if push == 0:
         return total
+
+    # Pushes: only falls count.
     pushed = replace(settings, push_newton=push, push_interval=2.5)
     walks = PUSHED + len(pushed_springs)
-    seeds = [seed + index % walks for index in range(walks * len(candidates))]
-    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs).missing
-    missing = missing.reshape(len(candidates), walks)
+    seeds = [seed + index % walks for index in range(walks * count)]
+    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs).missing.reshape(count, walks)
     fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
     return total + FALL_COST * fallen
 

@@ -183,8 +183,9 @@ class LegTuning(Study):
         keep: Callable[[LegConstants], None],
         progress: OnProgress,
     ) -> tuple[LegConstants, list[float]]:
-        """Minimise the squares of `leg_cost.all_misses` from `start`; return the constants, and their length after each
-        step.
+        """Minimise the sum of squares of `leg_cost.all_misses` from `start`, and hand each improvement to `keep`.
+
+        Returns the constants, and the length of the vector of misses at the start and after each step.
 
         Damped Gauss-Newton (Levenberg-Marquardt). One batch walks the finite differences of all constants, and one the
         steps at all dampings, whole and in part: a walk scatters too much to follow a single step.
@@ -192,43 +193,49 @@ class LegTuning(Study):
         target = reference_walk_at(settings, settings.speed, [start]).target
         search = Search(start, settings.speed, target, placing=settings.follows_plan)
 
-        def missed(vectors: NDArray) -> list[NDArray | None]:
-            found = all_misses(settings, [search.constants(v) for v in vectors], self.threads)
-            return [None if each is None else np.append(each, KEPT * v) for each, v in zip(found, vectors, strict=True)]
+        def misses_at(vectors: NDArray) -> list[NDArray | None]:
+            """Return the misses at search vectors (V, size), distance from the start appended; None for a fall."""
+            walked = all_misses(settings, [search.constants(vector) for vector in vectors], self.threads)
+            return [
+                None if misses is None else np.append(misses, KEPT * vector)
+                for misses, vector in zip(walked, vectors, strict=True)
+            ]
 
-        place = np.zeros(search.size)
+        vector = np.zeros(search.size)
         identity = np.eye(search.size)
-        (here,) = missed(place[None])
-        if here is None:
+        (misses,) = misses_at(vector[None])
+        if misses is None:
             raise SpringfootError(
                 "the constants to start from fall, so that they cannot be refined: refinements must be 0"
             )
-        lengths = [float(np.linalg.norm(here))]
+        lengths = [float(np.linalg.norm(misses))]
         damping = 1.0
         for _ in range(self.refinements):
-            there = missed(place + DIFFERENCE * identity)
-            columns = [np.zeros(len(here)) if each is None else (each - here) / DIFFERENCE for each in there]
-            slopes = np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST)
-            normal = slopes.T @ slopes
-            downhill = -slopes.T @ here
+            # Jacobian of the misses by finite differences; a constant whose change falls has no slope.
+            changed = misses_at(vector + DIFFERENCE * identity)
+            columns = [np.zeros(len(misses)) if near is None else (near - misses) / DIFFERENCE for near in changed]
+            jacobian = np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST)
+            normal = jacobian.T @ jacobian
+            downhill = -jacobian.T @ misses
+            # Steps at every damping, whole and in part; the best of all is taken if it is an improvement.
             tried = []
-            for each in damping * DAMPINGS:
-                step = np.linalg.solve(normal + each * (identity + np.diag(np.diag(normal))), downhill)
+            for stronger in damping * DAMPINGS:
+                step = np.linalg.solve(normal + stronger * (identity + np.diag(np.diag(normal))), downhill)
                 step *= min(1.0, LONGEST_STEP / np.abs(step).max())
-                tried += [(each, place + part * step) for part in (1.0, 0.4)]
-            found = missed(np.array([vector for _, vector in tried]))
-            paid = [np.inf if each is None else float(np.linalg.norm(each)) for each in found]
-            best = int(np.argmin(paid))
+                tried += [(stronger, vector + part * step) for part in (1.0, 0.4)]
+            found = misses_at(np.array([candidate for _, candidate in tried]))
+            costs = [np.inf if each is None else float(np.linalg.norm(each)) for each in found]
+            best = int(np.argmin(costs))
             better = found[best]
-            if better is not None and paid[best] < lengths[-1]:
-                damping, place = tried[best]
-                here = better
-                keep(search.constants(place))
+            if better is not None and costs[best] < lengths[-1]:
+                damping, vector = tried[best]
+                misses = better
+                keep(search.constants(vector))
             else:
                 damping *= 10.0
-            lengths.append(float(np.linalg.norm(here)))
+            lengths.append(float(np.linalg.norm(misses)))
             progress(1)
-        return search.constants(place), lengths
+        return search.constants(vector), lengths
 
     def _keep(self, name: str, found: LegConstants) -> None:
         """Write the best constants so far and this command into the file of constants; with --quick nothing."""

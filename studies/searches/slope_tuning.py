@@ -152,9 +152,10 @@ class SlopeTuning(Study):
 
         Raises `SpringfootError`, with nothing written, for another kind of file.
         """
+        known = read_constants(self.constants)
         try:
-            began = slope_constants_from(read_constants(self.constants)["slope"]["constants"])
-        except (KeyError, TypeError):
+            began = slope_constants_from(known["slope"]["constants"])
+        except (KeyError, TypeError, SpringfootError):
             raise SpringfootError(f"{self.constants} has no constants for slopes to begin with") from None
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(vector_of(began), self.sigma, options)
