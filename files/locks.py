@@ -32,10 +32,12 @@ MOST_OWNER_BYTES = 4096
 """Most bytes that are read of an owner's file; chosen, tens of times a usual one."""
 BEAT, DEAD = 60.0, 600.0
 """Time between two touches, and time without a touch after which an owner on another host is dead [s]; chosen."""
-
-
+_NAMED_WITHIN = 1.0
+"""Longest time between a lock and the owner's name in its file [s]; chosen."""
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 """Flags with which a link is not followed, and a pipe does not wait for its other end."""
+_KEYS = {"pid", "host", "began"}
+"""Keys of an owner's record."""
 
 
 class TakenError(SpringfootError):
@@ -63,6 +65,9 @@ def owned(folder: Path) -> Iterator[None]:
         over = threading.Event()
         try:
             former = _read(handle)
+            if os.fstat(handle).st_size and not former.keys() >= _KEYS:
+                mine = False
+                raise SpringfootError(f"{path} is not a file of springfoot's: remove it")
             if former and (former.get("host") != socket.gethostname() or (not locked and _runs(former))):
                 silent = time.time() - path.stat().st_mtime
                 mine = silent >= DEAD
@@ -108,7 +113,7 @@ def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
             if path.is_symlink() or not path.is_file():
                 raise SpringfootError(f"{path} is not a file of springfoot's: remove it") from None
             raise error
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
+        if not _may_be_ours(os.fstat(handle)):
             os.close(handle)
             raise SpringfootError(f"{path} is not a file of springfoot's: remove it")
         locked = fcntl is not None
@@ -116,7 +121,9 @@ def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
             if fcntl is not None:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            owner = _read(handle)
+            until = time.monotonic() + _NAMED_WITHIN
+            while not (owner := _read(handle)) and time.monotonic() < until:
+                time.sleep(0.01)  # it has only just locked the file
             os.close(handle)
             raise TakenError(_taken(path.parent, owner)) from None
         except OSError:  # a file system without locks
@@ -152,7 +159,7 @@ def _live(path: Path, over: threading.Event) -> None:
 
 
 def _read(handle: int) -> dict[str, Any]:
-    """Return the record of the owner; empty if there is none, or if it has only just locked the file."""
+    """Return the record of the owner; empty if there is none."""
     try:
         found = json.loads(os.pread(handle, MOST_OWNER_BYTES, 0))
     except (OSError, ValueError, RecursionError):
@@ -167,9 +174,14 @@ def is_marked(folder: Path) -> bool:
     except OSError:
         return False
     try:
-        return stat.S_ISREG(os.fstat(handle).st_mode) and {"pid", "host", "began"} <= _read(handle).keys()
+        return _may_be_ours(os.fstat(handle)) and _read(handle).keys() >= _KEYS
     finally:
         os.close(handle)
+
+
+def _may_be_ours(file: os.stat_result) -> bool:
+    """Tell whether an opened file is regular and has no second name, under which it would be another's file."""
+    return stat.S_ISREG(file.st_mode) and file.st_nlink <= 1
 
 
 def _runs(owner: dict[str, Any]) -> bool:

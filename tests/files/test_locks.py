@@ -171,6 +171,21 @@ def test_no_owner_is_written_through_a_link(tmp_path, target):
     assert (tmp_path / "victim").read_text() == "precious" and not (tmp_path / "nowhere").exists()
 
 
+def test_no_owner_is_written_over_another_file(tmp_path):
+    (tmp_path / "victim").write_text("precious")
+    for folder in ("hard", "own"):
+        (tmp_path / folder).mkdir()
+    os.link(tmp_path / "victim", tmp_path / "hard" / OWNER)
+    (tmp_path / "own" / OWNER).write_text("precious")
+    for folder in ("hard", "own"):
+        with (
+            pytest.raises(SpringfootError, match=r"is not a file of springfoot's: remove it"),
+            owned(tmp_path / folder),
+        ):
+            raise AssertionError
+        assert (tmp_path / folder / OWNER).read_text() == "precious"
+
+
 def test_a_pipe_in_the_place_of_an_owner_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / OWNER)
     with pytest.raises(SpringfootError, match=r"\.owner is not a file of springfoot's: remove it"), owned(tmp_path):
