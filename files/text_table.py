@@ -67,9 +67,9 @@ class Table:
 
 
 def existing(path: Path) -> Path:
-    """Return the path if it is a file; raise `SpringfootError` otherwise."""
+    """Return the path if it is a regular file; raise `SpringfootError` otherwise."""
     if not path.is_file():
-        raise SpringfootError(f"no file {path}")
+        raise SpringfootError(f"{path} is not a regular file" if path.exists() else f"no file {path}")
     return path
 
 

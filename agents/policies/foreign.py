@@ -78,14 +78,16 @@ class ForeignPolicy:
         if np.iscomplexobj(returned):
             raise SpringfootError(f"{self.name} must return real actions, returned complex ones")
         try:
-            actions = np.asarray(returned, np.float64)
+            actions = np.asarray(returned)
         except (TypeError, ValueError):
-            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned no numbers") from None
+            actions = np.array(None)
+        if actions.dtype.kind not in "biuf":
+            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned no numbers")
         if actions.shape != (len(batch), len(ACTIONS)):
             raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned {actions.shape}")
         if not np.isfinite(actions).all():
             raise SpringfootError(f"{self.name} returned an action that is not finite")
-        return actions.reshape(*rows.shape[:-1], -1).clip(-1.0, 1.0).astype(np.float32)
+        return actions.astype(np.float64).reshape(*rows.shape[:-1], -1).clip(-1.0, 1.0).astype(np.float32)
 
 
 def onnx_policy(path: Path) -> ForeignPolicy:

@@ -276,6 +276,12 @@ quits_later.calls = 0
 
 def turned(observation):
     return np.full((len(observation), 4), 0.5j)
+
+def dates(observation):
+    return np.zeros((len(observation), 4), "datetime64[s]")
+
+def words(observation):
+    return np.full((len(observation), 4), "0.5")
 """
 
 
@@ -321,6 +327,14 @@ def test_a_function_of_a_module_is_a_policy(name, module):
         ("my_policies:quits", "my_policies:quits calls sys.exit(0): a policy must return actions"),
         ("quitting_policies:act", "quitting_policies:act calls sys.exit(0): a policy must return actions"),
         ("my_policies:turned", "my_policies:turned must return real actions, returned complex ones"),
+        (
+            "my_policies:dates",
+            "my_policies:dates must return actions (2, 4), returned no numbers",
+        ),
+        (
+            "my_policies:words",
+            "my_policies:words must return actions (2, 4), returned no numbers",
+        ),
     ],
 )
 def test_a_function_that_is_no_policy_is_refused_with_one_line(name, said, module):
