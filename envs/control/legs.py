@@ -225,10 +225,11 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """Return the leg's curves (SAMPLES, 7) over the stride.
+    """Return the curves over the stride by which the controller moves one leg's hip and knee, (SAMPLES, 7).
 
-    Stance weight; hip and knee stiffness [N m/rad]; hip and knee drive torque [N m]; the planned CoM's forward speed
-    over its mean; the planned distance of the CoM ahead of the other leg's ankle [m].
+    Columns: fraction of the stance leg's gains in effect, from 0 in swing to 1 in stance; hip and knee stiffness K
+    [N m/rad]; hip and knee drive torque [N m], K times the rest angle plus the fed-forward moment; the planned CoM's
+    forward speed over its mean; the planned distance of the CoM ahead of the other leg's ankle [m].
     """
     body = walk.body
     target = walk.target
@@ -243,12 +244,13 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         (KNEE, "knee", constants.knee_knots_deg, constants.knee_stiffness),
     ):
         stiffness = (in_swing + (in_stance - in_swing) * stance) * body.stiffness_scale
+        # The joint's damping torque is K beta rate, so a target in motion needs a rest angle beta rate ahead.
         rest = target.mean(name, GRID) + beta[joint] * target.rate(name, GRID) / period + knot_curve(knots)
         if joint == HIP:
             rest = rest + (body.trunk_lean + walk.plan.lean)  # hip = thigh to the vertical + pitch of the trunk
-        feed = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
+        fed_forward = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
-        drives.append(stiffness * rest + feed)
+        drives.append(stiffness * rest + fed_forward)
     planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
     planned_place = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
     return np.stack([*columns, *drives, planned_speed, planned_place], axis=-1)

@@ -260,13 +260,16 @@ class LiveSession:
         return self.frame
 
     def _force(self, tick: Tick) -> NDArray:
-        """Return the array `Frame.force` from the last control window."""
+        """Return CoP (x, z) [m] and ground reaction force (forward, up) [body weights] of each foot, (side, 4).
+
+        Both are of the last control window; without load the CoP is 0.
+        """
         force = tick.measurement.force[0]
         contact = tick.measurement.contact[0]
         load = force[..., 1]
         total = np.maximum(load.sum(axis=-1, keepdims=True), 1e-6)
-        place = (load[..., None] * contact).sum(axis=1) / total
-        return np.concatenate([place, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
+        cop = (load[..., None] * contact).sum(axis=1) / total
+        return np.concatenate([cop, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
     def _action(self, observation: NDArray) -> NDArray:
         """Return the action (1, 4) for the wished K; the policy's own action, unchanged, with the source `policy`."""
@@ -290,15 +293,16 @@ class LiveSession:
         return own.reshape(1, -1)
 
     def _make(self, wishes: Wishes) -> Biped:
-        """Return the batch of one with the ground, the feet and the theta_eq of `wishes`."""
+        """Return a batch of one body on the ground and feet of `wishes`, its rest angles offset as wished."""
         offset = _offset(wishes)
         feet = {name: getattr(wishes, name) for name in ("slope_deg", "left_foot", "right_foot")}
         settings = replace(self._settings, **feet)
         if not offset.any():
             return Biped(settings, 1)
+        # The wished body's speed at the Froude number of the settings' body, within the tabulated speeds.
         speeds = tabulated_speeds(settings)
-        equal = float(np.clip(wishes.speed / sqrt(wishes.height / settings.height), speeds[0], speeds[-1]))
-        ((constants, walk),) = rows([reference_walk_at(settings, equal)])
+        froude_speed = float(np.clip(wishes.speed / sqrt(wishes.height / settings.height), speeds[0], speeds[-1]))
+        ((constants, walk),) = rows([reference_walk_at(settings, froude_speed)])
         return Biped(settings, 1, rest=foot_curves(settings, constants, walk)[0][None] + offset)
 
     def _check(self, wishes: Wishes) -> None:

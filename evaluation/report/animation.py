@@ -139,6 +139,7 @@ class _Canvas:
                 self._text((x, self._floor + 13 * OVERSAMPLING), f"{mark // 4} m", 11, FAINT, "ma")
 
     def _trunk(self) -> None:
+        """Draw trunk, neck and head; sizes [m at 1.70 m] by eye."""
         hip = self._at("base")[:2]
         pitch = self._at("base")[2]
         size = self._body.length_scale
@@ -149,6 +150,7 @@ class _Canvas:
         self._disc(shoulder + 0.165 * size * along, 0.095 * size, fill=TRUNK)
 
     def _leg(self, side: int, colour: tuple) -> None:
+        """Draw thigh, shank and foot of one leg from its joint angles."""
         body = self._body
         size = self._body.length_scale
         angle = self._at("angle")[side]

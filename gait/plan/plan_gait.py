@@ -16,6 +16,8 @@ RAMP = 0.06
 """Stride phase over which the schedule of K goes from one phase of stance to the next; chosen."""
 FLAT_SHARE = 0.5
 """End of early stance, as a fraction of the time from foot flat to heel-off; chosen."""
+SWING_END = 0.95
+"""Stride phase at which K of swing starts to become that of loading; chosen, as in `fit_human.SPRING_HABITS`."""
 
 
 def gait_of(plan: WalkPlan) -> HumanGait:
@@ -56,22 +58,30 @@ def gait_of(plan: WalkPlan) -> HumanGait:
 
 
 def _foot(plan: WalkPlan) -> FootHabits:
-    """Return the phases of the schedule of K: the plan's own events, and the other foot's toe-off and landing."""
+    """Return the phases at which rest angles and scheduled K change, set by the plan's events of the foot.
+
+    People's quasi-stiffness has no part in a plan (None).
+    """
     feet = plan.feet
     flat = feet.foot_flat
     heel_off = feet.heel_off
     toe_off = feet.toe_off
-    middle = flat + FLAT_SHARE * (heel_off - flat)
-    push_off = max(heel_off, middle + 2 * RAMP)
-    # start and end of loading, early stance, late stance, push-off and swing
-    plateaus = (0.0, flat, flat + RAMP, middle, middle + RAMP, push_off, push_off + RAMP, toe_off, toe_off + RAMP, 0.95)
-    swing = 0.0 if feet.style.toe_swing is None else float(np.degrees(feet.style.toe_swing))
+    mid_stance = flat + FLAT_SHARE * (heel_off - flat)
+    push_off = max(heel_off, mid_stance + 2 * RAMP)
+    plateaus = (
+        *(0.0, flat),  # start and end of loading
+        *(flat + RAMP, mid_stance),  # of early stance
+        *(mid_stance + RAMP, push_off),  # of late stance
+        *(push_off + RAMP, toe_off),  # of push-off
+        *(toe_off + RAMP, SWING_END),  # of swing
+    )
+    toe_swing_deg = 0.0 if feet.style.toe_swing is None else float(np.degrees(feet.style.toe_swing))
     return FootHabits(
         plateaus=plateaus,
         ankle_quasi_stiffness=None,
         toe_flat=(0.0, flat),
         toe_off=(toe_off, toe_off + RAMP),
-        toe_swing_deg=swing,
+        toe_swing_deg=toe_swing_deg,
     )
 
 

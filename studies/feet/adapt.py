@@ -44,9 +44,12 @@ def kept_name(name: str, search: int) -> str:
 
 
 def beginning(foot: str | dict[str, Any], speed: float) -> Person:
-    """Return the person before adaptation; an adaptive foot has the stiffness of a usual passive one."""
+    """Return the person before the search: both legs as tuned for sound feet at `speed` [m/s].
+
+    The leg of an adaptive foot without a schedule starts with the constant stiffness of a usual passive foot.
+    """
     tuned = leg_constants("planned", "people", speed)
-    other = tuned
+    other = tuned  # the leg on this foot; `sound` is the other one
     setting = foot_setting("foot", foot)
     if setting.kind == "adaptive" and setting.foot.schedule is None:
         ankle, toe = (float(SPRING_NUMBERS[f"{joint}_stiffness"].usual or 0.0) for joint in ("ankle", "toe"))

@@ -376,23 +376,32 @@ def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
 
 
 def _passive_against(rows: Sequence[Row], foot: str) -> str:
-    """Return, in words, the numbers in which the passive feet beat `foot`, people adapted to both, search by search."""
-    own = [row for row in rows if row["person"] == ADAPTED_ALONE]
-    told = []
-    theirs = {row["search"] for row in own if row["foot"] == foot}
-    for search in sorted({row["search"] for row in own if row["foot"] == "passive"}):
-        said: dict[str, list[str]] = {"better": [], "worse": [], "not told apart": []}
+    """Say in which numbers the passive feet are better, worse or not told apart from `foot`, for each search.
+
+    A search is one run of the search for the legs that adapt to a foot. People are adapted to both feet. Empty without
+    rows of either foot.
+    """
+    adapted = [row for row in rows if row["person"] == ADAPTED_ALONE]
+    searches_of_foot = {row["search"] for row in adapted if row["foot"] == foot}
+    passive_searches = sorted({row["search"] for row in adapted if row["foot"] == "passive"})
+    verdicts = []
+    for search in passive_searches:
+        numbers_by_verdict: dict[str, list[str]] = {"better": [], "worse": [], "not told apart": []}
         for asked in ASKED:
-            worn = (foot, search if search in theirs else ""), ("passive", search)
-            low, high = t_interval(asked.better * np.diff(pairs_of(own, worn, asked.key), axis=1).ravel())
-            said["better" if low > 0 else "worse" if high < 0 else "not told apart"].append(asked.label)
-        words = [f"{word} in {len(names)} ({'; '.join(names)})" for word, names in said.items() if names]
-        told.append(f"search {search}: {', '.join(words)}")
-    if not told or not theirs:
+            compared = (foot, search if search in searches_of_foot else ""), ("passive", search)
+            passive_minus_foot = np.diff(pairs_of(adapted, compared, asked.key), axis=1).ravel()
+            low, high = t_interval(asked.better * passive_minus_foot)  # `better` is 1 or -1, the better direction
+            verdict = "better" if low > 0 else "worse" if high < 0 else "not told apart"
+            numbers_by_verdict[verdict].append(asked.label)
+        words = [
+            f"{verdict} in {len(names)} ({'; '.join(names)})" for verdict, names in numbers_by_verdict.items() if names
+        ]
+        verdicts.append(f"search {search}: {', '.join(words)}")
+    if not verdicts or not searches_of_foot:
         return ""
     return (
         f"Of {len(ASKED)} numbers the passive foot found is, against `{foot}`, the person adapted to each: "
-        f"{'; '.join(told)}; by 95 % intervals of the mean difference over the groups of episodes, Student's."
+        f"{'; '.join(verdicts)}; by 95 % intervals of the mean difference over the groups of episodes, Student's."
     )
 
 

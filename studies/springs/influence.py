@@ -306,7 +306,7 @@ def save_influence_figure(path: Path, responses: Mapping[str, Response]) -> None
         for ax in axes[:5]:
             ax.axvline(0, color="#555555", lw=0.8)
             ax.set_ylim(ROWS.min() - 0.6, ROWS.max() + 1.1)
-        _foretold(axes[5], responses)
+        _draw_prediction(axes[5], responses)
         figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
 
 
@@ -340,8 +340,12 @@ def _whiskers(own: Response, key: Key, unit: float) -> np.ndarray:
     return np.abs(unit * (own.interval[key].T - own.mean[key]))
 
 
-def _foretold(ax: Axes, responses: Mapping[str, Response]) -> None:
-    """Draw the lasting change of speed over the integral of the acceleration at fixed states, for every condition."""
+def _draw_prediction(ax: Axes, responses: Mapping[str, Response]) -> None:
+    """Draw, for each change of K, the change of speed that lasts over the one that the unchanged walk predicts.
+
+    The prediction integrates the change of the CoM's acceleration over the phase in which K changes, with the angles
+    and rates of the unchanged walk. The first condition of `responses` is drawn large, with labels.
+    """
     (name, first), *others = responses.items()
     for number, (_, own) in enumerate(others):
         ax.plot(
