@@ -21,7 +21,12 @@ KNOTS = np.arange(10) / 10
 """Stride phases of the knots of the corrections to the target's curves, which are periodic cubic splines."""
 LARGEST_CONSTANT = 1e6
 """Largest constant, in its unit."""
-LEAST_STIFFNESS = dict.fromkeys(("hip_stiffness", "knee_stiffness", "ankle_schedule", "toe_schedule"), 1.0)
+LEAST_STIFFNESS: dict[str, float] = {
+    "hip_stiffness": 1.0,
+    "knee_stiffness": 1.0,
+    "ankle_schedule": 1.0,
+    "toe_schedule": 1.0,
+}
 """Lower bounds of constants [N m/rad]."""
 
 Constants = TypeVar("Constants", "LegConstants", "SlopeConstants")

@@ -6,7 +6,7 @@ exactly (`envs.physics.model`), another body at a Froude-equal speed does the sa
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from math import ceil, floor, sqrt
@@ -18,7 +18,7 @@ from springfoot.gait.body.body import Body
 from springfoot.gait.people.human import HumanGait
 from springfoot.gait.plan.com_plan import ComPlan, over_peoples_zmp
 from springfoot.gait.plan.kinetics import planned_moments
-from springfoot.gait.plan.plan import Cadence, WalkPlan, plan_walk
+from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, Cadence, WalkPlan, plan_walk
 from springfoot.gait.plan.plan_gait import gait_of
 from springfoot.gait.plan.walk_style import least_work
 
@@ -85,8 +85,7 @@ def reference_walk_at(
 ) -> ReferenceWalk:
     """Return the walk of the settings' body at `speed` [m/s]."""
     body = body_of(settings)
-    settings = replace(settings, speed=speed)
-    people = reference_gait(settings)
+    people = reference_gait(settings, speed)
     equal_speed = speed / sqrt(body.length_scale)
     legs = legs or [person_constants(settings, equal_speed, side)]
     if settings.follows_plan:
@@ -134,7 +133,8 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     """Return (G,) ascending speeds [m/s] of the settings' body that cover all Froude speeds of the settings.
 
     Without ranges this is the settings' speed alone. With ranges it is the multiples of `SPACING` that enclose them,
-    and the settings' speed.
+    and the settings' speed. Where a multiple would leave both the ranges and `PLAN_SPEED_RANGE`, the range's end takes
+    its place: a short body at the fastest speed walks as this one would beyond it.
     """
     height = settings.height
     speed = settings.speed
@@ -150,7 +150,8 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     first = floor(slow / unit / SPACING + 1e-9)
     last = ceil(fast / unit / SPACING - 1e-9)
     grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
-    return np.array(sorted({*grid, speed}))
+    least, most = PLAN_SPEED_RANGE
+    return np.array(sorted({*(min(max(at, min(slow, least)), max(fast, most)) for at in grid), speed}))
 
 
 @lru_cache(maxsize=256)

@@ -319,9 +319,10 @@ def plan_file_of(settings: BipedSettings) -> Path | None:
     return None if settings.plan_file is None else Path(settings.plan_file)
 
 
-def reference_gait(settings: BipedSettings) -> HumanGait:
-    """Return people's gait at the speed and height of the body, or that of `settings.human`."""
+def reference_gait(settings: BipedSettings, speed: float | None = None) -> HumanGait:
+    """Return people's gait, or that of `settings.human`, at the height of the body and its speed or another [m/s]."""
     people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
+    speed = settings.speed if speed is None else speed
     if settings.human is None:
-        return human_gait(settings.speed, settings.height, people)
-    return settings.human.gait(settings.speed, settings.height, people)
+        return human_gait(speed, settings.height, people)
+    return settings.human.gait(speed, settings.height, people)

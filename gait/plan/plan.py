@@ -19,7 +19,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, require_within
 
-from ..body.body import ANGLES, GRAVITY, Body
+from ..body.body import ANGLES, GRAVITY, HEIGHT_RANGE, REFERENCE_HEIGHT, Body
 from ..people.human import HumanGait, human_gait
 from .cart_table import Bob, ComMotion, periodic_com
 from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point
@@ -33,6 +33,11 @@ Cadence = Literal["people", "thesis"]
 
 PLAN_SPEED_RANGE = (0.4, 2.0)
 """Accepted speeds [m/s]; chosen: people's data reach from 0.85 to 1.96."""
+EQUAL_SPEED_RANGE = (
+    PLAN_SPEED_RANGE[0] / sqrt(HEIGHT_RANGE[1] / REFERENCE_HEIGHT),
+    PLAN_SPEED_RANGE[1] / sqrt(HEIGHT_RANGE[0] / REFERENCE_HEIGHT),
+)
+"""Speeds [m/s] at which a body of 1.70 m walks as the tallest and the shortest body at the ends of that range."""
 SLOPE_RANGE = (radians(-5.0), radians(5.0))
 """Accepted slopes [rad], uphill positive; chosen."""
 STEP_TIME_RANGE = (0.25, 1.2)
@@ -146,7 +151,9 @@ def plan_walk(
     Raises `SpringfootError`, saying by how much, for an impossible walk: legs too short, ZMP outside the feet, a swing
     foot in the ground.
     """
-    speed = require_within("speed", speed, PLAN_SPEED_RANGE, "m/s")
+    unit = sqrt(body.length_scale)
+    slowest, fastest = (round(unit * equal, 2) for equal in EQUAL_SPEED_RANGE)
+    speed = require_within("speed", speed, (slowest, fastest), "m/s")
     if cadence not in get_args(Cadence):
         raise SpringfootError(f"cadence must be 'people' or 'thesis', got {cadence!r}")
     slope = require_within("slope", slope, SLOPE_RANGE, "rad")

@@ -32,7 +32,9 @@ def test_a_body_on_its_course_with_k_ref_gets_the_share_of_the_moment_that_is_fe
     walk = reference_walk_at(settings, 1.2)
     tuned = leg_constants("planned", "people", 1.2)
     constants = replace(tuned, ankle_knots_deg=NO_KNOTS, feedforward=(1.0, 1.0, share))
-    K = plateau_curve(walk.target.foot.ankle_quasi_stiffness, walk.target.foot.plateaus) * walk.body.stiffness_scale
+    people = walk.target.foot.ankle_quasi_stiffness
+    assert people is not None
+    K = plateau_curve(people, walk.target.foot.plateaus) * walk.body.stiffness_scale
     rate = walk.target.rate("ankle", GRID) / (constants.period_factor * walk.plan.stride_time)
     undamped = (1 - share) * damping_times(walk.body)[ANKLE] * rate
     torque = K * (off_rest(constants, walk, ANKLE, "ankle") + undamped)

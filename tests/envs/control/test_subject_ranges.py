@@ -8,7 +8,7 @@ import pytest
 
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.reference_walk import reference_walks, tabulated_speeds
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.vector_env import SegmentedFootBipedVector
@@ -43,6 +43,35 @@ def test_a_height_and_a_mass_that_make_no_body_are_drawn_again():
     subjects.reset(np.arange(100), [np.random.default_rng(index) for index in range(100)])
     index = np.array([body.mass / body.height**2 for body in subjects.bodies])
     assert 10.0 <= index.min() < 20.0 and 60.0 < index.max() <= 80.0
+
+
+@pytest.mark.slow
+def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts():
+    """A short body at a high speed walks as the settings' tall body would beyond the speeds that it may have."""
+    random = np.random.default_rng(0)
+    beyond = 0
+    for number in range(200):
+        heights = np.sort(random.uniform(1.2, 2.3, 2))
+        fastest = min(2.0, 2.1 * np.sqrt(heights[0] / 1.7))  # beyond, its legs are too short for a step
+        speeds = np.sort(random.uniform(0.4, fastest, 2))
+        ranges: dict[str, Any] = {"height_range": tuple(heights), "speed_range": tuple(speeds)}
+        for name in random.choice(list(ranges), number % 2, replace=False):
+            del ranges[name]
+        settings = BipedSettings(height=random.choice(heights), speed=random.choice(speeds), **ranges)
+        grid = tabulated_speeds(settings)
+        beyond += grid[0] < 0.4 or grid[-1] > 2.0
+        assert len(reference_walks(settings)) == len(grid)
+    assert beyond > 20
+
+
+def test_a_grid_ends_at_the_range_where_it_would_leave_what_can_be_planned():
+    settings = BipedSettings(height=2.0, height_range=(1.25, 2.0), speed_range=(0.6, 2.0))
+    unit, fastest = np.sqrt(2.0 / 1.7), 2.0 * np.sqrt(2.0 / 1.25)
+    grid = tabulated_speeds(settings)
+    assert grid[-1] == pytest.approx(fastest) and grid[-2] == pytest.approx(2.3 * unit)
+    biped = Biped(settings, 3)
+    biped.reset(np.arange(3), [0, 1, 2])
+    assert np.isfinite(biped.step(np.zeros((3, 4))).observation).all()
 
 
 def test_settings_with_ranges_survive_json():

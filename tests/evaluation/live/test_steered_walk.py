@@ -137,6 +137,13 @@ def test_who_falls_lies_a_while_and_walks_anew():
     assert walk(session, 1).time == 0.0 and walk(session, 1).fell == ""
 
 
+@pytest.mark.parametrize("height", [1.45, 1.71, 1.8, 2.0])
+def test_a_walk_starts_at_any_height(height):
+    session = LiveSession("schedule", {"height": height})
+    assert session.body.height == height
+    assert walk(session, 20).fell == ""
+
+
 def test_settings_begin_where_flags_say_and_pushes_come_by_hand_alone():
     own = {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0}}
     session = LiveSession("schedule", own | {"push_newton": 0.0, "speed_range": None})

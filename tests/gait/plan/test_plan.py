@@ -240,8 +240,8 @@ def test_leg_inverse_kinematics_reaches_its_target():
 @pytest.mark.parametrize(
     ("arguments", "settings", "reason"),
     [
-        ((0.39,), {}, "speed"),
-        ((2.01,), {}, "speed"),
+        ((0.3,), {}, "speed"),
+        ((3.0,), {}, "speed"),
         ((float("nan"),), {}, "speed"),
         ((1.2, "robot"), {}, "cadence"),
         ((2.0, "thesis"), {}, r"legs too short.* \d\.\d+ m"),

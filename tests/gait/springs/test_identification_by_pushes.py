@@ -230,7 +230,7 @@ def test_bins_begin_where_the_phase_does():
     random = np.random.default_rng(1)
     trial = np.repeat(np.arange(12), 8)
     inside = low + width * np.tile(np.linspace(0.02, 0.98, 8), 12)
-    columns = {name: random.standard_normal(len(trial)) for name in ("torque", "angle", "velocity")}
+    columns: dict[str, Any] = {name: random.standard_normal(len(trial)) for name in ("torque", "angle", "velocity")}
     (found,) = identify_pushed(**columns, phase=inside, trial=trial, bounds=(low, low + width))
     assert (found.samples, found.trials) == (96, 12)
     few = trial < 1  # eight samples in all: just enough for a bin
