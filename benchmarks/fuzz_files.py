@@ -68,7 +68,9 @@ def readers(folder: Path) -> dict[str, Reader]:
         "record of a run": Reader(read=_record, suffix=".json", bases=(json.dumps(_run()).encode(),)),
         "recording": Reader(read=load_recording, suffix=".npz", bases=(recording.read_bytes(),)),
         "schedule": Reader(read=_schedule, suffix=".csv", bases=(_schedule_table(walk, folder),)),
-        "finite states": Reader(read=_schedule, suffix=".json", bases=(json.dumps(finite_states(walk)).encode(),)),
+        "finite states": Reader(
+            read=_schedule, suffix=".json", bases=(json.dumps(finite_states(walk, [0, 1])).encode(),)
+        ),
         "own data, mean curves": Reader(read=_own, suffix=".csv", bases=(_percent(), _percent(("knee", "ankle")))),
         "own data over time": Reader(read=_own, suffix=".csv", bases=(_over_time(),)),
         "own data of OpenSim": Reader(read=_own, suffix=".mot", bases=(_opensim(),)),

@@ -142,7 +142,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
             print()
             gait_table.print_words(f"Its mean stiffness alone, open loop: {walk_again}, with the same flags")
     files = ", ".join(name for name in ("walk.mp4", *report.FILES) if name in written)
-    if "finite_states.json" not in written:
+    if not any(name.startswith("finite_states") for name in written):
         print()
         gait_table.print_words("No finite_states.json: both feet have a device, whose stiffness no policy sets")
     each = files if len(labels) == 1 else f"in each of the folders {', '.join(labels)}: {files}"

@@ -6,6 +6,7 @@ import re
 import signal
 import sys
 import threading
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
 from typing import Any, TypeVar
@@ -34,16 +35,28 @@ _OURS = {
 def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flags:
     """Return the flags on the command line, `words` or those of the process; `--help` exits with 0.
 
-    Bad flags exit with 2, after one line on standard error that names the flag and its fault.
+    Bad flags, and a flag that is given twice, exit with 2, after one line on standard error that names the flag and its
+    fault.
     """
+    words = list(sys.argv[1:] if words is None else words)
     said = io.StringIO()
     try:
         with redirect_stderr(said):
-            return tyro.cli(flags, args=words, prog=program)
+            parsed = tyro.cli(flags, args=words, prog=program)
     except SystemExit as end:
         if end.code == 2:
             print(f"{program}: error: {_in_a_line(_of_box(said.getvalue()))}", file=sys.stderr)
         raise
+    if twice := _repeated_flag(words):
+        print(f"{program}: error: {twice} is given twice; give it once", file=sys.stderr)
+        raise SystemExit(2)
+    return parsed
+
+
+def _repeated_flag(words: Sequence[str]) -> str:
+    """Return the first flag that stands twice among the words, or no text; tyro takes the last one without a word."""
+    flags = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
+    return next((flag for flag, count in Counter(flags).items() if count > 1), "")
 
 
 def _of_box(text: str) -> str:

@@ -15,6 +15,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, THEME_OF, BipedSettings, body_of
 from springfoot.errors import SpringfootError
 from springfoot.gait.springs.stiffness import SPRINGS
@@ -42,6 +43,13 @@ SAME_K = 1e-9
 def deciding_legs(settings: BipedSettings) -> list[int]:
     """Return the sides whose ankle and toe follow the policy's stiffness; a leg with a device at either is left out."""
     return [side for side, foot in enumerate(settings.feet) if not any(joint.device for joint in foot.joints)]
+
+
+def alike_legs(settings: BipedSettings) -> list[list[int]]:
+    """Return the `deciding_legs`, or both if there are none, in groups of equal feet: together, or each by itself."""
+    legs = deciding_legs(settings) or [0, 1]
+    left, right = settings.feet
+    return [legs] if left == right else [[leg] for leg in legs]
 
 
 def decided(
@@ -95,22 +103,31 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
     return np.linalg.solve(normal + SMOOTHING * curvature.T @ curvature, np.stack(right_side, -1))
 
 
+def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
+    """Return the mean K (SAMPLES, 2) on `GRID` of decisions, between the least and the largest one."""
+    knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
+    at = np.arange(MEAN_KNOTS) / MEAN_KNOTS
+    return np.stack([np.interp(GRID, at, curve, period=1.0) for curve in knots.T], -1)
+
+
 def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     """Return `feedback` of metrics.json: the part of log K of ankle and toe that the phase does not explain; None
     without K.
 
     `share` is that part of the variance [0, 1], `spread` its standard deviation at equal phase (0.1: K varies by 10 %).
     The variance at equal phase is half the mean squared difference of neighbours in phase (Rice, Annals of Statistics
-    12 (1984) 1215), so that any schedule has none, with or without steps.
+    12 (1984) 1215), so that any schedule has none, with or without steps. Legs with different feet have schedules of
+    their own: their variances are taken apart, and averaged.
     """
-    phase, stiffness = decided(recording)
-    if len(phase) < 2:
+    by_leg = [decided(recording, legs) for legs in alike_legs(recording.settings)]
+    logarithms = [np.log(stiffness[np.argsort(phase)]) for phase, stiffness in by_leg if len(phase) >= 2]
+    if not logarithms:
         return {joint: {"share": None, "spread": None} for joint in SPRINGS}
-    logarithm = np.log(stiffness[np.argsort(phase)])
-    variances = zip(SPRINGS, logarithm.var(0), 0.5 * (np.diff(logarithm, axis=0) ** 2).mean(0), strict=True)
+    totals = np.mean([logarithm.var(0) for logarithm in logarithms], axis=0)
+    at_equal_phase = np.mean([0.5 * (np.diff(each, axis=0) ** 2).mean(0) for each in logarithms], axis=0)
     return {
         joint: {"share": min(float(alike / total), 1.0) if total > SAME_K else 0.0, "spread": float(np.sqrt(alike))}
-        for joint, total, alike in variances
+        for joint, total, alike in zip(SPRINGS, totals, at_equal_phase, strict=True)
     }
 
 
@@ -131,23 +148,26 @@ def open_loop_copy(
         threads: of the physics; any number gives the same bits.
         watch: see `Watch`.
 
-    The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`). If other speeds
-    can be commanded, it is taken at each tabulated speed, and is linear between them; K scales with the body. The
-    equilibrium is that of the settings. A residual action can leave the range of absolute actions, a copy cannot: K
-    beyond the range becomes its nearer end. Raises `SpringfootError` for a policy that walks no strides.
+    The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`); of each leg by
+    itself if the feet differ. If other speeds can be commanded, it is taken at each tabulated speed, and is linear
+    between them; K scales with the body. The equilibrium is that of the settings. A residual action can leave the range
+    of absolute actions, a copy cannot: K beyond the range becomes its nearer end. Raises
+    `SpringfootError` for a policy that walks no strides.
     """
     alone = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
+    groups = alike_legs(settings)
+    # A leg with a device follows no K: it is given that of the other one.
+    group_of = [next((number for number, legs in enumerate(groups) if side in legs), 0) for side in range(len(SIDES))]
     means: dict[float, NDArray] = {}
     speeds = tabulated_speeds(settings).tolist()
     how: dict[str, Any] = {"name": name, "episodes": COPY_EPISODES, "threads": threads}
     how["progress"] = watch(len(speeds) * COPY_EPISODES * COPY_SECONDS)
     for speed in speeds:
         recording = record(policy, replace(alone, speed=speed), **how)
-        phase, stiffness = decided(recording)
-        if len(phase):
-            knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
-            at = np.arange(MEAN_KNOTS) / MEAN_KNOTS
-            means[speed] = np.stack([np.interp(GRID, at, curve, period=1.0) for curve in knots.T], -1)
+        walked = [decided(recording, legs) for legs in groups]
+        if all(len(phase) for phase, _ in walked):
+            curves = [_mean_stiffness(phase, stiffness) for phase, stiffness in walked]
+            means[speed] = np.stack([curves[group] for group in group_of], axis=1)
     if not means:
         raise SpringfootError(f"{name} walks no strides after {WARM_UP:g} s whose mean stiffness could be taken")
     absolute = replace(settings, action_mode="absolute")

@@ -35,11 +35,13 @@ FILES = (
     "walk.gif",
     "stiffness_schedule.csv",
     "finite_states.json",
+    "finite_states_left.json",
+    "finite_states_right.json",
     "walk.mot",
     "walk.sto",
     "model.xml",
 )
-"""Files of every evaluation, and `gait_cycle` of each leg."""
+"""Files of an evaluation, of which it has one or two tables of finite states or none; and `gait_cycle` of each leg."""
 
 
 def write_report(

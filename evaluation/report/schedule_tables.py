@@ -4,6 +4,7 @@ Both are read back as policies (`springfoot.agents.policies.schedules`).
 """
 
 import json
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,12 @@ from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import body_of, reference_gait
-from springfoot.errors import SpringfootError
 from springfoot.files.digest import BLANK, SEAL, sealed
 from springfoot.files.writing import csv_text
 from springfoot.gait.people.contacts import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS
 
-from ..recording.open_loop import MEAN_KNOTS, decided, deciding_legs, mean_over_phase
+from ..recording.open_loop import MEAN_KNOTS, alike_legs, decided, deciding_legs, mean_over_phase
 from ..recording.recording import TICK, WARM_UP, Recording
 
 STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "late push-off", "swing")
@@ -30,7 +30,10 @@ STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "l
 
 
 def write_schedules(folder: Path, recording: Recording) -> None:
-    """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`."""
+    """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`.
+
+    Where both legs decide and the feet differ, each leg has its own, `finite_states_left.json` and `_right`.
+    """
     curves = schedule_curves(recording)
     settings = recording.settings
     body = body_of(recording.settings)
@@ -45,10 +48,12 @@ def write_schedules(folder: Path, recording: Recording) -> None:
     rows = ([int(percent), *row, BLANK] for percent, row in zip(PERCENT, values, strict=True))
     text = sealed(csv_text(["percent", *whose, *curves, SEAL], rows))
     (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
-    if deciding_legs(settings):
-        states = finite_states(recording) | {SEAL: BLANK}
+    groups = alike_legs(settings) if deciding_legs(settings) else []
+    for legs in groups:
+        states = finite_states(recording, legs) | {SEAL: BLANK}
         table = sealed(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-        (folder / "finite_states.json").write_text(table, encoding="utf-8")
+        end = f"_{SIDES[legs[0]]}" if len(groups) > 1 else ""
+        (folder / f"finite_states{end}.json").write_text(table, encoding="utf-8")
 
 
 def schedule_curves(recording: Recording) -> dict[str, NDArray]:
@@ -87,20 +92,15 @@ def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
     return np.stack([np.interp(phase, at, curve, period=1.0) for curve in knots.T], -1)
 
 
-def finite_states(recording: Recording) -> dict[str, Any]:
-    """Return `finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of the `deciding_legs`
-    together.
+def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
+    """Return `finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of `legs` together.
 
     K is the mean over the state; theta_eq is the angle at which the state's spring has its mean torque at its mean
     angle and rate. None stands for a state that the walk does not have; times with slack muscles are left out. The
-    states begin at the gait events of the target (`gait_events`), the inner ones half-way between two. Raises
-    `SpringfootError` if both feet have a device.
+    states begin at the gait events of the target (`gait_events`), the inner ones half-way between two.
     """
     settings = recording.settings
     body = body_of(recording.settings)
-    legs = deciding_legs(recording.settings)
-    if not legs:
-        raise SpringfootError("a table of finite states needs a foot without a device")
     strike, flat, heel_off, toe_off = gait_events(reference_gait(settings))
     starts = [strike, flat, (flat + heel_off) / 2, heel_off, (heel_off + toe_off) / 2, toe_off]
     events = ["heel strike", "foot flat", None, "heel-off", None, "toe-off"]

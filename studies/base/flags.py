@@ -50,20 +50,26 @@ def read_json(words: list[str]) -> dict[str, Any]:
     return value
 
 
-def read_own_gait(words: str, trust_units: bool = False) -> dict[str, Any]:
+def read_own_gait(words: str, trust_units: bool = False, mass: float | None = None) -> dict[str, Any]:
     """Return the setting `human` for the value of `--human`; `trust_units` as in `read_gait`.
 
     The value is a file of `read_gait`; FILE:CONDITION for one condition of a CSV; or several files of one walk with
-    commas between. Raises `SpringfootError` for a file that cannot be read.
+    commas between. Moments in N m are divided by the mass that the forces bear; in files without forces by `mass` [kg],
+    that of the body. Raises `SpringfootError` for a file that cannot be read.
     """
-    if Path(words).is_file():
-        return read_gait(words, trust_units=trust_units).to_json()
-    if "," in words:
-        return read_gait(*words.split(","), trust_units=trust_units).to_json()
-    file, _, condition = words.rpartition(":")
-    if Path(file).is_file():
-        return read_gait(file, condition=condition, trust_units=trust_units).to_json()
-    return read_gait(words, trust_units=trust_units).to_json()
+    files = [words]
+    condition = None
+    if not Path(words).is_file():
+        file, _, last = words.rpartition(":")
+        if "," in words:
+            files = words.split(",")
+        elif Path(file).is_file():
+            files = [file]
+            condition = last
+    own = read_gait(*files, condition=condition, trust_units=trust_units)
+    if mass is not None and "grf_vertical" not in own.mean:
+        own = read_gait(*files, condition=condition, trust_units=trust_units, mass=mass)
+    return own.to_json()
 
 
 def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | None:
@@ -165,15 +171,24 @@ def given(flags: Any) -> dict[str, Any]:
 
     Raises `SpringfootError` for a bad file.
     """
+    values = _given_words(flags)
+    trust = values.pop(TRUST, False)
+    for name in values.keys() & {*FOOT_SETTINGS}:
+        values[name] = foot_given(values[name])
+    for name in values.keys() & FILE_FLAGS.keys():
+        values[name] = FILE_FLAGS[name](values[name], trust, values.get("mass"))
+    return values
+
+
+def _given_words(flags: Any) -> dict[str, Any]:
+    """Return name -> value of the flags that the user gave, and `TRUST`, without themes."""
     values: dict[str, Any] = {}
     for item in dataclasses.fields(flags):
         value = getattr(flags, item.name)
         if dataclasses.is_dataclass(value):
-            values |= given(value)
-        elif item.name in FILE_FLAGS and value is not NOT_GIVEN:
-            values[item.name] = FILE_FLAGS[item.name](value, getattr(flags, TRUST))
-        elif item.name != TRUST and value is not NOT_GIVEN:
-            values[item.name] = foot_given(value) if item.name in FOOT_SETTINGS else value
+            values |= _given_words(value)
+        elif value is not NOT_GIVEN:
+            values[item.name] = value
     return values
 
 

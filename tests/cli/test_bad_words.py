@@ -41,6 +41,8 @@ EVALUATE = [
     (["--out", "o" * 400], f"File name too long: {'o' * 78}...{'o' * 78}"),
     (["--out"], "--out needs a value"),
     (["-z"], "unrecognized options: -z"),
+    (["--right-foot", "rigid", "--right-foot", "passive"], "--right-foot is given twice; give it once"),
+    (["--right_foot=rigid", "--speed", "1", "--right-foot", "rigid"], "--right-foot is given twice; give it once"),
 ]
 TRAIN = [
     (["--hidden", "64", "wide"], "--hidden must be whole numbers, got '64 wide'"),

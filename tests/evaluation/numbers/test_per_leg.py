@@ -1,5 +1,6 @@
 """Legs whose feet differ: each leg's numbers, how far they are apart, and which is which in table and pictures."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,12 @@ from drawn import has_line, kept_figures
 from PIL import Image
 from rich.console import Console
 
-from springfoot.envs.settings.settings import settings_from
-from springfoot.errors import SpringfootError
+from springfoot.agents.policies.baselines import follow
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.evaluation import measure, prepare, record
 from springfoot.evaluation.numbers.per_leg import asymmetry, leg_numbers
+from springfoot.evaluation.recording.open_loop import deciding_legs, feedback, open_loop_copy
 from springfoot.evaluation.report.animation import FAR, NEAR, save_animation
 from springfoot.evaluation.report.gait_figure import save_gait_figure
 from springfoot.evaluation.report.gait_table import print_table
@@ -110,11 +113,12 @@ def test_feedback_is_of_the_leg_that_decides(recordings):
 @pytest.mark.parametrize(("which", "changed"), [(0, (True, False)), (1, (False, True)), (2, (True, True))])
 def test_finite_states_are_of_the_legs_whose_stiffness_the_policy_sets(recordings, which, changed):
     recording = recordings[which]
-    states = finite_states(recording)["states"]
+    legs = deciding_legs(recording.settings)
+    states = finite_states(recording, legs)["states"]
     for side in (0, 1):
         stiffness = recording.series["stiffness"].copy()
         stiffness[:, :, side] *= 1.5
-        other = finite_states(replace(recording, series=recording.series | {"stiffness": stiffness}))["states"]
+        other = finite_states(replace(recording, series=recording.series | {"stiffness": stiffness}), legs)["states"]
         assert (states != other) == changed[side]
 
 
@@ -123,5 +127,30 @@ def test_without_a_leg_that_decides_there_is_no_table_of_finite_states(recording
     recording = replace(recordings[2], settings=replace(recordings[2].settings, **feet))
     write_schedules(tmp_path, recording)
     assert [path.name for path in tmp_path.iterdir()] == ["stiffness_schedule.csv"]
-    with pytest.raises(SpringfootError, match=r"^a table of finite states needs a foot without a device$"):
-        finite_states(recording)
+
+
+def test_legs_with_different_feet_have_states_and_feedback_of_their_own(recordings, tmp_path):
+    recording = recordings[2]
+    settings = replace(recording.settings, right_foot="weak")
+    stiffness = np.ones_like(recording.series["stiffness"]) * [[200.0, 30.0], [300.0, 60.0]]
+    planted = replace(recording, settings=settings, series=recording.series | {"stiffness": stiffness})
+    assert feedback(planted) == {joint: {"share": 0.0, "spread": 0.0} for joint in ("ankle", "toe")}
+    pooled = feedback(replace(planted, settings=recording.settings))["toe"]["spread"]
+    assert pooled is not None and pooled > 0.1
+    write_schedules(tmp_path, planted)
+    tables = sorted(path.name for path in tmp_path.glob("*.json"))
+    assert tables == ["finite_states_left.json", "finite_states_right.json"]
+    for name, toe in zip(tables, (30.0, 60.0), strict=True):
+        states = json.loads((tmp_path / name).read_text(encoding="utf-8"))["states"]
+        assert {state["toe"]["stiffness_Nm_per_rad"] for state in states} == {toe}
+        assert prepare(str(tmp_path / name), {})[1].equilibrium == "phase"  # a policy again
+
+
+def test_a_copy_open_loop_keeps_the_stiffness_of_legs_with_different_feet():
+    settings = settings_from(right_foot="weak", episode_seconds=6.0)
+    planted = np.array([[200.0, 30.0], [300.0, 60.0]])  # left and right, ankle and toe
+    table = np.broadcast_to(planted, (1, len(GRID), 2, 2))
+    body = body_of(settings)
+    copy, absolute = open_loop_copy(follow(table, np.zeros(1), settings, body), settings, name="planted")
+    copied = record(copy, absolute, name="copy", episodes=1).series["stiffness"]
+    assert copied[0, 100:300] == pytest.approx(np.broadcast_to(planted, (200, 2, 2)), rel=1e-5)

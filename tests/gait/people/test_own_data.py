@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tyro
 
+from springfoot.cli.evaluate import EvaluateFlags
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
 from springfoot.gait.people.human import COLUMNS, FORCES
 from springfoot.gait.people.motion_files import FILE_SIDES
 from springfoot.gait.people.own_data import OwnGait, read_gait
+from springfoot.studies.base.flags import given
 
 HUMAN = human_gait(1.3)
 MASS = 71.0
@@ -170,6 +173,15 @@ def test_opensim_angles_forces_and_moments_in_three_files(tmp_path, knee_sign):
     assert_like_people(read_gait(*files, mass=MASS), (*ANGLES, *MOMENTS, *FORCES))
     total = 2 * people_of(own).mean("grf_vertical", np.linspace(0, 1, 1000, endpoint=False)).mean()
     assert total == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("kinds", [("angles", "moments"), ("angles", "forces", "moments")])
+def test_a_body_of_a_given_mass_gets_the_moments_of_a_walk_whose_files_have_no_forces(tmp_path, kinds):
+    files = [opensim(tmp_path / f"{kind}.sto", kind=kind) for kind in kinds]
+    words = ["schedule", "--human", ",".join(map(str, files)), "--mass", str(MASS)]
+    settings = given(tyro.cli(EvaluateFlags, args=words).environment)
+    weighed = read_gait(*files) if "forces" in kinds else read_gait(*files, mass=MASS)
+    assert settings == {"human": weighed.to_json(), "mass": MASS} and {*MOMENTS} <= {*settings["human"]["mean"]}
 
 
 def gait_csv(path, gait=HUMAN, repeat=("mine",), **changes):
