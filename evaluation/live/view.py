@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from functools import partial
 from io import StringIO
 from queue import SimpleQueue
 from typing import Any, get_args
@@ -25,7 +26,7 @@ from springfoot.gait.springs.stiffness import SPRINGS
 
 from .messages import accept_values_only
 from .origin import own_pages_only
-from .scene import LiveScene
+from .scene import LiveScene, fit_to_screen
 from .steered_walk import (
     LIVE_FACTORS,
     LIVE_HEIGHTS,
@@ -68,7 +69,9 @@ class LiveView:
             self._server = viser.ViserServer(host=host, port=port, label="springfoot live", verbose=False)
         accept_values_only(self._server)
         self._gui = self._server.gui
-        self._gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        _set_theme(self._gui)
+        self._dark: set[int] = set()
+        self._server.on_client_connect(fit_to_screen)
         self.address = f"http://{host}:{self._server.get_port()}"
         """Where the page is."""
         self.frames = 0
@@ -135,8 +138,16 @@ class LiveView:
         size = self._gui.add_slider(
             "Push, N", *LIVE_PUSHES, step=10.0, initial_value=FIRST_PUSH, hint="forward positive"
         )
+        theme = self._gui.add_button("Dark or light page", color="gray")
+        theme.on_click(lambda event: self._asked.put(partial(self._turn_theme, event.client)))
         push.on_click(lambda _: self._asked.put(lambda: self._session.push(size.value)))
         restart.on_click(lambda _: self._asked.put(self._session.restart))
+
+    def _turn_theme(self, client: viser.ClientHandle | None) -> None:
+        """Turn the page of one browser dark, or light again; others keep theirs."""
+        if client is not None:
+            self._dark ^= {client.client_id}
+            _set_theme(client.gui, client.client_id in self._dark)
 
     def _add_wishes(self) -> None:
         most = self._session.stiffness_ranges()
@@ -212,6 +223,10 @@ class LiveView:
         curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)} | {"load": force[..., -1].T}
         for name, lines in (curves | {"speed": np.array([[each.speed for each in self._history]])}).items():
             self._curves[name].data = (seconds, *np.ascontiguousarray(lines))
+
+
+def _set_theme(gui: viser.GuiApi, dark: bool = False) -> None:
+    gui.configure_theme(show_logo=False, show_share_button=False, control_width="large", dark_mode=dark)
 
 
 def _plain(name: str) -> str:

@@ -11,7 +11,7 @@ from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.foot import LOCK, FootJoint
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
-from springfoot.envs.settings.settings import body_of
+from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.gait import GRAVITY
 from springfoot.gait.people.contacts import PERCENT
 
@@ -127,6 +127,17 @@ def foot_words(setting: FootSetting) -> str:
         its = [f"{_plain(name)} {value:g} {ORTHOSIS_NUMBERS[name].unit}" for name, value in given["orthosis"].items()]
         words.append(f"in an orthosis with {' and '.join(its) or 'no spring'}")
     return f"{_plain(setting.kind)} ({', '.join(words)})" if words else _plain(setting.kind)
+
+
+def walker_words(settings: BipedSettings) -> str:
+    """Return body and feet of the settings in words."""
+    height, mass = (
+        f"{given[0]:g} to {given[1]:g}" if given else f"{usual:g}"
+        for given, usual in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
+    )
+    left, right = foot_words(settings.left_foot), foot_words(settings.right_foot)
+    feet = f"both feet {left}" if left == right else f"left foot {left}, right foot {right}"
+    return f"{height} m, {mass} kg, {feet}"
 
 
 def _plain(name: str) -> str:

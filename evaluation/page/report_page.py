@@ -18,6 +18,7 @@ from ..numbers.metrics import Gait
 from ..recording.recording import Recording
 from ..report.gait_table import leg_rows, people_metrics, table_rows
 from .page_data import policy_data
+from .page_figure import walker_words
 from .template import as_json, filled
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
@@ -66,9 +67,10 @@ def _verdict(index: int, metrics: dict[str, Any]) -> str:
 
 
 def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
-    """Return falls, speed, joints, forces and energy in words."""
+    """Return body and feet, falls, speed, joints, forces and energy in words."""
     environment = metrics["environment"]
-    people = people_metrics(reference_gait(settings_from(**environment)))
+    settings = settings_from(**environment)
+    people = people_metrics(reference_gait(settings))
     judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
     falls = metrics["falls"]
     episodes = metrics["episodes"]
@@ -78,7 +80,10 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     joints = metrics["joints"]
     grf = metrics["grf"]
     work = metrics["joint_work_J_kg"]["ankle"]
-    said = {"Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s."}
+    said = {
+        "Walker": f"{walker_words(settings)}.",
+        "Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s.",
+    }
     if metrics["strides"]["count"] == 0:
         return said | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
     angles = ", ".join(f"{name} {_text(each['rmse_deg'], '.1f')}°" for name, each in joints.items())

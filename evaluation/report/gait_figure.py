@@ -176,8 +176,10 @@ def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) 
     settings = recording.settings
     metrics = gait.metrics
     falls = f"{metrics['falls']} fall{'s' * (metrics['falls'] != 1)}"
+    feet = ", ".join(dict.fromkeys(kinds_of(settings).values()))
     figure.suptitle(
-        f"{recording.policy}    {settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s commanded    "
+        f"{recording.policy}    {settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s commanded, "
+        f"feet {feet}    "
         f"{metrics['episodes']} episodes, {falls}, {metrics['strides']['count']} strides",
         x=0.01,
         ha="left",

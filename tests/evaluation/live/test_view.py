@@ -6,11 +6,13 @@ import resource
 import socket
 import threading
 import time
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from springfoot.cli.live import live_main
 from springfoot.cli.main import main
@@ -72,6 +74,35 @@ def test_in_a_browser_sliders_set_the_k_that_acts_and_buttons_push_and_restart(c
     tab.close()
     assert told == []
     assert {url.split("/")[2] for url in asked if url.startswith("http")} == {view.address.split("/")[2]}
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize(("size", "free"), [((1280, 900), (310, 0, 870, 900)), ((390, 844), (0, 0, 390, 335))])
+def test_the_body_is_seen_beside_its_panels_on_screen_and_telephone(chromium, view, size, free, dark):
+    """`free` is the part of the picture without panels: left, top, right, bottom."""
+    told = []
+    tab = chromium.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
+    tab.on("pageerror", lambda error: told.append(str(error)))
+    tab.on("console", lambda message: told.append(message.text) if message.type == "error" else None)
+    tab.goto(view.address)
+    tab.get_by_text("K that acts").wait_for(timeout=60_000)
+    if dark:
+        tab.get_by_role("button", name="Dark or light page").click()
+
+    def picture():
+        pixels = Image.open(BytesIO(tab.screenshot())).convert("RGB").crop(free)
+        return np.asarray(pixels, float)
+
+    def shows_the_body():
+        red, _, blue = np.moveaxis(picture(), -1, 0)
+        body = (blue > 1.5 * red) & (blue > 110.0)
+        rows = np.flatnonzero(body.any(axis=1))
+        return body.sum() > 2000 and np.ptp(rows) > 120 and rows[-1] < free[3] - free[1] - 20
+
+    assert reaches(shows_the_body)
+    assert reaches(lambda: (np.median(picture()) < 60.0) == dark)
+    tab.close()
+    assert told == []
 
 
 VALUES = [

@@ -10,10 +10,10 @@ import pytest
 
 from springfoot.cli.evaluate import evaluate_main
 from springfoot.envs.settings.feet import foot_setting
-from springfoot.envs.settings.settings import reference_gait
+from springfoot.envs.settings.settings import reference_gait, settings_from
 from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.page.page_figure import foot_words
+from springfoot.evaluation.page.page_figure import foot_words, walker_words
 from springfoot.evaluation.page.report_page import spoken_verdict, write_page
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
@@ -169,9 +169,22 @@ def test_a_foot_in_words(setting, words):
     assert foot_words(foot_setting("right_foot", setting)) == words
 
 
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({}, "1.7 m, 63 kg, both feet intact"),
+        ({"right_foot": "no_toe", "mass": 70.0}, "1.7 m, 70 kg, left foot intact, right foot no toe"),
+        ({"height_range": (1.5, 1.9), "left_foot": "drop"}, "1.5 to 1.9 m, 63 kg, left foot drop, right foot intact"),
+    ],
+)
+def test_a_walker_in_words(settings, words):
+    assert walker_words(settings_from(**settings)) == words
+
+
 def test_the_verdict_is_told_in_words(walk):
     said = spoken_verdict(walk[1].metrics)
-    assert list(said) == ["Falls", "Speed", "Joints", "Forces", "Energy"]
+    assert list(said) == ["Walker", "Falls", "Speed", "Joints", "Forces", "Energy"]
+    assert said["Walker"] == "1.7 m, 63 kg, both feet intact."
     assert said["Falls"].startswith("Never fell in 2 episodes") and "asked for 1.20" in said["Speed"]
     assert re.search(r"Misses \d of 14 criteria|Meets all 14 criteria", said["Joints"])
     faster = walked("schedule", speed=1.4)[1].metrics
