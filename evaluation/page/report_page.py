@@ -67,7 +67,7 @@ def _verdict(index: int, metrics: dict[str, Any]) -> str:
 
 
 def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
-    """Return body and feet, falls, speed, joints, forces and energy in words."""
+    """Return falls, body and feet, speed, joints, forces and energy in words."""
     environment = metrics["environment"]
     settings = settings_from(**environment)
     people = people_metrics(reference_gait(settings))
@@ -81,8 +81,8 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     grf = metrics["grf"]
     work = metrics["joint_work_J_kg"]["ankle"]
     said = {
-        "Walker": f"{walker_words(settings)}.",
         "Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s.",
+        "Walker": f"{walker_words(settings)}.",
     }
     if metrics["strides"]["count"] == 0:
         return said | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}

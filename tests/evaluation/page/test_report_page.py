@@ -183,7 +183,7 @@ def test_a_walker_in_words(settings, words):
 
 def test_the_verdict_is_told_in_words(walk):
     said = spoken_verdict(walk[1].metrics)
-    assert list(said) == ["Walker", "Falls", "Speed", "Joints", "Forces", "Energy"]
+    assert list(said) == ["Falls", "Walker", "Speed", "Joints", "Forces", "Energy"]
     assert said["Walker"] == "1.7 m, 63 kg, both feet intact."
     assert said["Falls"].startswith("Never fell in 2 episodes") and "asked for 1.20" in said["Speed"]
     assert re.search(r"Misses \d of 14 criteria|Meets all 14 criteria", said["Joints"])
