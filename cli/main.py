@@ -14,13 +14,25 @@ from springfoot.terminal import at_terminal
 if TYPE_CHECKING:
     from springfoot.studies.base.study import Study
 
-HELP = """usage: springfoot {train,evaluate,live,export,study} ...
+FIRST = """To begin with:
+
+  springfoot live pretrained            watch a walk in your browser, and steer it
+  springfoot evaluate pretrained        how human is it? numbers, curves, and report.html
+  springfoot train --out runs/mine      train a policy of your own, two to three minutes on two cores
+  springfoot evaluate runs/mine         how human is yours?
+  springfoot examples --copy examples   programs to start from
+
+springfoot --help lists all commands."""
+"""Commands that a newcomer types, in their order."""
+HELP = """usage: springfoot {train,evaluate,live,export,study,examples,completion} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
   springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
+  springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
+  springfoot completion SHELL       print the tab completion of all flags for bash, zsh or tcsh
 
 Each takes --help; springfoot --version says which this is."""
 
@@ -87,7 +99,18 @@ def _run(words: list[str]) -> int:
                 return export_main(rest, "springfoot export")
             case ["study", *rest]:
                 return study_main(rest)
-            case [] | ["-h" | "--help"]:
+            case ["examples", *rest]:
+                from .examples import examples_main
+
+                return examples_main(rest)
+            case ["completion", *rest]:
+                from .completion import completion_main
+
+                return completion_main(rest)
+            case []:
+                print(FIRST)
+                return 0
+            case ["-h" | "--help"]:
                 print(HELP)
                 return 0
             case ["--version"]:
@@ -104,7 +127,7 @@ def _run(words: list[str]) -> int:
             file=sys.stderr,
         )
         return 2
-    known = "there are train, evaluate, live, export and study"
+    known = "there are train, evaluate, live, export, study, examples and completion"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 

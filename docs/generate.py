@@ -20,6 +20,8 @@ COMMANDS = [
     ("`springfoot evaluate`", "evaluate policies; `evaluate.py` is the same"),
     ("`springfoot live`", "steer a walk in a browser"),
     ("`springfoot export`", "write a policy as an ONNX file"),
+    ("`springfoot examples`", "list or copy programs to start from"),
+    ("`springfoot completion`", "print the tab completion of all flags for a shell"),
 ]
 
 

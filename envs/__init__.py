@@ -1,11 +1,9 @@
-"""The walking model in MuJoCo, as Gymnasium environments; importing it registers `SegmentedFootBiped-v0`.
+"""The walking model in MuJoCo, as Gymnasium environments; `import springfoot` registers them.
 
 Settings need no simulator; MuJoCo and numba are imported at the first use of a name that walks.
 """
 
 from typing import TYPE_CHECKING
-
-import gymnasium as gym
 
 from springfoot.lazy import lazy_names
 
@@ -35,12 +33,6 @@ _MODULE = {
     "SegmentedFootBipedVector": "vector_env",
     "TERMINATIONS": "batch.step_result",
 }
-
-gym.register(
-    id="SegmentedFootBiped-v0",
-    entry_point="springfoot.envs.env:SegmentedFootBiped",
-    vector_entry_point="springfoot.envs.vector_env:SegmentedFootBipedVector",
-)
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(__name__, _MODULE)

@@ -28,18 +28,18 @@ DAYLIGHT, SUN = 1.6, 2.2
 
 NARROW = 600
 """Width of a picture in which the panel of sliders lies over the lower part [pixels]; chosen: telephones."""
-CAMERA = (0.5, -2.6, 1.0)
+STANDPOINT = (0.5, -2.6, 1.0)
 """Initial place of the camera [m], beside the walk."""
 MIDDLE = (0.15, 0.0, 0.75)
 """Initial middle of the picture [m]."""
-NARROW_CAMERA, NARROW_MIDDLE = (0.7, -4.2, 1.3), (0.15, 0.0, -1.2)
+NARROW_STANDPOINT, NARROW_MIDDLE = (0.7, -4.2, 1.3), (0.15, 0.0, -1.2)
 """Likewise of a narrow picture [m]: so far and so low that the whole body walks above the panel; chosen by eye."""
 
 
 def fit_to_screen(client: viser.ClientHandle) -> None:
     """Move the camera of a new browser with a narrow picture, so that the panel does not hide the body."""
     if client.camera.image_width < NARROW:
-        client.camera.position = NARROW_CAMERA
+        client.camera.position = NARROW_STANDPOINT
         client.camera.look_at = NARROW_MIDDLE
 
 
@@ -49,7 +49,7 @@ class LiveScene:
     def __init__(self, server: viser.ViserServer, session: LiveSession):
         self._server = server
         self._session = session
-        server.initial_camera.position = CAMERA
+        server.initial_camera.position = STANDPOINT
         server.initial_camera.look_at = MIDDLE
         self._begin()
 

@@ -1,6 +1,8 @@
 """The contract of Gymnasium's Env, and its docstring as the specification."""
 
 import re
+import subprocess
+import sys
 import warnings
 from dataclasses import replace
 from typing import Any
@@ -273,9 +275,13 @@ def test_a_spec_holds_its_settings_as_json_and_makes_the_same_environment():
     assert again.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 
 
-def test_the_bare_id_is_known_after_the_import():
-    env: Any = gym.make("SegmentedFootBiped-v0", speed=1.1)
+@pytest.mark.parametrize("name", ["springfoot/SegmentedFootBiped-v0", "SegmentedFootBiped-v0"])
+def test_both_ids_are_known_after_the_import_of_the_package_alone(name):
+    env: Any = gym.make(name, speed=1.1)
     assert isinstance(env.unwrapped, SegmentedFootBiped) and env.unwrapped.settings.speed == 1.1
+    assert gym.make_vec(name, num_envs=2).unwrapped.num_envs == 2
+    code = f"import gymnasium, springfoot, sys; gymnasium.spec({name!r}); print('mujoco' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
 
 
 def test_every_setting_is_an_argument_of_make():

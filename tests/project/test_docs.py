@@ -6,12 +6,15 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 import tyro
 
+from springfoot.cli.completion import Shell
 from springfoot.cli.evaluate import EvaluateFlags
+from springfoot.cli.examples import ExamplesFlags
 from springfoot.cli.export import ExportFlags
 from springfoot.cli.live import LiveFlags
 from springfoot.cli.main import STUDIES, main, study_class
@@ -138,8 +141,11 @@ def test_every_command_that_a_document_names_is_understood(command):
     program, words = program_of(command)
     if program[:2] == ("springfoot", "study") and program[2:]:
         tyro.cli(study_class(program[2]), args=words)  # exits where it does not understand
+    elif program == ("springfoot", "completion"):
+        assert not words or words[0] in get_args(Shell)
     elif program[0] == "springfoot" and program[1] != "study" and words:
         flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags, "live": LiveFlags}
+        flags["examples"] = ExamplesFlags
         tyro.cli(flags[program[1]], args=words)
     else:
         assert program[0] != "springfoot" or words in ([], ["--help"], ["NAME"])

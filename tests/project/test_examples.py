@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from springfoot.cli.main import main
 from springfoot.evaluation import prepare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,8 +33,20 @@ RUNS = {
 
 
 def test_every_example_is_run_and_short():
-    assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {"__init__.py", *RUNS}
     assert all(len(path.read_text().splitlines()) <= 60 for path in EXAMPLES.glob("*.py"))
+
+
+def test_examples_are_copied_out_of_the_package_into_a_new_folder(tmp_path, capsys):
+    copy = tmp_path / "mine"
+    assert main(["examples", "--copy", str(copy)]) == 0
+    known = {path.relative_to(EXAMPLES) for path in EXAMPLES.rglob("*.*") if path.suffix in (".py", ".txt")}
+    copied = {path.relative_to(copy): path.read_bytes() for path in copy.rglob("*.*")}
+    assert copied == {path: (EXAMPLES / path).read_bytes() for path in known - {Path("__init__.py")}}
+    assert f"{copy / 'one_walk.py'}: One walk, step by step" in capsys.readouterr().out
+    assert main(["examples", "--copy", str(copy)]) == 2
+    error = f"springfoot examples: error: {copy} exists already; give --copy a new folder\n"
+    assert capsys.readouterr().err == error
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from springfoot.cli.main import main
 from springfoot.extras import EXTRA_OF
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli")
+ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli", "examples")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 EXTRAS = ("evaluate", "train", "dev")
 """Extras of `make install`."""
@@ -210,7 +210,7 @@ def verdict(code, mode, python, folder):
 
 
 def test_no_public_name_is_unknown_to_a_strict_type_checker(users_python, tmp_path):
-    public = [room for room in ROOMS if room not in ("files", "cli")]
+    public = [room for room in ROOMS if room not in ("files", "cli", "examples")]
     names = {room: import_module(f"springfoot.{room}").__all__ for room in public}
     imports = [f"from springfoot.{room} import {', '.join(public)}" for room, public in names.items()]
     uses = [f"print({name})" for public in names.values() for name in public]
@@ -274,7 +274,7 @@ def test_commit_hooks_run_the_pinned_ruff():
 @pytest.mark.parametrize(
     ("room", "absent"),
     [
-        ("gait", {"gymnasium", "matplotlib", "mujoco", "stable_baselines3", "torch"}),
+        ("gait", {"matplotlib", "mujoco", "stable_baselines3", "torch"}),
         ("envs", {"matplotlib", "stable_baselines3", "torch", "tyro"}),
     ],
 )
@@ -296,7 +296,7 @@ def test_evaluating_and_the_studies_that_train_nothing_need_no_learner():
 import sys
 from springfoot.cli.main import main, study_class
 assert main(["--help"]) == main(["study", "--help"]) == 0
-assert not {{"numpy", "mujoco", "tyro"}} & set(sys.modules)
+assert not {{"scipy", "mujoco", "tyro"}} & set(sys.modules)
 for name in {(*names, "learning-curves")}:
     study_class(name)
 try:

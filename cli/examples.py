@@ -1,0 +1,49 @@
+"""Copy the examples out of the package: `springfoot examples`."""
+
+import shutil
+from ast import get_docstring, parse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from springfoot.command_line import exit_code
+from springfoot.command_line import parse as parse_flags
+from springfoot.errors import SpringfootError
+from springfoot.files.text_table import read_bytes
+from springfoot.files.writing import whole_folder
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExamplesFlags:
+    """List the programs to start from, examples/learners for other libraries, or copy them."""
+
+    copy: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: only list them)")] = None
+    """New folder for the copies."""
+
+
+def examples_main(arguments: Sequence[str], program: str = "springfoot examples") -> int:
+    """List or copy the examples; return 0, and 2 for bad input."""
+    flags = parse_flags(ExamplesFlags, arguments, program)
+    return exit_code(program, lambda: run_examples(flags))
+
+
+def run_examples(flags: ExamplesFlags) -> None:
+    """Print the name and the first line of each example, of the copies if they are asked for."""
+    source = Path(str(resources.files("springfoot.examples")))
+    programs = [path for path in sorted(source.rglob("*.py")) if path.name != "__init__.py"]
+    if flags.copy is not None:
+        if flags.copy.exists():
+            raise SpringfootError(f"{flags.copy} exists already; give --copy a new folder")
+        with whole_folder(flags.copy, flags.copy) as (folder, _):
+            for path in (*programs, *source.rglob("*.txt")):
+                copied = folder / path.relative_to(source)
+                copied.parent.mkdir(exist_ok=True)
+                shutil.copyfile(path, copied)
+    shown = flags.copy or Path("examples")
+    for path in programs:
+        words = get_docstring(parse(read_bytes(path))) or ""
+        print(f"{shown / path.relative_to(source)}: {words.splitlines()[0]}")

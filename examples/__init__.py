@@ -1,0 +1,1 @@
+"""Programs to start from; `springfoot examples --copy FOLDER` copies them."""
