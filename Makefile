@@ -138,7 +138,7 @@ FEET := $(BIN)/springfoot study
 feet: install
 	@set -ex; \
 	if [ -n "$(FULL)" ]; then $(FEET) adapt-all; cp runs/feet/adapted.json envs/control/adapted.json; fi; \
-	$(FEET) prosthesis $(if $(FULL),--train) --keep runs/feet/prosthesis.json; \
+	$(FEET) prosthesis $(if $(FULL),--train --policies agents/pretrained/feet) --keep runs/feet/prosthesis.json; \
 	$(FEET) orthosis --keep runs/feet/orthosis.json
 
 # Each stage is kept in runs/predict: after a stop the same command goes on.

@@ -1,7 +1,6 @@
 """Add the README of the package index, where no file of the repository lies beside it, to pyproject.toml."""
 
 import re
-import runpy
 import tomllib
 from pathlib import Path
 
@@ -31,7 +30,8 @@ def index_page(source: str | None, version: str) -> str:
 
 if __name__ == "__main__":
     project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    version = runpy.run_path(str(HERE / "package" / "__init__.py"))["__version__"]
+    package = (HERE / "package" / "__init__.py").read_text(encoding="utf-8")  # read, not run: it imports Gymnasium
+    version = re.findall(r'^__version__ = "(.+)"$', package, re.MULTILINE)[0]
     setup(
         long_description=index_page(project.get("urls", {}).get("Source"), version),
         long_description_content_type="text/markdown",

@@ -10,6 +10,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .policies.baselines import BASELINES, PolicyFunction, baseline
+    from .policies.cards import policy_card
     from .policies.conversion import policy_from_mlp, policy_from_sb3
     from .policies.export import export_policy
     from .policies.foreign import ForeignPolicy
@@ -30,6 +31,7 @@ __all__ = [
     "baseline",
     "export_policy",
     "load_policy",
+    "policy_card",
     "policy_from_mlp",
     "policy_from_sb3",
     "read_policy",
@@ -50,6 +52,7 @@ _MODULE = {
     "baseline": "policies.baselines",
     "export_policy": "policies.export",
     "load_policy": "policies.policy",
+    "policy_card": "policies.cards",
     "policy_from_mlp": "policies.conversion",
     "policy_from_sb3": "policies.conversion",
     "read_policy": "policies.policy",

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from springfoot.agents import TrainingConfig
+from springfoot.agents import TrainingConfig, policy_card
+from springfoot.agents.policies import SHIPPED
 from springfoot.cli.main import STUDIES
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
@@ -71,9 +72,15 @@ def observations() -> str:
     return f"# Observations, actions, reward\n\n{before}## Arguments\n{settings_line}{after}".rstrip()
 
 
+def policies() -> str:
+    """Return the page of the policies that come with the package: a model card each."""
+    words = "Each is a name for every command, and for `springfoot.agents.load_policy`."
+    return "\n\n".join(["# Policies of the package", words, *map(policy_card, SHIPPED)])
+
+
 def pages() -> dict[str, str]:
     """Return the text of each page by its name."""
-    texts = {"settings": settings(), "commands": commands(), "observations": observations()}
+    texts = {"settings": settings(), "commands": commands(), "observations": observations(), "policies": policies()}
     return {name: f"{NOTE}\n\n{text}\n" for name, text in texts.items()}
 
 

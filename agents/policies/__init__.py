@@ -6,14 +6,16 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .baselines import CONSTANT_STIFFNESS, PolicyFunction, and_copy, has_feedback, leg_phase, own_settings, schedule
-    from .policy import BEST, RUN
+    from .policy import BEST, RUN, SHIPPED, find_policy
 
 __all__ = [
     "BEST",
     "CONSTANT_STIFFNESS",
     "RUN",
+    "SHIPPED",
     "PolicyFunction",
     "and_copy",
+    "find_policy",
     "has_feedback",
     "leg_phase",
     "own_settings",
@@ -27,8 +29,10 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "BEST": "policy",
             "CONSTANT_STIFFNESS": "baselines",
             "RUN": "policy",
+            "SHIPPED": "policy",
             "PolicyFunction": "baselines",
             "and_copy": "baselines",
+            "find_policy": "policy",
             "has_feedback": "baselines",
             "leg_phase": "baselines",
             "own_settings": "baselines",

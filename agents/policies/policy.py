@@ -45,9 +45,12 @@ Output = Literal["clip", "tanh"]
 
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
-SHIPPED = {"pretrained": "walk.safetensors", "predicted": "predicted.safetensors"}
-"""Name of a policy of this package -> its file in `pretrained/`: of `PRETRAINED_BY`, and of preset
-`predict`."""
+OF_FEET = tuple(f"{kind}-{search}-{seed}" for kind in ("passive", "adaptive") for search in (1, 2) for seed in range(5))
+"""Policies trained on prosthetic feet: KIND-SEARCH-SEED, of `springfoot study prosthesis`."""
+SHIPPED = {"pretrained": "walk.safetensors", "predicted": "predicted.safetensors"} | {
+    name: f"feet/{name}.safetensors" for name in OF_FEET
+}
+"""Name of a policy of this package -> its file in `pretrained/`; `policy_card` describes each."""
 PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
 """Command that made `pretrained` from nothing."""
 RUN = "run.json"
@@ -143,7 +146,7 @@ def find_policy(name: str | Path) -> Path:
     """
     path = Path(name)
     if str(name) in SHIPPED:
-        path = Path(str(resources.files("springfoot.agents") / "pretrained" / SHIPPED[str(name)]))
+        path = Path(str(resources.files("springfoot.agents") / "pretrained")) / SHIPPED[str(name)]
         if not path.is_file():
             raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: train.py")
     elif path.is_dir():

@@ -19,7 +19,7 @@ from springfoot.agents.policies.baselines import (
     own_settings,
 )
 from springfoot.agents.policies.foreign import is_function
-from springfoot.agents.policies.policy import SHIPPED, load_policy
+from springfoot.agents.policies.policy import OF_FEET, SHIPPED, load_policy
 from springfoot.agents.policies.schedules import schedule_file
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
@@ -65,7 +65,9 @@ def prepare(
         settings = settings_from(**(own | wanted))
         return make(settings), settings
     if name not in SHIPPED and not Path(name).exists() and not is_function(name):
-        known = ", ".join([*SHIPPED, *BASELINES])
+        known = ", ".join(
+            [*(name for name in SHIPPED if name not in OF_FEET), f"{OF_FEET[0]} to {OF_FEET[-1]}", *BASELINES]
+        )
         raise SpringfootError(
             f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, module:function, or one of {known}, "
             f"or {FROZEN}:POLICY"

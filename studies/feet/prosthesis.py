@@ -24,7 +24,7 @@ import numpy as np
 import tyro
 from matplotlib.figure import Figure
 
-from springfoot.agents.policies import BEST
+from springfoot.agents.policies import BEST, SHIPPED, find_policy
 from springfoot.agents.training import PRESETS, TrainingConfig
 from springfoot.envs.control import TUNED_SPEED
 from springfoot.envs.settings import ADAPTED, committed_feet, without_person
@@ -80,8 +80,8 @@ class Prosthesis(TrainingStudy):
     """Train missing policies and keep them in `policies`."""
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/feet/trainings")
     """Folder of the trainings."""
-    policies: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("docs/feet")
-    """Folder of the trained policies, KIND-SEARCH-SEED.safetensors."""
+    policies: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """Folder of the trained policies, KIND-SEARCH-SEED.safetensors; by default those of the package."""
     keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """File in which each row's numbers are kept, to go on after a stop."""
 
@@ -93,6 +93,8 @@ class Prosthesis(TrainingStudy):
         """Refuse counts out of range, and groups of unequal size."""
         super().check()
         require_count("groups", self.groups)
+        if self.train and self.policies is None:
+            raise SpringfootError("--train keeps policies: give --policies a folder for them")
         if self.episodes % self.groups:
             raise SpringfootError(f"episodes must be a multiple of groups, got {self.episodes} and {self.groups}")
 
@@ -115,7 +117,7 @@ class Prosthesis(TrainingStudy):
         columns = list(rows[0])
         elsewhere = f"{self.episodes_elsewhere} episodes of each, of {self.seeds_elsewhere} seeds of the trainings"
         learned = f"{self.timesteps or STEPS:,} steps of 20 ms"
-        text = sections(rows, shares, (self.what_ran, elsewhere, learned), self.policies)
+        text = sections(rows, shares, (self.what_ran, elsewhere, learned))
         files = {
             "prosthesis.csv": csv_text(columns, [[row[name] for name in columns] for row in rows]),
             "recovered.csv": csv_text(list(shares[0]), [list(each.values()) for each in shares]) if shares else "",
@@ -159,11 +161,17 @@ class Prosthesis(TrainingStudy):
                         yield _row(kind, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own
                     seeds = self.seeds if _here(where) else min(self.seeds, self.seeds_elsewhere)
                     for seed in range(seeds if kind in TRAINED else 0):
-                        policy = self.policies / f"{kind}-{search}-{seed}.safetensors"
-                        if policy.is_file():
+                        if policy := self._policy(f"{kind}-{search}-{seed}"):
                             its = {**given, "right_foot": worn}
-                            yield _row(kind, WITH_POLICY, where, search, seed), str(policy), its
+                            yield _row(kind, WITH_POLICY, where, search, seed), policy, its
         yield from self._held()
+
+    def _policy(self, name: str) -> str:
+        """Return a trained policy, a file or a name of the package's; no text if there is none."""
+        if self.policies is None:
+            return name if name in SHIPPED else ""
+        path = self.policies / f"{name}.safetensors"
+        return str(path) if path.is_file() else ""
 
     def _held(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
         """Yield the rigid foot with a held toe, and the passive feet, at the speed of the held toe's search."""
@@ -194,6 +202,7 @@ class Prosthesis(TrainingStudy):
                     folder = self.runs / f"{kind}-{search}" / f"seed-{seed}"
                     jobs.append((config, folder, f"{kind} {search}, seed {seed}"))
         failed = self.train_missing(jobs)
+        assert self.policies is not None  # as `check` saw to
         self.policies.mkdir(parents=True, exist_ok=True)
         for _, folder, _ in jobs:
             if (folder / BEST).is_file():
@@ -231,7 +240,7 @@ def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
 
 def _digest(policy: str, given: Mapping[str, Any]) -> str:
     """Return a digest of the policy's file, and of the legs and the foot that its settings name."""
-    path = Path(policy)
+    path = find_policy(policy) if policy in SHIPPED else Path(policy)
     foot = given.get("right_foot")
     name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
     content = read_bytes(path) if path.is_file() else b""
@@ -314,7 +323,7 @@ def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = Fa
     return found
 
 
-def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, str], policies: Path) -> dict[str, str]:
+def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, str]) -> dict[str, str]:
     """Return the sections of the report, by heading.
 
     `ran` describes the walks at the first place, the walks elsewhere, and the length of the trainings.
@@ -326,7 +335,7 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, st
         "as shares of episodes; numbers of walks that fell are of the strides before. Mean ± SD over rows of the CSV: "
         "groups of the same episodes, or seeds of trainings. Not adapted: legs of two sound feet, stiffness by "
         "`pretrained`. Adapted: legs (and the foot's own numbers) of `springfoot study adapt`, stiffness as its search "
-        f"left it. Trained: the same, stiffness by policies trained on it for {ran[2]} ({policies}). Cost of "
+        f"left it. Trained: the same, stiffness by policies trained on it for {ran[2]}. Cost of "
         f"transport counts what a passive spring gives back as well. {ABOUT_STOPS}"
     )
     text = {"PROSTHESIS": f"![Feet](prosthesis.png)\n\n{_where(first)}\n\n{_walks_table(here)}\n\n{note}"}

@@ -134,13 +134,13 @@ def test_the_passive_foot_is_better_than_the_rigid_one_by_an_interval(rigid, wor
     rows = rows_of([1.5, 1.52, 1.48], [1.4, 1.41, 1.39], 1.3)
     worn = [row for row in rows if (row["foot"], row["person"]) == ("passive", ADAPTED_ALONE)]
     rows += [{**row, "foot": "rigid", "sound_peak_bw": peak} for row, peak in zip(worn, rigid, strict=True)]
-    text = sections(rows, [], ("3 episodes", "2 episodes", "9 steps"), tmp_path)["PROSTHESIS"]
+    text = sections(rows, [], ("3 episodes", "2 episodes", "9 steps"))["PROSTHESIS"]
     assert re.search(f"search 1: .*{word} in [0-9] \\([^)]*sound-side peak BW", text)
 
 
 def test_the_page_tells_every_row_and_what_is_missing(tmp_path):
     rows = rows_of([1.5, 1.52, 1.48], [1.4, 1.41, 1.39], 1.3)
-    text = sections(rows, share_rows(rows), ("3 episodes", "2 episodes", "9 steps"), tmp_path)
+    text = sections(rows, share_rows(rows), ("3 episodes", "2 episodes", "9 steps"))
     assert "| passive | adapted, trained | 1 | 3 | – | – | – | 1.50 ± 0.02 |" in text["PROSTHESIS"]
     assert "trained on it for 9 steps" in text["PROSTHESIS"]
     assert "50% [" in text["RECOVERED"]

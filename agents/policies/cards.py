@@ -1,0 +1,46 @@
+"""Describe the policies that come with the package: a model card each, of what their files say."""
+
+from hashlib import sha256
+
+from springfoot.envs.settings.settings import BipedSettings, settings_to_json
+from springfoot.errors import SpringfootError
+from springfoot.files.text_table import read_bytes
+
+from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
+
+MADE = {
+    "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", PRETRAINED_BY, "walk"),
+    "predicted": ("Walks by a plan that knows no person's curves.", "springfoot study predict", "prediction"),
+}
+"""Policy -> purpose, the command that made it, and the page of its results."""
+SHARED_LIMITS = (
+    "One planar body in simulation; a stiffness that walks here is none for a patient's foot. Slopes, loads and other "
+    "bodies were not trained: measure them first (`springfoot study compare --world`)."
+)
+"""Limits that all of them share."""
+
+
+def policy_card(name: str) -> str:
+    """Return the model card of one of `SHIPPED`, as Markdown; raise `SpringfootError` for another name."""
+    if name not in SHIPPED:
+        raise SpringfootError(f"no policy {name!r} in the package; there are {', '.join(SHIPPED)}")
+    policy = read_policy(name)
+    purpose, command, page = MADE.get(name) or _of_a_foot(name)
+    usual = settings_to_json(BipedSettings())
+    own = {key: value for key, value in settings_to_json(policy.settings).items() if value != usual[key]}
+    lines = [
+        f"made by: `{command}`",
+        f"results and falls: docs/results/{page}.md",
+        f"network: {' - '.join(map(str, policy.layer_sizes))}, {policy.activation}; observations to four stiffnesses",
+        f"settings of its training, where not the defaults: {', '.join(f'{key} {own[key]}' for key in own) or 'none'}",
+        f"limits: {SHARED_LIMITS}",
+        f"SHA-256: `{sha256(read_bytes(find_policy(name))).hexdigest()}`",
+    ]
+    return "\n- ".join([f"**{name}.** {purpose}\n", *lines])
+
+
+def _of_a_foot(name: str) -> tuple[str, str, str]:
+    """Return purpose, command and page of a policy KIND-SEARCH-SEED."""
+    kind, search, seed = name.split("-")
+    purpose = f"Walks with a {kind} right foot, found by search {search}, to which the person has adapted; seed {seed}."
+    return purpose, "springfoot study prosthesis --train --policies FOLDER", "feet"
