@@ -1,16 +1,12 @@
 """Print tab completion for a shell: `springfoot completion bash`."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import make_dataclass
 from importlib import import_module
 from typing import Annotated, Any, Literal, Union, get_args
 
 import tyro
-
-from springfoot.extras import EXTRA_OF
-
-from .main import STUDIES, study_class
 
 Shell = Literal["bash", "zsh", "tcsh"]
 """Shells that tyro writes completions for."""
@@ -28,15 +24,23 @@ bash:  springfoot completion bash > ~/.local/share/bash-completion/completions/s
 zsh:   springfoot completion zsh > FOLDER/_springfoot, a folder of your $fpath"""
 
 
-def completion_main(arguments: Sequence[str]) -> int:
-    """Print the completion of all commands and flags for a shell; return 0, and 2 for another word."""
+def completion_main(arguments: Sequence[str], installed_studies: Callable[[], dict[str, Any]]) -> int:
+    """Print the completion of all commands and flags for a shell; return 0, and 2 for another word.
+
+    `installed_studies` returns name -> class of the studies whose packages are installed.
+    """
     match arguments:
         case ["-h" | "--help"]:
             print(HELP)
             return 0
         case [shell] if shell in get_args(Shell):
             own_names = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
-            tyro.cli(_all_commands(), prog="springfoot", args=["--tyro-print-completion", shell], config=own_names)
+            tyro.cli(
+                _all_commands(installed_studies()),
+                prog="springfoot",
+                args=["--tyro-print-completion", shell],
+                config=own_names,
+            )
         case _:
             words = " ".join(arguments)
             print(
@@ -47,24 +51,14 @@ def completion_main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _all_commands() -> Any:
-    """Return the type, a union for tyro, of all commands; studies whose packages are not installed are left out."""
+def _all_commands(studies: dict[str, Any]) -> Any:
+    """Return the type, a union for tyro, of all commands."""
     commands = {}
     for name, place in COMMANDS.items():
         module, _, flags = place.partition(".")
         commands[name] = getattr(import_module(f"springfoot.cli.{module}"), flags)
-    studies = {name: found for name in STUDIES if (found := _installed_study(name)) is not None}
     commands["study"] = make_dataclass("StudyCommand", [("study", _one_of(studies))])
     return _one_of(commands)
-
-
-def _installed_study(name: str) -> Any:
-    try:
-        return study_class(name)
-    except ModuleNotFoundError as error:
-        if error.name not in EXTRA_OF:
-            raise
-        return None
 
 
 def _one_of(commands: dict[str, Any]) -> Any:

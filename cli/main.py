@@ -106,7 +106,7 @@ def _run(words: list[str]) -> int:
             case ["completion", *rest]:
                 from .completion import completion_main
 
-                return completion_main(rest)
+                return completion_main(rest, _installed_studies)
             case []:
                 print(FIRST)
                 return 0
@@ -159,6 +159,18 @@ def study_class(name: str) -> "type[Study]":
     """Return the class of one of `STUDIES`."""
     module, _, found = STUDIES[name][0].rpartition(".")
     return getattr(import_module(f"springfoot.studies.{module}"), found)
+
+
+def _installed_studies() -> "dict[str, type[Study]]":
+    """Return name -> class of the studies whose packages are installed."""
+    found = {}
+    for name in STUDIES:
+        try:
+            found[name] = study_class(name)
+        except ModuleNotFoundError as error:
+            if error.name not in EXTRA_OF:
+                raise
+    return found
 
 
 def study_help() -> str:

@@ -5,7 +5,6 @@ import subprocess
 
 import pytest
 
-from springfoot.cli.completion import completion_main
 from springfoot.cli.main import STUDIES, main
 
 OFFER = """
@@ -40,7 +39,7 @@ def test_bash_offers_commands_studies_and_flags(tmp_path, capsys):
 
 @pytest.mark.parametrize("words", [[], ["fish"], ["bash", "zsh"]])
 def test_another_shell_is_refused(words, capsys):
-    assert completion_main(words) == 2
+    assert main(["completion", *words]) == 2
     told = f"springfoot completion: error: give one of bash, zsh, tcsh, got {' '.join(words)!r}\n"
     assert capsys.readouterr().err == told
 

@@ -1,5 +1,6 @@
 """Networks trained elsewhere become policies: the same actions, and one line for what cannot be."""
 
+import dataclasses
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +13,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecNormalize
 
 from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_mlp, policy_from_sb3, read_policy, save_policy
-from springfoot.agents.policies.conversion import TORCH_NAMES
+from springfoot.agents.policies.conversion import IGNORED, NEVER_VARIED, TORCH_NAMES, ignoring_unvaried
 from springfoot.agents.policies.policy import ACTIVATIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation import OBSERVATION
@@ -94,6 +95,15 @@ def test_a_model_of_stable_baselines3_becomes_a_file_that_acts_the_same(name, tm
     assert expected.std() > 0.3 and np.abs(expected).max() <= 1.0
     assert again.settings == model.get_env().get_attr("settings")[0]
     assert again.header == policy.header
+
+
+def test_what_varied_by_the_limit_is_kept():
+    width = len(OBSERVATION)
+    policy = policy_from_mlp([(np.zeros((4, width)), np.zeros(4))], BipedSettings(), activation="tanh")
+    limit = dataclasses.replace(policy, observation_variance=np.full(width, NEVER_VARIED))
+    assert (ignoring_unvaried(limit).observation_variance == NEVER_VARIED).all()
+    below = dataclasses.replace(policy, observation_variance=np.full(width, 0.99 * NEVER_VARIED))
+    assert (ignoring_unvaried(below).observation_variance == IGNORED).all()
 
 
 def test_what_never_varied_is_ignored_if_asked():

@@ -268,6 +268,7 @@ def test_projection_is_almost_inverse_dynamics_below_the_hip_in_stance_and_nothi
     assert 0.08 < rows["hip", "stance"].rms < 0.2
     assert rows["hip", "swing"].r is None and rows["hip", "swing"].rms > 0.15
     assert all(row.peak >= row.rms > 0 for row in rows.values())
+    assert rows["ankle", "stance"].peak < 10 * rows["ankle", "stance"].rms  # of the same difference, not of a sum
     motion = leg_motion({name: np.zeros(4) for name in ANGLES}, np.zeros((4, 2)), 0.01)
     hanging = FootLoad(force=np.zeros((4, 2, 2)), point=np.zeros((4, 2, 2)))
     assert [row.part for row in projection_table(body, motion, hanging)] == ["swing"] * 4

@@ -226,6 +226,7 @@ def test_many_strides_and_any_origin_of_the_angle_give_the_same_spring():
     found = only(torque, angle, velocity, phase)
     folded = only(*(values.reshape(4, 15) for values in (torque, angle, velocity, phase)))
     assert folded == found
+    assert only(torque, 0.01 * angle, velocity, phase).condition == pytest.approx(found.condition)  # of any unit
     stiffness, damping_time, equilibrium = estimates(only(torque, angle + 1.5, velocity, phase))
     assert (stiffness, damping_time) == tuple(pytest.approx(each) for each in estimates(found)[:2])
     assert np.subtract(equilibrium, 1.5) == pytest.approx(estimates(found)[2])
