@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from springfoot.command_line import end_in_order, exit_code, parse
 from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, printable, require_count
-from springfoot.files.writing import whole_folder
+from springfoot.files.writing import is_taken, whole_folder
 from springfoot.studies.base.flags import SettingsFlags, given
 
 LONGEST_NAME = 60
@@ -83,7 +83,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
             f"report.html shows up to {MOST_IN_REPORT} policies, got {len(flags.policies)}; give --no-report"
         )
     labels = _labels(flags.policies)
-    if flags.out is not None and flags.out.exists():
+    if flags.out is not None and is_taken(flags.out):
         raise SpringfootError(f"{flags.out} exists already; give --out a new folder")
     from springfoot.agents.policies.baselines import FROZEN, has_feedback
     from springfoot.evaluation.numbers import metrics

@@ -14,7 +14,7 @@ from springfoot.command_line import exit_code
 from springfoot.command_line import parse as parse_flags
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import read_bytes
-from springfoot.files.writing import whole_folder
+from springfoot.files.writing import is_taken, whole_folder
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ def run_examples(flags: ExamplesFlags) -> None:
     source = Path(str(resources.files("springfoot.examples")))
     programs = [path for path in sorted(source.rglob("*.py")) if path.name != "__init__.py"]
     if flags.copy is not None:
-        if flags.copy.exists():
+        if is_taken(flags.copy):
             raise SpringfootError(f"{flags.copy} exists already; give --copy a new folder")
         with whole_folder(flags.copy, flags.copy) as (folder, _):
             for path in (*programs, *source.rglob("*.txt")):

@@ -5,11 +5,12 @@ The members of the archive are stored, not compressed, so that a small file cann
 
 import io
 import json
+import os
 from math import prod
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 import numpy as np
 from numpy.lib import format as npy
@@ -18,10 +19,22 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from .tensor_file import DIGEST, digest_of
-from .text_table import existing
+from .text_table import open_file
 
 HEADER = "header"
 """Name of the array with the JSON text."""
+_FAULTS = (
+    ArithmeticError,  # more entries than a number can count
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,  # a member under a password
+    TypeError,
+    ValueError,
+)
+"""Errors of `zipfile`, `numpy` and `json` on files of other contents."""
 
 
 def write_arrays(path: Path, header: dict[str, Any], arrays: dict[str, NDArray]) -> None:
@@ -35,12 +48,14 @@ def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArra
     """Return header and arrays of a file of `write_arrays`; raise `SpringfootError` for any other, calling it no
     `what`."""
     try:
-        with ZipFile(existing(path)) as archive:
-            if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
+        with open_file(path) as file, ZipFile(file) as archive:
+            members = archive.infolist()
+            if (
+                any(member.compress_type != ZIP_STORED for member in members)
+                or sum(member.file_size for member in members) > os.fstat(file.fileno()).st_size
+            ):
                 raise SpringfootError(f"{path} is no {what}: it is compressed")
-            arrays = {
-                member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in archive.infolist()
-            }
+            arrays = {member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in members}
         header = json.loads(str(arrays.pop(HEADER)))
         digest = header.pop(DIGEST, None)
         whole = digest == digest_of(header, arrays)
@@ -48,7 +63,7 @@ def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArra
         raise
     except BadZipFile as error:
         raise SpringfootError(f"{path} is no {what}, or it is damaged: {error}") from None
-    except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, MemoryError) as error:
+    except _FAULTS as error:
         reason = f": {error.strerror}" if isinstance(error, OSError) and error.strerror else ""
         raise SpringfootError(f"{path} is no {what}{reason}") from None
     if digest is None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ def read_object(path: Path, what: str) -> dict[str, Any]:
     content = read_bytes(path, MOST_JSON_BYTES)
     require_whole(path, content)
     try:
-        value = json.loads(content, object_pairs_hook=keys_once)
+        value = json.loads(content, object_pairs_hook=keys_once, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise SpringfootError(f"{path} is no {what}: it is not JSON, {json_fault(error)}") from None
     if not isinstance(value, dict):
@@ -44,6 +45,14 @@ def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
             raise ValueError(f"{key!r:.40} stands twice in an object")
         values[key] = value
     return values
+
+
+def _finite(text: str) -> float:
+    """Return a number of a JSON text; raise `ValueError` for NaN and for what no float can hold, which JSON has not."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError(f"{text:.40} is not a finite number")
+    return value
 
 
 def json_fault(error: Exception) -> str:

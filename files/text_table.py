@@ -2,11 +2,14 @@
 
 import csv
 import io
+import os
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from stat import S_ISREG
+from typing import BinaryIO
 
 import numpy as np
 
@@ -20,6 +23,10 @@ MOST_TEXT_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_
 take less than half a gigabyte."""
 LARGEST_VALUE = 1e12
 """Largest magnitude of a number in a cell; chosen, so that means and squares are finite."""
+
+
+_NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+"""Flag with which opening a pipe does not wait for its other end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,14 +80,28 @@ def existing(path: Path) -> Path:
     return path
 
 
+def open_file(path: Path) -> BinaryIO:
+    """Open a regular file for reading; raise `SpringfootError` for anything else, also where one takes its place
+    now."""
+
+    def opener(name: str, flags: int) -> int:
+        return os.open(name, flags | _NO_WAIT)
+
+    file = open(existing(path), "rb", opener=opener)  # noqa: SIM115  # the caller closes it
+    if not S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise SpringfootError(f"{path} is not a regular file")
+    return file
+
+
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     """Return the content of a file; raise `SpringfootError` if it is missing or larger than `most` bytes.
 
-    Never reads more than that.
+    Never reads more than that, and never waits for more.
     """
-    with existing(path).open("rb") as file:
-        size = path.stat().st_size
-        content = file.read(most + 1) if size <= most else b""
+    with open_file(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        content = (file.read(most + 1) or b"") if size <= most else b""  # None: it would wait
     if max(size, len(content)) > most:
         raise SpringfootError(f"{path.name} must have at most {most:,} bytes, has {max(size, len(content)):,}")
     return content

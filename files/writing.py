@@ -56,6 +56,15 @@ def _is_temporary(path: Path) -> bool:
     return re.fullmatch(r"\..+\.(safetensors|json|png)\.[a-z0-9_]{8}", path.name) is not None
 
 
+def is_taken(path: Path) -> bool:
+    """Tell whether a name is in use: by a file, a folder or a link, also by a link to nothing."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
 def write_new(contents: Mapping[Path, bytes]) -> None:
     """Write several new files, all of them or none; raise `SpringfootError`, with nothing written, if one exists."""
     require_new_files(contents)
@@ -74,7 +83,7 @@ def write_new(contents: Mapping[Path, bytes]) -> None:
 def require_new_files(paths: Iterable[Path]) -> None:
     """Raise `SpringfootError` if one of these files exists."""
     for path in paths:
-        if path.exists():
+        if is_taken(path):
             raise SpringfootError(f"{path} already exists; out must be a new file")
 
 
@@ -110,7 +119,7 @@ def _part(out: Path) -> Iterator[Path]:
         raise TakenError(f"{part} is not of springfoot's making: remove it, or choose another folder than {out}")
     try:
         with owned(part):
-            if out.exists():
+            if is_taken(out):
                 raise TakenError(f"{out} exists already; out must be a new folder")
             try:
                 _empty(part)
@@ -138,11 +147,11 @@ def _settle(part: Path, out: Path) -> None:
     name = out
     for number in count(2):
         try:
-            if not name.exists():
+            if not is_taken(name):
                 part.rename(name)
                 break
         except OSError:
-            if not name.exists():
+            if not is_taken(name):
                 raise
         name = out.with_name(f"{out.name}-{number}")
     (name / OWNER).unlink(missing_ok=True)
@@ -181,7 +190,9 @@ def require_new(out: str | Path) -> Path:
     Files of a process that was killed before its first result do not count.
     """
     out = Path(out)
-    if out.exists() and not (out.is_dir() and all(path.name == OWNER or _is_temporary(path) for path in out.iterdir())):
+    if is_taken(out) and not (
+        out.is_dir() and all(path.name == OWNER or _is_temporary(path) for path in out.iterdir())
+    ):
         raise SpringfootError(f"{out} already exists; out must be a new or an empty folder")
     return out
 

@@ -8,7 +8,8 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -26,7 +27,7 @@ from springfoot.files.json_file import MOST_JSON_BYTES
 from springfoot.files.text_table import read_bytes
 
 from .fingerprint import fingerprint, require_same
-from .onnx_process import INPUT_TYPES, one_line, onnx_session
+from .onnx_process import FORMS, INPUT_TYPES, form, one_line, onnx_session
 
 CONTRACT_KEY = "springfoot"
 """Key of an ONNX file's metadata with the contract of an exported policy."""
@@ -71,10 +72,8 @@ class ForeignPolicy:
         """Actions (N, 4) in [-1, 1] for observations (N, D)."""
         rows = observation_rows(observation, self.width).astype(np.float32)
         batch = np.atleast_2d(rows)
-        try:
+        with _ending_nothing(self.name):
             returned = self.act(batch)
-        except SystemExit as error:
-            raise _ended(self.name, error) from None
         if np.iscomplexobj(returned):
             raise SpringfootError(f"{self.name} must return real actions, returned complex ones")
         try:
@@ -100,10 +99,11 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     a contract that is wrong or of another version of the environment.
     """
     try:
-        import onnxruntime  # noqa: F401  # not above: an extra
+        import onnx  # noqa: F401  # not above: an extra
+        import onnxruntime  # noqa: F401  # likewise
     except ModuleNotFoundError as error:
         raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
-    session, fails = onnx_session(path, np.zeros((2, len(OBSERVATION))))
+    session, failed = onnx_session(path, np.zeros((2, len(OBSERVATION))))
     inputs = session.get_inputs()
     outputs = [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
@@ -116,14 +116,16 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     width = len(biped.observation_names)
     if len(given.shape) not in (1, 2) or (isinstance(given.shape[-1], int) and given.shape[-1] != width):
         raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, given.shape))})")
-    if not fails:
-        session, fails = onnx_session(path, _first_observations(biped))
-    if fails:
-        raise SpringfootError(f"{path} fails on observations (2, {width}): {fails}")
+    if len(failed) < len(FORMS):
+        session, failed = onnx_session(path, _first_observations(biped))
+    if len(failed) == len(FORMS):
+        raise SpringfootError(f"{path} fails on observations (2, {width}): {failed[FORMS[0]]}")
     output = "action" if "action" in outputs else outputs[0]
     dtype = INPUT_TYPES[given.type]
 
     def act(observation: NDArray) -> Any:
+        if (reason := failed.get(form(observation))) is not None:
+            raise SpringfootError(reason)
         return session.run([output], {given.name: np.ascontiguousarray(observation, dtype)})[0]
 
     return _probed(str(path), act, biped)
@@ -144,28 +146,38 @@ def function_policy(name: str) -> ForeignPolicy:
     module_name, _, function_name = name.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
-    try:
-        module = import_module(module_name)
-    except SystemExit as error:
-        raise _ended(name, error) from None
-    except Exception as error:  # whatever the user's module raises
-        raise SpringfootError(f"{name}: cannot import {module_name}: {one_line(error)}") from error
-    function = getattr(module, function_name, None)
-    if not callable(function):
-        place = getattr(module, "__file__", None) or "it"
-        raise SpringfootError(f"{name}: module {module_name} has no function {function_name} ({place})")
-    settings = getattr(function, "settings", None)
-    if not isinstance(settings, BipedSettings):
+    with _ending_nothing(name):
         try:
-            settings = settings_from(**(settings or {}))
-        except (SpringfootError, TypeError) as error:
-            raise SpringfootError(f"{name}: its settings: {error}") from None
-    return _probed(name, function, Biped(settings, 1))
+            module = import_module(module_name)
+        except Exception as error:  # whatever the user's module raises
+            raise SpringfootError(f"{name}: cannot import {module_name}: {one_line(error)}") from error
+        try:
+            function = getattr(module, function_name, None)
+            settings = getattr(function, "settings", None)
+            if callable(function) and not isinstance(settings, BipedSettings):
+                settings = settings_from(**(settings or {}))
+        except Exception as error:  # whatever the user's properties raise
+            raise SpringfootError(f"{name}: its settings: {one_line(error)}") from None
+        if not callable(function):
+            place = getattr(module, "__file__", None) or "it"
+            raise SpringfootError(f"{name}: module {module_name} has no function {function_name} ({place})")
+        return _probed(name, function, Biped(settings or BipedSettings(), 1))
 
 
-def _ended(name: str, error: SystemExit) -> SpringfootError:
-    """Return the error of a user's code that ends Python, which would end our command without a word."""
-    return SpringfootError(f"{name} calls sys.exit({error.code!r:.40}): a policy must return actions")
+@contextmanager
+def _ending_nothing(name: str) -> Iterator[None]:
+    """Raise `SpringfootError` where a user's code ends Python, or raises what is no `Exception`.
+
+    Either would end our command without a word.
+    """
+    try:
+        yield
+    except SystemExit as error:
+        raise SpringfootError(f"{name} calls sys.exit({error.code!r:.40}): a policy must return actions") from None
+    except (Exception, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise SpringfootError(f"{name} raises {type(error).__name__}: a policy must return actions") from None
 
 
 def _asked_by(path: Path, inside: str | None) -> Biped:
@@ -209,8 +221,6 @@ def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPo
     ):
         try:
             found = np.shape(act(given))
-        except SystemExit as error:
-            raise _ended(name, error) from None
         except Exception as error:  # whatever the user's function raises
             failed = failed or f"{name} fails on observations {given.shape}: {one_line(error)}"
             continue

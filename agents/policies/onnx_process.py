@@ -16,12 +16,22 @@ MOST_ONNX_BYTES = 2**26
 """Largest ONNX file to read; chosen, ten times the largest network that is trained here."""
 INPUT_TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 """Allowed types of the input."""
+FORMS = ("(N, D)", "(1, D)", "(D,)")
+"""Shapes in which an observation is given: several, the only row, alone."""
+REFUSED = {"Loop", "RandomNormal", "RandomNormalLike", "RandomUniform", "RandomUniformLike", "Multinomial", "Bernoulli"}
+"""Operators that no policy needs, and with which a run says nothing about the time and the memory of the next."""
 
 _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
 
-def onnx_session(path: Path, observations: NDArray) -> tuple[Any, str]:
-    """Return onnxruntime's session of a file, and the reason why it takes none of the `observations` (N, D), else "".
+def form(observation: NDArray) -> str:
+    """Return which of `FORMS` an observation has."""
+    several, row, alone = FORMS
+    return alone if observation.ndim == 1 else row if len(observation) == 1 else several
+
+
+def onnx_session(path: Path, observations: NDArray) -> tuple[Any, dict[str, str]]:
+    """Return onnxruntime's session of a file, and the reasons why it does not take `observations` (N, D), by `form`.
 
     A child process opens the file and runs it on them first: the time and the memory that a graph takes may depend on
     the numbers that it is given. Raises `SpringfootError` for a file that onnxruntime does not open, or not within the
@@ -52,14 +62,17 @@ def _session(path: Path) -> Any:
 
 def main() -> None:
     """Run the child: open the file that the command line names, run it once, print the reason if it failed."""
-    import onnxruntime  # noqa: F401  # before the bounds
+    import onnx  # before the bounds
+    import onnxruntime  # noqa: F401  # likewise
 
     out = os.dup(1)
     os.dup2(2, 1)  # what a library prints is not ours
     bound_resources()
-    found = {"refused": "", "fails": ""}
+    found: dict[str, Any] = {"refused": "", "fails": {}}
     try:
         session = _session(Path(sys.argv[1]))
+        if refused := sorted(REFUSED & _operators(onnx.load(sys.argv[1], load_external_data=False))):
+            raise SpringfootError(f"a policy may not use {refused[0]}")
     except Exception as error:  # its classes have no common one
         found["refused"] = one_line(error)
     else:
@@ -67,19 +80,30 @@ def main() -> None:
     os.write(out, json.dumps(found).encode())
 
 
-def _fails(session: Any, observations: NDArray) -> str:
-    """Return the reason why a session takes neither several observations nor one; "" if it does."""
+def _operators(model: Any) -> set[str]:
+    """Return the names of a model's operators, also of those in its functions and in graphs within graphs."""
+    found: set[str] = set()
+    waiting = [*model.graph.node, *(node for function in model.functions for node in function.node)]
+    while waiting:
+        node = waiting.pop()
+        found.add(node.op_type)
+        for attribute in node.attribute:
+            waiting += [inner for graph in (attribute.g, *attribute.graphs) for inner in graph.node]
+    return found
+
+
+def _fails(session: Any, observations: NDArray) -> dict[str, str]:
+    """Run a session on the observations, on each as the only row, and alone; return the reasons of what fails, by
+    `form`."""
     inputs = session.get_inputs()
-    failed = ""
+    failed: dict[str, str] = {}
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:
         return failed  # the parent says so
-    for rows in (observations, observations[:1], observations[0]):
+    for rows in (observations, *(row[None] for row in observations), *observations):
         try:
             session.run(None, {inputs[0].name: np.ascontiguousarray(rows, INPUT_TYPES[inputs[0].type])})
         except Exception as error:
-            failed = failed or one_line(error)
-        else:
-            return ""
+            failed[form(rows)] = one_line(error)
     return failed
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from springfoot.errors import SpringfootError
 from springfoot.files.json_file import read_object
 from springfoot.files.writing import write_atomically
 
@@ -17,6 +18,8 @@ class Kept:
         self._known: dict[str, Any] = {}
         if path is not None and path.exists():
             self._known = read_object(path, "file of a study's numbers")
+            if not all(isinstance(answer, dict) for answer in self._known.values()):
+                raise SpringfootError(f"{path} is no file of a study's numbers: each must be an object in braces")
 
     def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Return the kept answer to `question`, a JSON value, or `make` and keep it."""

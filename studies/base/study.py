@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from springfoot.envs.settings import LONGEST_EPISODE
 from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, require_count, require_number
-from springfoot.files.writing import whole_folder
+from springfoot.files.writing import is_taken, whole_folder
 
 OnProgress = Callable[[float], object]
 """Function that a study calls with each advance of its progress: simulated seconds, or the unit `Study.UNIT`."""
@@ -73,7 +73,7 @@ class Study:
         """
         study = replace(self, **self.QUICK) if self.quick else self
         study.check()
-        if study.out is not None and study.out.exists():
+        if study.out is not None and is_taken(study.out):
             raise SpringfootError(f"{study.out} exists already: out must be a new folder")
         with whole_folder(study.out, Path("runs", name)) as (folder, out):
             with tqdm(

@@ -53,12 +53,10 @@ def generations(
         table = read_object(kept, "file of a search's costs")
         try:
             before = table["asked"]
-            known = [np.array(paid, float) for paid in table["paid"]]
+            known = [_costs(paid, strategy.popsize) for paid in table["paid"]]
         except (ValueError, TypeError, KeyError, OverflowError) as error:
             raise SpringfootError(f"{kept} is no file of a search's costs: {error}") from None
-        if any(paid.shape != (strategy.popsize,) or not np.isfinite(paid).all() for paid in known):
-            raise SpringfootError(f"{kept} is damaged: each generation must have {strategy.popsize} finite costs")
-        if before != asked:
+        if json.dumps(before, sort_keys=True) != json.dumps(asked, sort_keys=True):
             raise SpringfootError(f"{kept} is of a search with other settings; choose another place")
     for generation in range(count):
         vectors = [np.asarray(vector) for vector in strategy.ask()]
@@ -72,3 +70,10 @@ def generations(
                 write_atomically(kept, (json.dumps(table) + "\n").encode())
         strategy.tell(vectors, paid.tolist())
         yield generation, vectors, paid
+
+
+def _costs(paid: Any, candidates: int) -> NDArray:
+    """Return the costs of a kept generation; raise `ValueError` unless they are so many finite numbers."""
+    if not isinstance(paid, list) or len(paid) != candidates or not all(type(cost) in (int, float) for cost in paid):
+        raise ValueError(f"each generation must have {candidates} costs, which are numbers")
+    return np.array(paid, float)

@@ -177,7 +177,9 @@ def test_what_is_no_json_object_is_refused(tmp_path, content, said):
     assert str(caught.value).startswith(f"{path} is no record: {said}")
 
 
-@pytest.mark.parametrize("kind", ["compressed", "a shape of terabytes", "objects", "no digest"])
+@pytest.mark.parametrize(
+    "kind", ["compressed", "lzma", "a shape of terabytes", "a shape beyond numbers", "objects", "no digest"]
+)
 def test_an_archive_that_would_fill_the_memory_or_run_code_is_refused(tmp_path, kind):
     path, arrays = tmp_path / "a.npz", {"header": np.array("{}"), "phase": np.zeros(10**6)}
     if kind == "compressed":
@@ -186,11 +188,18 @@ def test_an_archive_that_would_fill_the_memory_or_run_code_is_refused(tmp_path, 
         np.savez(path, phase=np.array([{}], object), allow_pickle=True)
     else:
         np.savez(path, **arrays)
-    if kind == "a shape of terabytes":
+    if kind == "lzma":
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_LZMA) as archive:
+            archive.writestr("phase.npy", bytes(4000))
+        content = bytearray(path.read_bytes())
+        content[45:60] = b"\xff" * 15
+        path.write_bytes(content)
+    if kind.startswith("a shape"):
         file = io.BytesIO()
-        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)})
+        descr, shape = ("|V0", (2**70,)) if kind.endswith("numbers") else ("<f8", (10**12,))
+        np.lib.format.write_array_header_1_0(file, {"descr": descr, "fortran_order": False, "shape": shape})
         with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("phase.npy", file.getvalue() + b"0" * 100)
+            archive.writestr("phase.npy", file.getvalue() + b"0" * (0 if kind.endswith("numbers") else 100))
     with pytest.raises(SpringfootError) as caught:
         read_arrays(path, "recording")
     said = {"compressed": "is no recording: it is compressed", "no digest": "has no digest: another version"}

@@ -12,7 +12,7 @@ from springfoot.agents.training.checkpoint import read_checkpoint
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.recording.recording import load_recording
 from springfoot.files.json_file import read_object
-from springfoot.files.text_table import read_csv
+from springfoot.files.text_table import read_bytes, read_csv
 from springfoot.gait.people.human import harmonics
 from springfoot.gait.plan.walk_style import styles_of
 from springfoot.studies.base.kept import Kept
@@ -73,7 +73,7 @@ def test_json_that_is_no_object_is_one_line(tmp_path, name, text):
     refused(tmp_path / name)
 
 
-@pytest.mark.parametrize("bad", [float("nan"), float("inf"), "x", None, [1.0]])
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), "x", "1_0", True, None, [1.0]])
 def test_a_search_takes_no_cost_that_is_no_number(tmp_path, bad):
     path = tmp_path / "log.json"
     first = search(path)
@@ -82,3 +82,33 @@ def test_a_search_takes_no_cost_that_is_no_number(tmp_path, bad):
     table["paid"][0][2] = bad
     path.write_text(json.dumps(table), encoding="utf-8")
     refused(path)
+
+
+def test_a_pipe_that_takes_a_files_place_while_it_is_opened_is_refused_at_once(tmp_path):
+    class Swapped(type(tmp_path)):
+        """A path at which a pipe appears as soon as somebody has seen a file."""
+
+        def is_file(self):
+            self.unlink()
+            os.mkfifo(self)
+            return True
+
+    path = Swapped(tmp_path / "table.csv")
+    path.write_text("a\n1\n")
+    with pytest.raises(SpringfootError, match=r"table\.csv is not a regular file$"):
+        read_bytes(path)
+
+
+@pytest.mark.parametrize("answer", ['"word"', "[]", "1", '{"v": NaN}', '{"v": 1e999}', "null"])
+def test_a_study_takes_no_kept_answer_that_it_did_not_write(tmp_path, answer):
+    path = tmp_path / "kept.json"
+    path.write_text(f'{{"question": {answer}}}')
+    refused(path)
+
+
+def test_a_search_of_other_settings_is_told_from_this_one_by_their_types_too(tmp_path):
+    path = tmp_path / "log.json"
+    path.write_text('{"asked": true, "paid": []}')
+    strategy = cma.CMAEvolutionStrategy(np.zeros(3), 0.5, {"popsize": 4, "seed": 1, "verbose": -9})
+    with pytest.raises(SpringfootError, match="is of a search with other settings"):
+        list(generations(strategy, 0, lambda _, vectors: np.zeros(len(vectors)), path, 1))

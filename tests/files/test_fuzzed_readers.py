@@ -11,7 +11,16 @@ from benchmarks.fuzz_files import readers
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOMS = ("gait", "envs", "agents", "evaluation", "studies", "cli", "package")
-READING = {"read_object", "read_csv", "read_tensors", "read_arrays", "read_bytes", "text_lines", "existing"}
+READING = {
+    "read_object",
+    "read_csv",
+    "read_tensors",
+    "read_arrays",
+    "read_bytes",
+    "text_lines",
+    "existing",
+    "open_file",
+}
 """Functions of `files` that open a path."""
 NOT_FUZZED = {
     ("agents/training/session.py", "_evaluate"): "keeps the bytes of the policy that it has just written",

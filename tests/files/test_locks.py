@@ -17,7 +17,7 @@ from springfoot.command_line import exit_code
 from springfoot.errors import SpringfootError
 from springfoot.files import locks as ownership
 from springfoot.files.locks import OWNER, TakenError, owned
-from springfoot.files.writing import whole_folder
+from springfoot.files.writing import require_new, whole_folder, write_new
 
 HOLD = """
 import sys, time
@@ -263,3 +263,17 @@ def test_a_read_only_parent_is_one_line(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(ValueError, match="cannot make the folder"), owned(Path(tmp_path, "file", "run")):
         raise AssertionError
+
+
+def test_a_link_to_nothing_is_a_name_in_use(tmp_path):
+    free = tmp_path / "eval"
+    (tmp_path / "eval-1").symlink_to(tmp_path / "nowhere")
+    with whole_folder(None, free) as (_, name):
+        assert name.name == "eval-2"
+    with pytest.raises(TakenError, match="eval-1 exists already"), whole_folder(tmp_path / "eval-1", free):
+        raise AssertionError
+    with pytest.raises(SpringfootError, match="eval-1 already exists; out must be a new file"):
+        write_new({tmp_path / "eval-1": b""})
+    with pytest.raises(SpringfootError, match="eval-1 already exists; out must be a new or an empty folder"):
+        require_new(tmp_path / "eval-1")
+    assert (tmp_path / "eval-1").is_symlink() and not (tmp_path / "nowhere").exists()
