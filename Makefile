@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-kills fuzz extremes mutants check format bench feet docs lock clean
+.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-rllib test-kills fuzz extremes mutants check format bench feet docs lock clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -19,6 +19,7 @@ help:
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make test-learners  train with every library of docs/how-to/learners.md, each outside $(VENV); goes on after a stop"
+	@echo "make test-rllib  train with RLlib on several Ray nodes of this machine, kill some, in an environment of its own"
 	@echo "make test-kills   end 20 trainings several times each, resume them, and compare them with uninterrupted ones"
 	@echo "make fuzz     change files of every kind at random for ten minutes, and read them"
 	@echo "make extremes ten million extreme steps in drawn settings: is all finite, and the memory flat?"
@@ -100,18 +101,29 @@ test-wheel: install
 test-sdist: install
 	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test-all VENV=.venv
 
-test-learners: install build/learners/many/installed build/learners/rllib/installed
+test-learners: install build/learners/many/installed
 	$(BIN)/python -m benchmarks.learners
 
 test-kills: install
 	$(BIN)/python -m benchmarks.kills
 
-# All of constraints.txt but filelock, of which Tianshou wants an older one, and Gymnasium, which RLlib pins.
-build/learners/%/installed: examples/learners/requirements-%.txt constraints.txt pyproject.toml
-	$(PYTHON) -m venv build/learners/$*
-	grep -vE '^(filelock|gymnasium)==' constraints.txt > build/learners/$*/constraints.txt
-	build/learners/$*/bin/pip install --disable-pip-version-check --constraint build/learners/$*/constraints.txt \
+# All of constraints.txt but filelock, of which Tianshou wants an older one.
+build/learners/many/installed: examples/learners/requirements-many.txt constraints.txt pyproject.toml
+	$(PYTHON) -m venv build/learners/many
+	grep -v '^filelock==' constraints.txt > build/learners/many/constraints.txt
+	build/learners/many/bin/pip install --disable-pip-version-check --constraint build/learners/many/constraints.txt \
 	  --requirement $< --editable ".[evaluate]" torch
+	@touch $@
+
+# RLlib pins another Gymnasium than ours.
+test-rllib: build/rllib/installed
+	build/rllib/bin/python -m pytest tests/agents/training/test_rllib.py
+
+build/rllib/installed: constraints.txt pyproject.toml
+	$(PYTHON) -m venv build/rllib
+	grep -v '^gymnasium==' constraints.txt > build/rllib/constraints.txt
+	build/rllib/bin/pip install --disable-pip-version-check --constraint build/rllib/constraints.txt \
+	  --editable ".[rllib]" torch pytest
 	@touch $@
 
 check: install build/typing/made

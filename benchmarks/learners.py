@@ -34,6 +34,8 @@ from springfoot.files.markdown import table
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples" / "learners"
+VENV = "many"
+"""Folder of the virtual environment, which `make test-learners` makes."""
 EPISODES = 20
 SIGNIFICANT = 0.01
 SHORT = 8192
@@ -53,7 +55,6 @@ class Learner:
     flags: tuple[str, ...] = ()
     timesteps: int = 131_072
     must_learn: bool = True
-    venv: str = "many"
 
 
 def _runs(name: str, packages: tuple[str, ...], example: str, *flags: str) -> Learner:
@@ -70,7 +71,6 @@ LEARNERS = (
     Learner(name="skrl PPO", packages=("skrl",), example="skrl_ppo"),
     Learner(name="Tianshou PPO", packages=("tianshou",), example="tianshou_ppo"),
     Learner(name="RSL-RL PPO", packages=("rsl-rl-lib",), example="rsl_rl_ppo"),
-    Learner(name="RLlib PPO, our batch", packages=("ray", "gymnasium"), example="rllib_ppo", venv="rllib"),
     _runs("stable-baselines3 SAC", SB3, "sb3", "--algorithm", "sac"),
     _runs("sb3-contrib TQC", CONTRIB, "sb3", "--algorithm", "tqc"),
     _runs("sb3-contrib RecurrentPPO", CONTRIB, "sb3_recurrent"),
@@ -84,7 +84,7 @@ class Flags:
     """Train with every library, and judge what it learned; exits with 1 where one did not."""
 
     folder: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("build/learners")
-    """Where `make test-learners` makes the virtual environments, and where policies and results are kept."""
+    """Where `make test-learners` makes the virtual environment, and where policies and results are kept."""
     only: tuple[str, ...] = ()
     """Examples to run, by file name without .py; all unless given."""
 
@@ -112,11 +112,11 @@ def result_of(learner: Learner, folder: Path) -> dict[str, Any]:
         return kept
     path.parent.mkdir(parents=True, exist_ok=True)
     print(f"{learner.name} …", flush=True)
-    python = folder.resolve() / learner.venv / "bin" / "python"
+    python = folder.resolve() / VENV / "bin" / "python"
     after = path.with_suffix(".after.safetensors").resolve()
     before = path.with_suffix(".before.safetensors").resolve()
     if not python.is_file():
-        raise SpringfootError(f"no virtual environment {folder / learner.venv}; make test-learners makes it")
+        raise SpringfootError(f"no virtual environment {folder / VENV}; make test-learners makes it")
     began = perf_counter()
     result: dict[str, Any] = {"key": key, "versions": _versions(python, learner.packages)}
     if learner.example == "sb3_recurrent":

@@ -12,11 +12,13 @@ import tyro
 from springfoot.agents.training.config import PRESETS, TrainingConfig
 from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import MOST_THREADS, SpringfootError, require_count
+from springfoot.extras import naming_extras
 from springfoot.files.writing import require_new
 from springfoot.studies.base.flags import given, optional_flags
 
 PRESET = PRESETS["walk"]
+ENGINES = Literal["sb3", "rllib"]
 RESUMED = {"timesteps", "threads", "reward_weights"}
 """Settings that may change when a run is continued."""
 TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
@@ -45,6 +47,11 @@ class TrainFlags:
     """Training that is known to work, from which the other flags differ: one body at one speed; people of
     1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it; or one
     body that follows its own plan, no curve of people's."""
+    engine: ENGINES = "sb3"
+    """Library that learns: stable-baselines3 on this machine, or RLlib on a Ray cluster (extra `rllib`), that of the
+    variable RAY_ADDRESS or this machine. --resume goes on with the engine that began."""
+    num_env_runners: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
+    """Processes of RLlib that collect, on one processor each; one for each processor but one unless given."""
     training: tyro.conf.OmitArgPrefixes[TrainingFlags]  # type: ignore[valid-type]
     """How to train."""
     environment: tyro.conf.OmitArgPrefixes[EnvironmentFlags]  # type: ignore[valid-type]
@@ -76,7 +83,13 @@ def run_training(flags: TrainFlags) -> int:
             runs = [flags.out] if (flags.out / RUN).is_file() else runs_within(flags.out)
             further = f"; to continue a run, give {_likewise('--resume', runs)}" if runs else ""
             raise SpringfootError(f"{error}{further}") from None
+    if flags.num_env_runners is not None:
+        if flags.engine != "rllib" and flags.out is not None:
+            raise SpringfootError("--num-env-runners is of --engine rllib; give that, or drop it")
+        require_count("num_env_runners", flags.num_env_runners, 0, MOST_THREADS)
     if flags.seeds is not None:
+        if flags.engine != "sb3":
+            raise SpringfootError("--seeds trains with stable-baselines3; drop --engine")
         if flags.resume:
             raise SpringfootError("--seeds begins anew; continue each seed's own by --resume FOLDER/seed-N")
         if "threads" in settings:
@@ -85,23 +98,17 @@ def run_training(flags: TrainFlags) -> int:
     if flags.resume and (fixed := sorted(set(settings) - RESUMED)):
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
-        from springfoot.agents.training import (
-            training,  # not above: torch takes seconds, and bad flags need not wait for it
-        )
-
         end_in_order()
         folder = flags.resume
-        record = training.resume(flags.resume, **settings)
+        record = _continued(flags, settings)
     else:
         assert flags.out is not None
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
         if flags.seeds is not None:
             return run_seeds(config, flags.out, flags.seeds)
-        from springfoot.agents.training import training
-
         end_in_order()
         folder = flags.out
-        record = training.train(config, flags.out)
+        record = _trained(flags, config)
     interrupted = record["status"] == "interrupted"
     best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
@@ -113,6 +120,40 @@ def run_training(flags: TrainFlags) -> int:
     if interrupted:
         print(f"Or:      springfoot train --resume {_word(folder)}")
     return stopped_by(record) if interrupted else 0
+
+
+def _trained(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
+    """Train a new run with the engine asked for; return its record."""
+    assert flags.out is not None
+    if flags.engine == "rllib":
+        return _rllib().train(config, flags.out, flags.num_env_runners)
+    from springfoot.agents.training import training  # not above: torch takes seconds, and bad flags need not wait
+
+    return training.train(config, flags.out)
+
+
+def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
+    """Continue a run with the engine that began it; return its record."""
+    from springfoot.agents.policies.policy import RUN
+    from springfoot.agents.training.run_record import is_of_rllib, read_record
+
+    assert flags.resume is not None
+    if (flags.resume / RUN).is_file() and is_of_rllib(read_record(flags.resume)):
+        if "reward_weights" in settings:
+            raise SpringfootError("--resume of a run of RLlib goes on with its reward; drop --reward-weights")
+        return _rllib().resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
+    if flags.num_env_runners is not None:
+        raise SpringfootError("--num-env-runners is of --engine rllib; drop it")
+    from springfoot.agents.training import training
+
+    return training.resume(flags.resume, **settings)
+
+
+def _rllib() -> Any:
+    """Return the module that trains on Ray."""
+    with naming_extras():
+        from springfoot.agents.training import rllib_training
+    return rllib_training
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:

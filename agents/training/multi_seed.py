@@ -15,10 +15,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 from springfoot.command_line import end_in_order, exit_code, stopped_by
 from springfoot.errors import SpringfootError, require_count
+from springfoot.extras import naming_extras
 from springfoot.files.locks import owned
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.files.writing import require_new, write_atomically
@@ -29,6 +30,8 @@ from .config import TrainingConfig, config_from_json, config_to_json, processors
 from .run_record import read_record
 
 SEEDS = "seeds.json"
+Engine = Literal["here", "ray"]
+"""Where several trainings run: in processes on this machine, or on the nodes of a Ray cluster."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
 """Results in `seeds.json` with mean and standard deviation (n - 1) over the seeds."""
@@ -58,17 +61,41 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
 
 
 def train_all(
-    jobs: Sequence[tuple[TrainingConfig, Path, str]],
+    jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engine = "here"
 ) -> tuple[list[dict[str, Any]], signal.Signals | None]:
     """Train each configuration in its folder, as `train_seeds` does; its messages begin with its name.
 
-    A folder with an unfinished run is continued. Returns a row of results for each, and the signal that stopped them.
+    A folder with an unfinished run is continued. With the `engine` ray the trainings run on the nodes of a Ray cluster
+    (`ray_cluster`). Returns a row of results for each, and the signal that stopped them.
     """
+    if engine == "ray":
+        return _train_on_ray(jobs)
     at_once = min(max(len(jobs), 1), processors())
     with _Trainings() as trainings, ThreadPoolExecutor(at_once) as pool:
         print(f"{len(jobs)} seeds, {at_once} at a time, one thread each", file=sys.stderr, flush=True)
         rows = list(pool.map(lambda job: trainings.run(*job), jobs))
     return rows, trainings.stopping
+
+
+def _train_on_ray(
+    jobs: Sequence[tuple[TrainingConfig, Path, str]],
+) -> tuple[list[dict[str, Any]], signal.Signals | None]:
+    """Train as `train_all` does, on the nodes of a Ray cluster."""
+    with naming_extras():
+        from .ray_cluster import run_on_ray  # not above: an extra
+    stopping = None
+    try:
+        run_on_ray([(name, _command(config, folder.absolute())) for config, folder, name in jobs])
+    except KeyboardInterrupt:
+        stopping = signal.SIGINT
+    without = "interrupted" if stopping else "failed"
+    return [_row(config, folder, without) for config, folder, _ in jobs], stopping
+
+
+def _command(config: TrainingConfig, folder: Path) -> list[str]:
+    """Return the command that trains or continues one seed in a process of its own, on one thread."""
+    values = config_to_json(replace(config, threads=1))
+    return [sys.executable, "-m", __name__, str(folder), json.dumps(values)]
 
 
 def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) -> str:
@@ -77,7 +104,7 @@ def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) ->
     return "failed" if any(row["status"] == "failed" for row in rows) else status
 
 
-def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
+def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engine = "here") -> str:
     """Train the configurations without a finished run in their folders, as `train_all` does.
 
     Continues unfinished runs. Returns `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing
@@ -89,7 +116,7 @@ def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> str:
             if replace(done, threads=config.threads) != config:
                 raise SpringfootError(f"{folder} was trained with other settings; choose another folder")
     missing = [job for job in jobs if not is_finished(job[1])]
-    return _status(*train_all(missing)) if missing else "finished"
+    return _status(*train_all(missing, engine)) if missing else "finished"
 
 
 def is_finished(folder: Path) -> bool:
@@ -128,8 +155,7 @@ class _Trainings:
 
     def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
         """Train in a process of its own, print its messages after its `name`, and return its row of results."""
-        config = replace(config, threads=1)
-        command = [sys.executable, "-m", __name__, str(folder), json.dumps(config_to_json(config))]
+        command = _command(config, folder)
         _block(True)  # the new process inherits this, and unblocks after its imports; this thread only waits for it
         with self._lock:
             if self.stopping:

@@ -1,11 +1,27 @@
 """Measure the returns of a policy on fixed seeds, for the periodic evaluations of a training."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.walk import walked_steps
+
+EVALUATION_SEED = 2**30
+"""Seed of the first episode of every periodic evaluation; the following episodes count on."""
+
+
+def evaluation_of(biped: Biped, policy: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
+    """Return the numbers of a periodic evaluation, as they stand in run.json: one episode in each environment."""
+    returns, seconds, fell = evaluate_returns(biped, policy, EVALUATION_SEED)
+    return {
+        "return_mean": float(returns.mean()),
+        "return_sd": float(returns.std()),
+        "episodes": len(returns),
+        "falls": int(fell.sum()),
+        "seconds_mean": float(seconds.mean()),
+    }
 
 
 def evaluate_returns(

@@ -14,6 +14,8 @@ from ..policies.policy import RUN
 from .config import config_from_json
 
 EVENTS = "events.out.tfevents.*"
+RLLIB = "rllib"
+"""Name of the engine in the record of a run that RLlib trained."""
 
 
 def read_record(out: Path) -> dict[str, Any]:
@@ -56,6 +58,12 @@ def runs_within(out: Path) -> list[Path]:
 def write_record(out: Path, record: Mapping[str, Any]) -> None:
     """Write the record, whole or not at all."""
     write_atomically(out / RUN, sealed_object(dict(record)))
+
+
+def is_of_rllib(record: Mapping[str, Any]) -> bool:
+    """Tell whether a run's record says that RLlib trained it."""
+    engine = record.get("engine")
+    return isinstance(engine, dict) and engine.get("name") == RLLIB
 
 
 def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -21,21 +21,19 @@ from springfoot.files.text_table import has_content, read_bytes
 from springfoot.files.writing import write_atomically
 
 from ..policies.fingerprint import fingerprint, require_same
-from ..policies.policy import BEST, LAST, Policy, read_policy, save_policy
+from ..policies.policy import BEST, LAST, read_policy, save_policy
 from .callbacks import Onlooker, Onlookers, tell
 from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, checkpoints, write_checkpoint
 from .config import TrainingConfig, config_to_json, processors
 from .learning_state import learning_state, restore_learning
 from .ppo import Learner
 from .progress import Progress
-from .returns import evaluate_returns
+from .returns import evaluation_of
 from .run_record import best_of, cut_events, event_sizes, same_source, write_record
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 from .stopping import Stopping
 from .training_log import log_configuration, no_word_of_writers
 
-EVALUATION_SEED = 2**30
-"""Seed of the first episode of every periodic evaluation; the following episodes count on."""
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
 """Packages whose versions decide the result of a training."""
 SHARE = 0.02
@@ -66,7 +64,7 @@ class Session(BaseCallback):
         self._environments = SegmentedFootBipedVecEnv(config.num_envs, num_threads=threads, **settings)
         self._evaluation = Biped(config.environment, config.eval_episodes, threads)
         self._fingerprint = fingerprint(self._evaluation)
-        seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)  # below EVALUATION_SEED
+        seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)  # below that of evaluations
         self.learner = Learner(config, self._environments, seed)
         self._stopping = Stopping()
         self._began = monotonic()
@@ -133,7 +131,7 @@ class Session(BaseCallback):
             write_atomically(self._out / BEST, self._best)
         told = best_of(self._record)
         if told is not None:
-            again = told | self._returns(read_policy(self._out / BEST))
+            again = told | evaluation_of(self._evaluation, read_policy(self._out / BEST))
             if again["return_mean"] != told["return_mean"]:
                 session["best"] = again
                 print(
@@ -220,7 +218,9 @@ class Session(BaseCallback):
     def _evaluate(self) -> None:
         """Evaluate the policy on the fixed seeds, keep it if it is the best so far, and save."""
         assert self._policy is not None
-        entry = {"timesteps": self._trained, "seconds": round(self._seconds(), 1)} | self._returns(self._policy)
+        entry = {"timesteps": self._trained, "seconds": round(self._seconds(), 1)} | evaluation_of(
+            self._evaluation, self._policy
+        )
         best = best_of(self._record)
         if best is None or entry["return_mean"] > best["return_mean"]:
             save_policy(self._out / BEST, self._policy)
@@ -234,17 +234,6 @@ class Session(BaseCallback):
         self._save("running")
         if not tell(self._onlookers, entry):
             self._stopping.ask()
-
-    def _returns(self, policy: Policy) -> dict[str, Any]:
-        """Return the numbers of an evaluation of a policy on the fixed seeds."""
-        returns, seconds, fell = evaluate_returns(self._evaluation, policy, EVALUATION_SEED)
-        return {
-            "return_mean": float(returns.mean()),
-            "return_sd": float(returns.std()),
-            "episodes": len(returns),
-            "falls": int(fell.sum()),
-            "seconds_mean": float(seconds.mean()),
-        }
 
     def _seconds(self) -> float:
         """Wall time of this session and the earlier ones [s]."""

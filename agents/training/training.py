@@ -21,7 +21,7 @@ from ..policies.policy import BEST, LAST, RUN
 from .callbacks import Onlooker
 from .checkpoint import Checkpoint, newest_checkpoint
 from .config import TrainingConfig, config_from_json, config_to_json
-from .run_record import read_record, runs_within
+from .run_record import is_of_rllib, read_record, runs_within
 from .session import BEST_FILE, Session
 
 
@@ -71,6 +71,8 @@ def resume(
     with owned(out):
         remove_temporary(out)
         record = read_record(out)
+        if is_of_rllib(record):
+            raise SpringfootError(f"{out} was trained by RLlib: continue it by springfoot train --resume {out}")
         found = newest_checkpoint(out)
         if found is None and record.get("timesteps"):
             raise SpringfootError(f"{out} holds no run to continue: no state-{record['timesteps']}.safetensors in it")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
-from springfoot.agents.training import TrainingConfig, train_missing
+from springfoot.agents.training import Engine, TrainingConfig, train_missing
 from springfoot.errors import require_count
 
 from .study import WalkingStudy
@@ -23,6 +23,9 @@ class TrainingStudy(WalkingStudy):
     """Seeds of each training, 0 and the next ones."""
     timesteps: int | None = None
     """Steps of 20 ms of each training, the preset's unless given."""
+    engine: Engine = "here"
+    """Where missing seeds are trained: in processes on this machine, or on a Ray cluster (extra `rllib`) whose nodes
+    share the folder of the trainings."""
     train: bool = True
     """Train missing seeds; without, use the finished ones."""
 
@@ -40,7 +43,7 @@ class TrainingStudy(WalkingStudy):
 
         Raises `KeyboardInterrupt` if the user stopped it.
         """
-        status = train_missing(jobs) if self.train else "finished"
+        status = train_missing(jobs, self.engine) if self.train else "finished"
         if status == "interrupted":
             raise KeyboardInterrupt
         return status == "failed"

@@ -15,7 +15,7 @@ import pytest
 
 import train as train_script
 from benchmarks.kills import EVENTS, differences, scalars
-from springfoot.agents.training import session
+from springfoot.agents.training import returns, session
 from springfoot.agents.training.checkpoint import KEPT_CHECKPOINTS, checkpoints, newest_checkpoint
 from springfoot.agents.training.config import PRESETS, config_from_json
 from springfoot.agents.training.run_record import read_record
@@ -112,9 +112,9 @@ def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeyp
             os.kill(os.getpid(), signal.SIGINT)
 
     with monkeypatch.context() as patch:
-        evaluate = session.evaluate_returns
+        evaluate = returns.evaluate_returns
         calls = iter([evaluate, in_the_middle])  # of the best, and at the end
-        patch.setattr(session, "evaluate_returns", lambda *given: next(calls)(*given))
+        patch.setattr(returns, "evaluate_returns", lambda *given: next(calls)(*given))
         record = resume(half)
     assert (record["status"], record["timesteps"]) == ("interrupted", 2560)
     assert resume(half)["status"] == "finished"

@@ -14,9 +14,8 @@ from springfoot.agents.policies.policy import LAST, load_policy
 from springfoot.agents.training import training
 from springfoot.agents.training.config import PRESETS, TrainingConfig, config_from_json, config_to_json
 from springfoot.agents.training.ppo import Learner
-from springfoot.agents.training.returns import evaluate_returns
+from springfoot.agents.training.returns import EVALUATION_SEED, evaluate_returns
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
-from springfoot.agents.training.session import EVALUATION_SEED
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError

@@ -1,0 +1,77 @@
+"""Join a Ray cluster, and run independent commands on its nodes; one whose node dies runs again on another.
+
+Every node needs springfoot, and for commands the same folders: they read and write files.
+"""
+
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import ray  # pyright: ignore[reportMissingImports]
+
+MOST_RETRIES = 10
+"""Nodes that may die under a command before it counts as failed; chosen."""
+
+
+@contextmanager
+def joined(processors: int | None = None) -> Iterator[None]:
+    """Join the cluster of the variable RAY_ADDRESS until the block ends, else start one on this machine alone.
+
+    A process that is connected already stays so. `processors` is how many a cluster on this machine offers; as many as
+    there are unless given.
+    """
+    if ray.is_initialized():
+        yield
+        return
+    for name in ("ray", "ray.rllib", "ray.tune"):
+        logging.getLogger(name).setLevel(logging.ERROR)
+    os.environ.setdefault("RAY_BACKEND_LOG_LEVEL", "fatal")
+    address = os.environ.get("RAY_ADDRESS")
+    alone: dict[str, Any] = {} if address else {"include_dashboard": False, "num_cpus": processors}
+    ray.init(address=address or "local", log_to_driver=False, logging_level="ERROR", **alone)
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
+    """Run each (name, words) with one processor of the cluster, and print what it says after its name.
+
+    Raises `KeyboardInterrupt` after a signal, with the commands ended.
+    """
+    with joined():
+        task = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run)
+        names = {task.remote(words, os.getcwd()): name for name, words in commands}
+        waiting = list(names)
+        try:
+            while waiting:
+                (done,), waiting = ray.wait(waiting)
+                try:
+                    said = ray.get(done)
+                except ray.exceptions.RayError as error:
+                    said = f"lost with its node: {str(error).splitlines()[0]}\n"
+                for line in said.splitlines():
+                    print(f"{names[done]}: {line}", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            for each in waiting:
+                ray.cancel(each)
+            raise
+
+
+def _run(words: list[str], folder: str) -> str:
+    """Run a command in a folder on this node; return what it says on standard error."""
+    done = subprocess.run(
+        words,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )
+    return done.stderr

@@ -1,0 +1,75 @@
+"""Define actor and critic for RLlib with the layers and the first weights that our own trainer gives them.
+
+Observations are normalised inside by statistics that stay as they are: RLlib's own filter merges the counts of its
+runners anew after every update, so that they grow without bound.
+"""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+from ray.rllib.core.columns import Columns  # pyright: ignore[reportMissingImports]
+from ray.rllib.core.rl_module.apis import ValueFunctionAPI  # pyright: ignore[reportMissingImports]
+from ray.rllib.core.rl_module.torch import TorchRLModule  # pyright: ignore[reportMissingImports]
+from torch import nn
+
+from ..policies.policy import VARIANCE_FLOOR
+
+OBSERVATION_CLIP = 10.0
+"""Largest magnitude of a normalised observation, as in stable-baselines3's VecNormalize."""
+_HIDDEN_GAIN, _ACTION_GAIN, _VALUE_GAIN = 2**0.5, 0.01, 1.0
+"""Gains of the orthogonal first weights, as in stable-baselines3's ActorCriticPolicy."""
+
+
+class ActorCritic(TorchRLModule, ValueFunctionAPI):
+    """Two tanh networks on normalised observations: mean actions with a common log standard deviation, and the value.
+
+    `model_config` has `hidden`, widths; `log_std`, of the actions at the start; `mean` and `variance` (D,) of the
+    observations.
+    """
+
+    def setup(self) -> None:
+        """Make the layers; the mean action begins at 0."""
+        given: dict[str, Any] = dict(self.model_config)
+        observations = int(np.prod(self.observation_space.shape))
+        actions = int(np.prod(self.action_space.shape))
+        self.register_buffer("mean", torch.tensor(given["mean"], dtype=torch.float32))
+        self.register_buffer("variance", torch.tensor(given["variance"], dtype=torch.float32))
+        self.actor = _network([observations, *given["hidden"], actions], _ACTION_GAIN)
+        self.critic = _network([observations, *given["hidden"], 1], _VALUE_GAIN)
+        self.log_std = nn.Parameter(torch.full((actions,), float(given["log_std"])))
+
+    def _forward(self, batch: dict[str, Any], **_: Any) -> dict[str, Any]:
+        """Return means and log standard deviations (N, 8) of the actions."""
+        mean = self.actor(self._normalized(batch))
+        return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, self.log_std.expand_as(mean)], dim=-1)}
+
+    def compute_values(self, batch: dict[str, Any], embeddings: Any = None) -> torch.Tensor:
+        """Return the values (N,)."""
+        return self.critic(self._normalized(batch)).squeeze(-1)
+
+    def _normalized(self, batch: dict[str, Any]) -> torch.Tensor:
+        centred = (batch[Columns.OBS] - self.mean) / torch.sqrt(self.variance + VARIANCE_FLOOR)
+        return centred.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
+
+
+def _network(widths: list[int], gain: float) -> nn.Sequential:
+    """Return tanh layers with orthogonal weights and biases of 0, the last one linear with this gain."""
+    layers: list[nn.Module] = []
+    for index, (below, above) in enumerate(pairwise(widths)):
+        last = index == len(widths) - 2
+        layer = nn.Linear(below, above)
+        nn.init.orthogonal_(layer.weight, gain if last else _HIDDEN_GAIN)
+        nn.init.zeros_(layer.bias)
+        layers += [layer] if last else [layer, nn.Tanh()]
+    return nn.Sequential(*layers)
+
+
+def actor_layers(state: dict[str, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return weight and bias of each layer of the actor in a module's state."""
+    names = sorted(
+        (name.removesuffix(".weight") for name in state if name.startswith("actor.") and name.endswith(".weight")),
+        key=lambda name: int(name.split(".")[1]),
+    )
+    return [(np.array(state[f"{name}.weight"]), np.array(state[f"{name}.bias"])) for name in names]

@@ -1,0 +1,356 @@
+"""Train with RLlib's PPO where one machine is not enough: runners on a Ray cluster collect, this process learns.
+
+A run has the folder of any other training: policies, `run.json`, TensorBoard's events. Its checkpoints `ray-N` after N
+steps are Ray's own, and hold pickles: continue only runs of your own. A runner that dies is started again by RLlib.
+"""
+
+import dataclasses
+import shutil
+import warnings
+from collections.abc import Mapping
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import ray  # pyright: ignore[reportMissingImports]
+import torch
+from ray.rllib.algorithms.ppo import PPOConfig  # pyright: ignore[reportMissingImports]
+from ray.rllib.core import DEFAULT_MODULE_ID  # pyright: ignore[reportMissingImports]
+from ray.rllib.core.rl_module import RLModuleSpec  # pyright: ignore[reportMissingImports]
+from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
+from tensorboardX import SummaryWriter  # pyright: ignore[reportMissingImports]
+
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.physics.timing import ACTION_STEP
+from springfoot.envs.settings.settings import settings_to_json
+from springfoot.envs.vector_env import SegmentedFootBipedVector
+from springfoot.errors import SpringfootError, require_count
+from springfoot.files.json_file import read_object, sealed_object
+from springfoot.files.locks import owned
+from springfoot.files.provenance import source
+from springfoot.files.writing import remove_temporary, require_new, write_atomically
+
+from ..policies.conversion import ignoring_unvaried
+from ..policies.fingerprint import fingerprint
+from ..policies.policy import BEST, LAST, Policy, save_policy
+from .config import TrainingConfig, config_from_json, config_to_json, processors
+from .progress import Progress
+from .ray_cluster import joined
+from .returns import evaluation_of
+from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
+from .run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
+from .stopping import Stopping
+
+PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray")
+"""Packages whose versions decide the result of a training."""
+CHECKPOINT = "ray-"
+"""First part of a checkpoint's folder name; the timesteps follow."""
+_TOLD = "springfoot.json"
+"""File of a checkpoint with the record at its time."""
+_BATCH = "springfoot-batch"
+"""Name under which RLlib finds our environments."""
+
+
+class _Batch(gym.vector.VectorWrapper):
+    """Our vector environment with rewards times `scale`, and without the infos, which RLlib would turn into N
+    dictionaries a step."""
+
+    def __init__(self, env: gym.vector.VectorEnv, scale: float) -> None:
+        super().__init__(env)
+        self._scale = scale
+
+    def reset(self, **given: Any) -> tuple[NDArray, dict[str, Any]]:
+        """Reset as the environment does."""
+        return self.env.reset(**given)[0], {}
+
+    def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
+        """Step as the environment does."""
+        observation, reward, terminated, truncated, _ = self.env.step(actions)
+        return observation, reward * self._scale, terminated, truncated, {}
+
+
+def _batch(given: Mapping[str, Any]) -> gym.vector.VectorEnv:
+    """Make the environments of a runner; `given` has their number, their settings and the scale of the reward."""
+    return _Batch(SegmentedFootBipedVector(given["num_envs"], **given["settings"]), given["scale"])
+
+
+def train(config: TrainingConfig, out: str | Path, num_env_runners: int | None = None) -> dict[str, Any]:
+    """Train a new policy in the new folder `out` on a Ray cluster; return the content of `run.json`.
+
+    Args:
+        config: as at home; `num_envs` and `update_steps` are those of all runners together.
+        out: new folder, on this machine.
+        num_env_runners: processes that collect, each on one processor of the cluster; 0 collects in this process, None
+            takes one for each processor but one.
+
+    The cluster is that of the variable RAY_ADDRESS, else the one this process is connected to, else this machine alone.
+    Signals, status and errors are those of `springfoot.agents.train`; the bits depend on the order in which samples
+    arrive.
+    """
+    out = require_new(out)
+    with owned(out):
+        remove_temporary(require_new(out))
+        record = {"sessions": [], "evaluations": []}
+        return _Run(config, out, record, num_env_runners).learn()
+
+
+def resume(
+    out: str | Path, timesteps: int | None = None, threads: int | None = None, num_env_runners: int | None = None
+) -> dict[str, Any]:
+    """Continue the run in `out` from its newest checkpoint, which is a pickle; return the content of `run.json`.
+
+    `timesteps` are how many more, None finishes an interrupted run; `num_env_runners` are as many as before unless
+    given. Raises `SpringfootError` for a run that is finished, or that another engine trained.
+    """
+    out = Path(out)
+    with owned(out):
+        remove_temporary(out)
+        record = read_record(out)
+        if not is_of_rllib(record):
+            raise SpringfootError(f"{out} was trained by another engine")
+        found = _newest(out)
+        told = read_object(found / _TOLD, "record of a checkpoint") if found else {"sessions": [], "evaluations": []}
+        try:
+            require_past(told)
+            done = require_count("timesteps", told.get("timesteps", 0), 0)
+            runners = record["engine"]["num_env_runners"] if num_env_runners is None else num_env_runners
+        except (KeyError, TypeError, ValueError) as error:
+            raise SpringfootError(f"{found or out} is not a checkpoint of ours: {error}") from None
+        config = config_from_json(record["config"])
+        total = config.timesteps if timesteps is None else done + timesteps
+        if total <= done and record.get("status") == "finished":
+            raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
+        config = dataclasses.replace(config, timesteps=total, threads=threads or config.threads)
+        return _Run(config, out, told, runners, found).learn()
+
+
+def _newest(out: Path) -> Path | None:
+    """Return the folder of the newest checkpoint; None if there is none."""
+    numbers = [path.name.removeprefix(CHECKPOINT) for path in out.glob(f"{CHECKPOINT}*") if (path / _TOLD).is_file()]
+    return out / f"{CHECKPOINT}{max(map(int, numbers))}" if numbers else None
+
+
+class _Run:
+    """Train the run in the folder `out`, from the beginning or from the checkpoint `found`."""
+
+    def __init__(
+        self,
+        config: TrainingConfig,
+        out: Path,
+        record: dict[str, Any],
+        num_env_runners: int | None,
+        found: Path | None = None,
+    ) -> None:
+        threads = config.threads or processors()
+        self._evaluation = Biped(config.environment, config.eval_episodes, threads)  # first: raises for bad settings
+        self._fingerprint = fingerprint(self._evaluation)
+        self._config = config
+        self._out = out
+        self._found = found
+        self._runners = num_env_runners
+        self._trained = record.get("timesteps", 0)
+        self._seconds_before = float(record.get("seconds", 0.0))
+        self._record = {name: record[name] for name in ("sessions", "evaluations")}
+        self._stopping = Stopping()
+        self._began = monotonic()
+
+    def learn(self) -> dict[str, Any]:
+        """Train until the configured timesteps are done or a signal stops it; return the record."""
+        with ExitStack() as stack:
+            self._connect(stack)
+            self._algorithm = self._built()
+            stack.callback(shutil.rmtree, self._algorithm.logdir, ignore_errors=True)  # Ray's, empty
+            stack.callback(self._algorithm.stop)
+            if self._found is not None:
+                self._algorithm.restore_from_path(str(self._found.absolute()))
+                if (self._found / BEST).is_file():
+                    shutil.copyfile(self._found / BEST, self._out / BEST)
+            self._record["sessions"].append({"from_timesteps": self._trained, **source(PACKAGES)})
+            self._write_record("running")
+            self._writer = stack.enter_context(SummaryWriter(str(self._out), purge_step=self._trained or None))
+            self._progress = Progress(self._config.timesteps, self._trained)
+            stack.enter_context(self._stopping)  # after Ray, which has handlers of its own
+            with suppress(KeyboardInterrupt), self._progress:  # at the second signal: what is kept stands
+                self._learn()
+            self._write_record("finished" if self._finished else "interrupted")
+        return self._record
+
+    def _connect(self, stack: ExitStack) -> None:
+        """Join or start a Ray cluster, and settle the number of runners."""
+        stack.enter_context(joined(None if self._runners is None else max(self._runners + 1, processors())))
+        if self._runners is None:
+            self._runners = max(1, int(ray.cluster_resources().get("CPU", 2)) - 1)
+        require_count("num_env_runners", self._runners, 0)
+        if self._config.num_envs % max(1, self._runners):
+            raise SpringfootError(
+                f"num_envs must be a multiple of the {self._runners} runners, got {self._config.num_envs}"
+            )
+
+    def _built(self) -> Any:
+        """Return RLlib's PPO with the configuration's numbers."""
+        config = self._config
+        assert self._runners is not None
+        torch.set_num_threads(1)
+        register_env(_BATCH, _batch)
+        share = config.environment.step_seconds / ACTION_STEP
+        gamma = config.gamma**share
+        fragment = max(1, config.update_steps // config.num_envs)
+        samples = fragment * config.num_envs
+        mean, variance = observed(config)
+        network = {
+            "hidden": list(config.hidden),
+            "log_std": config.log_std,
+            "mean": mean.tolist(),
+            "variance": variance.tolist(),
+        }
+        rate = config.learning_rate
+        ppo = (
+            PPOConfig()
+            .environment(
+                _BATCH,
+                env_config={"settings": settings_to_json(config.environment), "scale": 1.0 - gamma},
+                disable_env_checking=True,
+            )
+            .env_runners(
+                num_env_runners=self._runners,
+                num_envs_per_env_runner=config.num_envs // max(1, self._runners),
+                gym_env_vectorize_mode="vector_entry_point",
+                rollout_fragment_length=fragment,
+                explore=True,
+            )
+            .learners(num_learners=0)
+            .rl_module(rl_module_spec=RLModuleSpec(module_class=ActorCritic, model_config=network))
+            .training(
+                train_batch_size_per_learner=samples,
+                minibatch_size=-(-samples // config.minibatches),
+                num_epochs=config.epochs,
+                lr=[[0, rate], [config.timesteps, rate * config.learning_rate_end]],
+                gamma=gamma,
+                lambda_=config.gae_lambda**share,
+                clip_param=config.clip_range,
+                use_kl_loss=False,
+                entropy_coeff=0.0,
+                vf_loss_coeff=0.5,
+                vf_clip_param=float("inf"),
+                grad_clip=0.5,
+                grad_clip_by="global_norm",
+            )
+            .fault_tolerance(restart_failed_env_runners=True)
+            .debugging(seed=config.seed)
+        )
+        with warnings.catch_warnings():  # of Ray's own parts
+            warnings.simplefilter("ignore")
+            return ppo.build_algo()
+
+    def _learn(self) -> None:
+        """Train, evaluate and keep checkpoints until the end or a signal."""
+        while self._trained < self._config.timesteps and not self._stopping.asked:
+            past = self._record["evaluations"]
+            if not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval:
+                self._evaluate()
+            result = self._algorithm.train()
+            collected = result["env_runners"]
+            before = self._trained
+            self._trained = int(collected["num_env_steps_sampled_lifetime"])
+            self._progress.advance(self._trained - before)
+            for name in ("episode_return_mean", "num_healthy_workers"):
+                if np.isfinite(collected.get(name, np.nan)):
+                    self._writer.add_scalar(f"rllib/{name}", float(collected[name]), self._trained)
+        if not self._stopping.asked and not self._finished:
+            self._evaluate()
+        self._keep()
+
+    @property
+    def _finished(self) -> bool:
+        """Return True if all timesteps are done, and evaluated."""
+        past = self._record["evaluations"]
+        return bool(past) and past[-1]["timesteps"] == self._trained >= self._config.timesteps
+
+    def _policy(self) -> Policy:
+        """Return the actor's mean actions with the present weights."""
+        state = self._algorithm.learner_group.get_weights()[DEFAULT_MODULE_ID]
+        layers = actor_layers(state)
+        return ignoring_unvaried(
+            Policy(
+                settings=self._config.environment,
+                fingerprint=self._fingerprint,
+                weights=tuple(weight for weight, _ in layers),
+                biases=tuple(bias for _, bias in layers),
+                observation_mean=np.array(state["mean"], float),
+                observation_variance=np.array(state["variance"], float),
+                observation_clip=OBSERVATION_CLIP,
+            )
+        )
+
+    def _evaluate(self) -> None:
+        """Evaluate the policy on the fixed seeds, keep it if it is the best so far, and save."""
+        policy = self._policy()
+        entry = {"timesteps": self._trained, "seconds": self._seconds(), **evaluation_of(self._evaluation, policy)}
+        best = best_of(self._record)
+        if best is None or entry["return_mean"] > best["return_mean"]:
+            save_policy(self._out / BEST, policy)
+        self._record["evaluations"].append(entry)
+        for name in ("return_mean", "falls", "seconds_mean"):
+            self._writer.add_scalar(f"evaluation/{name}", entry[name], self._trained)
+        self._writer.flush()
+        self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {entry['episodes']} fell")
+        self._keep()
+
+    def _keep(self) -> None:
+        """Write the newest policy, a checkpoint of Ray's, and the record; remove the checkpoints before."""
+        save_policy(self._out / LAST, self._policy())
+        kept = self._out / f"{CHECKPOINT}{self._trained}"
+        part = self._out / f".{kept.name}"
+        shutil.rmtree(part, ignore_errors=True)
+        self._algorithm.save_to_path(str(part.absolute()))
+        told = {name: self._record[name] for name in ("sessions", "evaluations")}
+        told |= {"timesteps": self._trained, "seconds": self._seconds()}
+        write_atomically(part / _TOLD, sealed_object(told))
+        if (self._out / BEST).is_file():
+            shutil.copyfile(self._out / BEST, part / BEST)
+        shutil.rmtree(kept, ignore_errors=True)
+        part.rename(kept)
+        for path in self._out.glob(f"{CHECKPOINT}*"):
+            if path != kept:
+                shutil.rmtree(path, ignore_errors=True)
+        self._write_record("running")
+
+    def _seconds(self) -> float:
+        """Wall time of this session and the earlier ones [s]."""
+        return round(self._seconds_before + monotonic() - self._began, 1)
+
+    def _write_record(self, status: str) -> None:
+        """Write run.json with this session's status, time and evaluations."""
+        self._record |= {
+            "engine": {"name": RLLIB, "num_env_runners": self._runners},
+            "config": config_to_json(self._config),
+            "status": status,
+            "timesteps": self._trained,
+            "seconds": self._seconds(),
+            "best": best_of(self._record),
+        }
+        if status == "interrupted" and self._stopping.signal is not None:
+            self._record["signal"] = self._stopping.signal.name
+        write_record(self._out, self._record)
+
+
+def observed(config: TrainingConfig) -> tuple[NDArray, NDArray]:
+    """Return mean and variance (D,) of the observations of one update of random actions around 0.
+
+    They stand for the whole training: a mean that moved would have to be the same on every runner at every step.
+    """
+    environments = SegmentedFootBipedVector(config.num_envs, **dict[str, Any](settings_to_json(config.environment)))
+    random = np.random.default_rng([config.seed, 1])
+    shape = environments.action_space.shape
+    observation, _ = environments.reset(seed=config.seed)
+    seen = [observation.astype(float)]
+    for _ in range(max(1, config.update_steps // config.num_envs)):
+        observation, *_ = environments.step(random.normal(0.0, np.exp(config.log_std), shape).clip(-1.0, 1.0))
+        seen.append(observation.astype(float))
+    environments.close()
+    every = np.concatenate(seen)
+    return every.mean(axis=0), every.var(axis=0)

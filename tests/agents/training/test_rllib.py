@@ -1,0 +1,168 @@
+"""RLlib trains on several Ray nodes as our own trainer does here, and goes on after runners, nodes or all are killed.
+
+RLlib pins another Gymnasium: `make test-rllib` runs these in an environment of their own.
+"""
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from springfoot.agents import load_policy
+from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.run_record import is_of_rllib, read_record
+from springfoot.cli.train import train_main
+from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.vector_env import SegmentedFootBipedVector
+from springfoot.errors import SpringfootError
+
+ray = pytest.importorskip("ray", reason="RLlib has an environment of its own: make test-rllib")
+
+from springfoot.agents.training import rllib_training  # noqa: E402
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # Ray's own
+SMALL = TrainingConfig(timesteps=8192, num_envs=8, update_steps=1024, eval_interval=4096, eval_episodes=2)
+
+
+@pytest.fixture
+def cluster():
+    """A Ray cluster of three nodes on this machine: one for the learner, two with a processor each for runners."""
+    from ray.cluster_utils import Cluster  # pyright: ignore[reportMissingImports]
+
+    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    made.nodes = [made.add_node(num_cpus=1), made.add_node(num_cpus=1)]
+    ray.init(address=made.address, log_to_driver=False, logging_level="ERROR")
+    yield made
+    ray.shutdown()
+    made.shutdown()
+
+
+def test_a_run_has_the_folder_of_any_other_and_its_policy_walks(tmp_path, capsys):
+    out = tmp_path / "run"
+    words = ["--out", str(out), "--engine", "rllib", "--num-env-runners", "2", "--timesteps", "8192"]
+    words += ["--num-envs", "8", "--update-steps", "1024", "--eval-interval", "4096", "--eval-episodes", "2"]
+    assert train_main(words) == 0
+    assert "8" in capsys.readouterr().out
+    record = read_record(out)
+    assert record["status"] == "finished" and is_of_rllib(record) and record["engine"]["num_env_runners"] == 2
+    assert {path.name.split("-")[0] for path in out.iterdir()} >= {"best.safetensors", "last.safetensors", "ray"}
+    assert load_policy(out / "best.safetensors").settings == PRESETS["walk"].environment
+    with pytest.raises(SpringfootError, match="has done its"):
+        rllib_training.resume(out)
+
+
+def test_the_first_policy_is_the_mean_action_of_the_untrained_network(tmp_path):
+    """The file's network is the one that RLlib runs: the same actions for the same observations, before the clip."""
+    import torch
+    from ray.rllib.core.columns import Columns  # pyright: ignore[reportMissingImports]
+
+    from springfoot.agents.training.rllib_network import ActorCritic, actor_layers
+
+    mean, variance = rllib_training.observed(SMALL)
+    environments = SegmentedFootBipedVector(4)
+    given = {"hidden": [8, 8], "log_std": -0.9, "mean": mean.tolist(), "variance": variance.tolist()}
+    module = ActorCritic(
+        observation_space=environments.single_observation_space,
+        action_space=environments.single_action_space,
+        model_config=given,
+    )
+    rows = environments.reset(seed=3)[0]
+    with torch.no_grad():
+        theirs = module.forward_inference({Columns.OBS: torch.from_numpy(rows)})[Columns.ACTION_DIST_INPUTS]
+    layers = actor_layers({name: value.numpy() for name, value in module.state_dict().items()})
+    hidden = np.clip((rows - mean) / np.sqrt(variance + 1e-8), -10, 10)
+    for index, (weight, bias) in enumerate(layers):
+        hidden = hidden @ weight.T + bias
+        hidden = hidden if index == len(layers) - 1 else np.tanh(hidden)
+    assert theirs[:, :4].numpy() == pytest.approx(hidden, abs=1e-5)
+    assert theirs[:, 4:].numpy() == pytest.approx(-0.9)
+
+
+def test_a_killed_node_and_its_runner_are_replaced(cluster, tmp_path):
+    def kill():
+        while not list((tmp_path / "run").glob("ray-*")):
+            time.sleep(0.1)
+        cluster.add_node(num_cpus=1)
+        cluster.remove_node(cluster.nodes[0], allow_graceful=False)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    config = dataclasses.replace(SMALL, timesteps=40_960)
+    record = rllib_training.train(config, tmp_path / "run", 2)
+    killer.join(1.0)
+    assert not killer.is_alive()
+    assert record["status"] == "finished" and record["timesteps"] >= config.timesteps
+
+
+def test_a_run_that_is_killed_altogether_goes_on(tmp_path):
+    out = tmp_path / "run"
+    words = ["--engine", "rllib", "--num-env-runners", "1", "--timesteps", "400000", "--num-envs", "8"]
+    words += ["--update-steps", "1024", "--eval-interval", "4096", "--eval-episodes", "2"]
+    command = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
+    process = subprocess.Popen([*command, "--out", str(out), *words], start_new_session=True)
+    while not list(out.glob("ray-[1-9]*")):
+        assert process.poll() is None
+        time.sleep(0.2)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    done = max(int(path.name.removeprefix("ray-")) for path in out.glob("ray-*"))
+    record = rllib_training.resume(out, timesteps=4096)
+    assert record["status"] == "finished" and record["timesteps"] >= done + 4096
+    assert [entry["timesteps"] for entry in record["evaluations"]] == sorted(
+        {entry["timesteps"] for entry in record["evaluations"]}
+    )
+
+
+def test_the_first_ctrl_c_leaves_a_run_that_goes_on(tmp_path):
+    out = tmp_path / "run"
+    words = ["--engine", "rllib", "--num-env-runners", "1", "--timesteps", "4000000", "--out", str(out)]
+    command = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
+    process = subprocess.Popen([*command, *words], start_new_session=True)
+    while not list(out.glob("ray-*")):
+        assert process.poll() is None
+        time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(120) == 130
+    assert read_record(out)["status"] == "interrupted" and load_policy(out).settings == BipedSettings(
+        episode_seconds=10.0, push_newton=150.0
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--engine", "rllib", "--num-env-runners", "3"], "num_envs must be a multiple of the 3 runners, got 64"),
+        (["--num-env-runners", "2"], "--num-env-runners is of --engine rllib; give that, or drop it"),
+        (["--engine", "rllib", "--seeds", "2"], "--seeds trains with stable-baselines3; drop --engine"),
+    ],
+)
+def test_flags_that_do_not_fit_are_one_line(tmp_path, capsys, words, said):
+    assert train_main([*words, "--out", str(tmp_path / "run")]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == f"train.py: error: {said}"
+    assert not (tmp_path / "run").exists()
+
+
+def test_trainings_of_a_study_run_on_the_nodes_and_again_where_one_dies(cluster, tmp_path):
+    from springfoot.agents.training import train_missing
+
+    jobs = [(dataclasses.replace(SMALL, seed=k, timesteps=20_480), tmp_path / f"seed-{k}", f"seed {k}") for k in (0, 1)]
+
+    def kill():
+        while not all(list(folder.glob("state-*")) for _, folder, _ in jobs):
+            time.sleep(0.1)
+        cluster.add_node(num_cpus=1)
+        cluster.remove_node(cluster.nodes[0], allow_graceful=False)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    assert train_missing(jobs, "ray") == "finished"
+    killer.join(1.0)
+    assert not killer.is_alive()
+    for _, folder, _ in jobs:
+        assert read_record(folder)["timesteps"] >= 20_480
