@@ -15,6 +15,7 @@ COMMANDS = {
     "evaluate": "evaluate.EvaluateFlags",
     "live": "live.LiveFlags",
     "export": "export.ExportFlags",
+    "datasets": "datasets.DatasetsFlags",
     "examples": "examples.ExamplesFlags",
 }
 """Command -> class of its flags."""

@@ -24,13 +24,14 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-HELP = """usage: springfoot {train,evaluate,live,export,study,examples,completion} ...
+HELP = """usage: springfoot {train,evaluate,live,export,study,datasets,examples,completion} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
   springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
+  springfoot datasets               write Minari sets of walks, for offline learning
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
   springfoot completion SHELL       print the tab completion of all flags for bash, zsh or tcsh
 
@@ -99,6 +100,10 @@ def _run(words: list[str]) -> int:
                 return export_main(rest, "springfoot export")
             case ["study", *rest]:
                 return study_main(rest)
+            case ["datasets", *rest]:
+                from .datasets import datasets_main
+
+                return datasets_main(rest)
             case ["examples", *rest]:
                 from .examples import examples_main
 
@@ -127,7 +132,7 @@ def _run(words: list[str]) -> int:
             file=sys.stderr,
         )
         return 2
-    known = "there are train, evaluate, live, export, study, examples and completion"
+    known = "there are train, evaluate, live, export, study, datasets, examples and completion"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 

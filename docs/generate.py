@@ -21,6 +21,7 @@ COMMANDS = [
     ("`springfoot evaluate`", "evaluate policies; `evaluate.py` is the same"),
     ("`springfoot live`", "steer a walk in a browser"),
     ("`springfoot export`", "write a policy as an ONNX file"),
+    ("`springfoot datasets`", "write Minari sets of walks, for offline learning"),
     ("`springfoot examples`", "list or copy programs to start from"),
     ("`springfoot completion`", "print the tab completion of all flags for a shell"),
 ]

@@ -10,6 +10,11 @@ from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
 MADE = {
     "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", PRETRAINED_BY, "walk"),
+    "medium": (
+        "Walks, and falls in half of the episodes when pushed: a training stopped early, for sets of offline learning.",
+        "python train.py --push-newton 250 --timesteps 300000 --out runs/medium",
+        "walk",
+    ),
     "predicted": ("Walks by a plan that knows no person's curves.", "springfoot study predict", "prediction"),
 }
 """Policy -> purpose, the command that made it, and the page of its results."""

@@ -93,7 +93,7 @@ def test_a_folder_that_vanishes_meanwhile_is_one_line(tmp_path):
     parent.mkdir()
     process = subprocess.Popen([*EVALUATE, "--out", str(parent / "new")], stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 300
-    while not any(parent.iterdir()) and process.poll() is None and time.monotonic() < until:
+    while not any(parent.rglob(".owner")) and process.poll() is None and time.monotonic() < until:
         time.sleep(0.01)
     shutil.rmtree(parent)
     _, error = process.communicate()

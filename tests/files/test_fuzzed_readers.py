@@ -26,6 +26,10 @@ NOT_FUZZED = {
     ("agents/training/session.py", "_evaluate"): "keeps the bytes of the policy that it has just written",
     ("studies/feet/prosthesis.py", "_digest"): "takes a digest of the bytes",
     ("agents/policies/cards.py", "policy_card"): "takes a digest of a file of the package",
+    (
+        "agents/training/rllib_training.py",
+        "resume",
+    ): "reads a record beside Ray's pickles, in an environment of its own",
     ("cli/examples.py", "run_examples"): "reads files of the package alone",
     ("gait/people/c3d_file.py", "_refuse_broken"): "runs in the child that the reader of C3D files starts",
 }

@@ -25,6 +25,7 @@ RUNS = {
         ["schedule", "--episodes", "1", "--seconds", "7", "--out", "schedule.png"],
         "schedule.png: 0 of 1 fell",
     ),
+    "clone_from_minari.py": (["--epochs", "1", "--dataset", "springfoot/walk/random-v0"], " steps, mean squared error"),
     "search_with_optuna.py": (
         ["--trials", "2", "--timesteps", "9000", "--seconds", "0.4"],
         "best of 2 trials: learning rate ",
@@ -51,10 +52,13 @@ def test_examples_are_copied_out_of_the_package_into_a_new_folder(tmp_path, caps
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_example_does_what_it_says(name, tmp_path):
+def test_example_does_what_it_says(name, tmp_path, monkeypatch):
     words, said = RUNS[name]
     if name == "search_with_optuna.py":
         pytest.importorskip("optuna", reason="needs Optuna: pip install optuna")
+    if name == "clone_from_minari.py":
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+        assert main(["datasets", "--sets", "random", "--episodes", "2"]) == 0
     command = [sys.executable, "-W", "error", str(EXAMPLES / name), *words]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,7 @@ from springfoot.evaluation import prepare, record
 def test_every_shipped_file_has_a_name():
     folder = find_policy("pretrained").parent
     named = {str(find_policy(name).relative_to(folder)) for name in SHIPPED}
-    assert named == {str(path.relative_to(folder)) for path in folder.rglob("*.safetensors")} and len(named) == 22
+    assert named == {str(path.relative_to(folder)) for path in folder.rglob("*.safetensors")} and len(named) == 23
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -35,6 +35,6 @@ def test_a_policy_of_a_foot_walks_on_it():
 
 def test_another_name_has_no_card():
     with pytest.raises(
-        SpringfootError, match="no policy 'mine' in the package; there are pretrained, predicted, passive"
+        SpringfootError, match="no policy 'mine' in the package; there are pretrained, medium, predicted, passive"
     ):
         policy_card("mine")

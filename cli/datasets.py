@@ -1,0 +1,51 @@
+"""Define the command that writes sets for offline learning: `springfoot datasets`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from springfoot.command_line import end_in_order, exit_code, parse
+from springfoot.errors import SpringfootError, require_count
+from springfoot.files.markdown import table
+
+MOST_EPISODES = 10_000
+"""Most episodes of a set; chosen, a gigabyte in memory."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetsFlags:
+    """Write walks as Minari sets springfoot/walk/NAME-v0, for learners that see no environment.
+
+    Minari keeps them in ~/.minari, or in the folder of the variable MINARI_DATASETS_PATH.
+    """
+
+    sets: tuple[Literal["expert", "medium", "random"], ...] = ("expert", "medium", "random")
+    """Policies that walk: `pretrained`, the same training stopped early, and random actions."""
+    episodes: int = 200
+    """Episodes of each set, of ten seconds or until a fall."""
+    seed: int = 0
+    """Seed of the first episode; the following count on."""
+
+
+def datasets_main(arguments: Sequence[str] | None = None, program: str = "springfoot datasets") -> int:
+    """Write the sets; return 0, 2 for bad input, 130 after Ctrl-C."""
+    flags = parse(DatasetsFlags, arguments, program)
+    return exit_code(program, lambda: run_datasets(flags))
+
+
+def run_datasets(flags: DatasetsFlags) -> None:
+    """Write the sets, and print what is in them."""
+    from springfoot.evaluation.recording.minari_sets import set_id, write_sets  # not above: help needs no simulator
+
+    require_count("episodes", flags.episodes, 1, MOST_EPISODES)
+    require_count("seed", flags.seed, 0)
+    if not flags.sets or len(set(flags.sets)) < len(flags.sets):
+        raise SpringfootError("give --sets each set once, of expert, medium and random")
+    end_in_order()
+    told = write_sets(flags.sets, flags.episodes, flags.seed)
+    rows = [
+        [set_id(name), str(row["episodes"]), f"{row['steps']:,}", f"{row['return_mean']:.0f}", str(row["falls"])]
+        for name, row in told.items()
+    ]
+    print(table(["set", "episodes", "steps", "mean return", "falls"], rows))
+    print(f'\nNext:    python -c "import minari; print(minari.load_dataset({set_id(flags.sets[0])!r}))"')

@@ -1,0 +1,151 @@
+"""Write walks as Minari sets, for learners that see no environment: of an expert, of a medium policy, of random
+actions."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from springfoot import __version__
+from springfoot.agents import PolicyFunction, baseline, read_policy
+from springfoot.arrays import NDArray
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.walk import walked_steps
+from springfoot.envs.settings.settings import BipedSettings, settings_to_json
+from springfoot.errors import SpringfootError
+from springfoot.extras import naming_extras
+
+SETS = {
+    "expert": ("pretrained", "the actions of `pretrained`"),
+    "medium": ("medium", "the actions of `medium`, the same training stopped early"),
+    "random": ("random", "every action drawn from the whole range"),
+}
+"""Name of a set -> its policy, in words too."""
+ENVIRONMENT = "springfoot/SegmentedFootBiped-v0"
+_BATCH = 50
+"""Episodes side by side; chosen."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WalkedEpisode:
+    """One episode of T steps."""
+
+    seed: int
+    observations: NDArray
+    """(T + 1, D), float32."""
+    actions: NDArray
+    """(T, 4), float32."""
+    rewards: NDArray
+    """(T,)."""
+    fell: bool
+    """Whether it ended in a fall (terminated), not by its length (truncated)."""
+
+
+def set_id(name: str) -> str:
+    """Return the id under which Minari finds a set."""
+    return f"springfoot/walk/{name}-v0"
+
+
+def walked_episodes(settings: BipedSettings, policy: PolicyFunction, episodes: int, seed: int) -> list[WalkedEpisode]:
+    """Walk episodes seeded `seed`, `seed` + 1, … and return what a learner sees of each."""
+    done: list[WalkedEpisode] = []
+    while len(done) < episodes:
+        count = min(_BATCH, episodes - len(done))
+        seeds = [seed + len(done) + index for index in range(count)]
+        done += _walked_batch(Biped(settings, count), policy, seeds)
+    return done
+
+
+def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[WalkedEpisode]:
+    """Walk one episode in each environment."""
+    biped.reset(np.arange(len(seeds)), seeds)
+    observations = [biped.observe().copy()]
+    actions: list[NDArray] = []
+    rewards: list[NDArray] = []
+    active: list[NDArray] = []
+    fell = np.zeros(len(seeds), bool)
+
+    def act(observation: NDArray) -> NDArray:
+        actions.append(policy(observation))
+        return actions[-1]
+
+    for taken, result in walked_steps(biped, act):
+        observations.append(result.observation.copy())
+        rewards.append(result.reward.copy())
+        active.append(taken)
+        fell |= taken & result.terminated
+    steps = np.sum(active, axis=0)
+    seen, acted, paid = np.stack(observations, 1), np.stack(actions, 1), np.stack(rewards, 1)
+    return [
+        WalkedEpisode(
+            seed=seeds[k],
+            observations=seen[k, : steps[k] + 1],
+            actions=acted[k, : steps[k]],
+            rewards=paid[k, : steps[k]],
+            fell=bool(fell[k]),
+        )
+        for k in range(len(seeds))
+    ]
+
+
+def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, dict[str, float]]:
+    """Write Minari sets of `SETS`; return episodes, steps, mean return and falls of each.
+
+    All walk the task of `pretrained`. Minari keeps them in the folder of its variable MINARI_DATASETS_PATH. Raises
+    `SpringfootError`, with nothing written, for a set that exists.
+    """
+    with naming_extras():
+        import h5py  # noqa: F401  # not above: extras
+        import minari
+        from minari.data_collector import EpisodeBuffer
+    settings = replace(read_policy("pretrained").settings)
+    for name in names:
+        if set_id(name) in minari.list_local_datasets():
+            raise SpringfootError(f"the Minari set {set_id(name)} exists already; minari delete {set_id(name)}")
+    told = {}
+    environment = gym.make(ENVIRONMENT, **settings_to_json(settings))
+    for name in names:
+        policy, words = SETS[name]
+        act = baseline(policy, settings, seed) if policy == "random" else read_policy(policy)
+        walks = walked_episodes(settings, act, episodes, seed)
+        buffers = [
+            EpisodeBuffer(
+                id=index,
+                seed=walk.seed,
+                observations=walk.observations,  # pyright: ignore[reportArgumentType]  # an array serves
+                actions=walk.actions,  # pyright: ignore[reportArgumentType]
+                rewards=walk.rewards.tolist(),
+                terminations=_last(len(walk.rewards), walk.fell),
+                truncations=_last(len(walk.rewards), not walk.fell),
+            )
+            for index, walk in enumerate(walks)
+        ]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that an address is missing, and an evaluation's environment
+            minari.create_dataset_from_buffers(
+                set_id(name),
+                buffers,
+                env=environment.spec,
+                observation_space=environment.observation_space,
+                action_space=environment.action_space,
+                algorithm_name=words,
+                author="springfoot contributors",
+                description=f"{episodes} episodes from seed {seed} on: {words}.",
+                requirements=[f"springfoot=={__version__}"],
+            )
+        told[name] = {
+            "episodes": episodes,
+            "steps": sum(len(walk.rewards) for walk in walks),
+            "return_mean": float(np.mean([walk.rewards.sum() for walk in walks])),
+            "falls": sum(walk.fell for walk in walks),
+        }
+    environment.close()
+    return told
+
+
+def _last(steps: int, value: bool) -> list[Any]:
+    """Return False for each step but the last, which has `value`."""
+    return [False] * (steps - 1) + [value]

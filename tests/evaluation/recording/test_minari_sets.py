@@ -1,0 +1,78 @@
+"""Minari's sets hold what a learner sees of a walk: the environment that they name gives the same bits again."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import minari
+import numpy as np
+import pytest
+
+from springfoot.agents import load_policy
+from springfoot.agents.training.returns import evaluate_returns
+from springfoot.cli.main import main
+from springfoot.envs import Biped
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.recording.minari_sets import walked_episodes, write_sets
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "clone_from_minari.py"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "sets"))
+    return tmp_path
+
+
+def test_an_episode_is_what_its_environment_gives_for_its_seed_and_actions(folder):
+    told = write_sets(["random"], 3, seed=5)["random"]
+    dataset = minari.load_dataset("springfoot/walk/random-v0")
+    environment = dataset.recover_environment()
+    episodes = list(dataset.iterate_episodes())
+    seeds = [dataset.storage.get_episode_metadata([episode.id]) for episode in episodes]
+    assert [next(iter(each))["seed"] for each in seeds] == [5, 6, 7]
+    for seed, episode in zip((5, 6, 7), episodes, strict=True):
+        observation, _ = environment.reset(seed=seed)
+        assert np.array_equal(observation, episode.observations[0])
+        for step, action in enumerate(episode.actions):
+            observation, reward, terminated, truncated, _ = environment.step(action)
+            assert np.array_equal(observation, episode.observations[step + 1])
+            assert (reward, terminated, truncated) == (
+                episode.rewards[step],
+                episode.terminations[step],
+                episode.truncations[step],
+            )
+        assert terminated or truncated
+    assert told["steps"] == dataset.total_steps
+    assert told["falls"] == sum(bool(episode.terminations[-1]) for episode in episodes)
+
+
+def test_episodes_of_several_batches_are_those_of_one():
+    policy = load_policy("medium")
+    several = walked_episodes(policy.settings, policy, 52, 0)
+    alone = walked_episodes(policy.settings, policy, 1, 51)
+    assert len(several) == 52 and several[51].seed == 51
+    assert np.array_equal(several[51].observations, alone[0].observations)
+
+
+def test_a_set_that_exists_is_kept(folder, capsys):
+    assert main(["datasets", "--sets", "random", "--episodes", "1"]) == 0
+    assert "springfoot/walk/random-v0" in capsys.readouterr().out
+    assert main(["datasets", "--sets", "expert", "random", "--episodes", "1"]) == 2
+    assert "springfoot/walk/random-v0 exists already" in capsys.readouterr().err
+    assert list(minari.list_local_datasets()) == ["springfoot/walk/random-v0"]
+    with pytest.raises(SpringfootError, match="exists already"):
+        write_sets(["random"], 1)
+
+
+@pytest.mark.slow
+def test_a_clone_of_the_expert_returns_as_much_in_a_fresh_process(folder):
+    assert main(["datasets", "--sets", "expert"]) == 0
+    words = [sys.executable, str(EXAMPLE), "--out", str(folder / "clone.safetensors")]
+    subprocess.run(words, check=True, env=dict(os.environ), cwd=folder)
+    expert = load_policy("pretrained")
+    biped = Biped(expert.settings, 20)
+    own, _, _ = evaluate_returns(biped, expert, 10**6)
+    cloned, _, _ = evaluate_returns(biped, load_policy(folder / "clone.safetensors"), 10**6)
+    assert cloned.mean() >= 0.95 * own.mean()
