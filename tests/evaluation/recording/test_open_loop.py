@@ -179,7 +179,7 @@ ERRORS = [
     (
         "frozen:nobody",
         "no policy 'nobody': give a .safetensors or .onnx file, a run folder, module:function, or one of "
-        f"pretrained, predicted, passive-1-0 to adaptive-2-4, {', '.join(BASELINES)}, "
+        f"pretrained, medium, predicted, passive-1-0 to adaptive-2-4, {', '.join(BASELINES)}, "
         "or frozen:POLICY",
     ),
 ]
