@@ -117,7 +117,7 @@ build/learners/many/installed: examples/learners/requirements-many.txt constrain
 
 # RLlib pins another Gymnasium than ours.
 test-rllib: build/rllib/installed
-	build/rllib/bin/python -m pytest tests/agents/training/test_rllib.py
+	build/rllib/bin/python -m pytest tests/agents/training/cluster/test_rllib.py
 
 build/rllib/installed: constraints.txt pyproject.toml
 	$(PYTHON) -m venv build/rllib

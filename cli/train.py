@@ -142,8 +142,8 @@ def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
         if "reward_weights" in settings:
             raise SpringfootError("--resume of a run of RLlib goes on with its reward; drop --reward-weights")
         return _rllib().resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
-    if flags.num_env_runners is not None:
-        raise SpringfootError("--num-env-runners is of --engine rllib; drop it")
+    if flags.num_env_runners is not None or flags.engine != "sb3":
+        raise SpringfootError(f"{flags.resume} is no run of RLlib; drop --engine and --num-env-runners")
     from springfoot.agents.training import training
 
     return training.resume(flags.resume, **settings)
@@ -152,7 +152,7 @@ def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
 def _rllib() -> Any:
     """Return the module that trains on Ray."""
     with naming_extras():
-        from springfoot.agents.training import rllib_training
+        from springfoot.agents.training.cluster import rllib_training
     return rllib_training
 
 

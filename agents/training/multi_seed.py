@@ -66,7 +66,7 @@ def train_all(
     """Train each configuration in its folder, as `train_seeds` does; its messages begin with its name.
 
     A folder with an unfinished run is continued. With the `engine` ray the trainings run on the nodes of a Ray cluster
-    (`ray_cluster`). Returns a row of results for each, and the signal that stopped them.
+    (`cluster.nodes`). Returns a row of results for each, and the signal that stopped them.
     """
     if engine == "ray":
         return _train_on_ray(jobs)
@@ -82,7 +82,7 @@ def _train_on_ray(
 ) -> tuple[list[dict[str, Any]], signal.Signals | None]:
     """Train as `train_all` does, on the nodes of a Ray cluster."""
     with naming_extras():
-        from .ray_cluster import run_on_ray  # not above: an extra
+        from .cluster.nodes import run_on_ray  # not above: an extra
     stopping = None
     try:
         run_on_ray([(name, _command(config, folder.absolute())) for config, folder, name in jobs])

@@ -1,9 +1,13 @@
 """Write walks as Minari sets, for learners that see no environment: of an expert, of a medium policy, of random
 actions."""
 
+import os
+import shutil
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -17,6 +21,7 @@ from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.settings.settings import BipedSettings, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.extras import naming_extras
+from springfoot.files.writing import is_taken, whole_folder
 
 SETS = {
     "expert": ("pretrained", "the actions of `pretrained`"),
@@ -24,6 +29,9 @@ SETS = {
     "random": ("random", "every action drawn from the whole range"),
 }
 """Name of a set -> its policy, in words too."""
+NAMESPACE = "springfoot/walk"
+PLACE = "MINARI_DATASETS_PATH"
+"""Variable of the folder of Minari's sets."""
 ENVIRONMENT = "springfoot/SegmentedFootBiped-v0"
 _BATCH = 50
 """Episodes side by side; chosen."""
@@ -46,7 +54,7 @@ class WalkedEpisode:
 
 def set_id(name: str) -> str:
     """Return the id under which Minari finds a set."""
-    return f"springfoot/walk/{name}-v0"
+    return f"{NAMESPACE}/{name}-v0"
 
 
 def walked_episodes(settings: BipedSettings, policy: PolicyFunction, episodes: int, seed: int) -> list[WalkedEpisode]:
@@ -94,17 +102,21 @@ def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> lis
 def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, dict[str, float]]:
     """Write Minari sets of `SETS`; return episodes, steps, mean return and falls of each.
 
-    All walk the task of `pretrained`. Minari keeps them in the folder of its variable MINARI_DATASETS_PATH. Raises
-    `SpringfootError`, with nothing written, for a set that exists.
+    All walk the task of `pretrained`. Minari keeps them in the folder of its variable MINARI_DATASETS_PATH; each is
+    written whole or not at all. Raises `SpringfootError`, with nothing written, for a set that exists.
     """
     with naming_extras():
         import h5py  # noqa: F401  # not above: extras
         import minari
+        from minari import namespace
         from minari.data_collector import EpisodeBuffer
-    settings = replace(read_policy("pretrained").settings)
+        from minari.storage.datasets_root_dir import get_dataset_path
+    settings = read_policy("pretrained").settings
     for name in names:
-        if set_id(name) in minari.list_local_datasets():
+        if is_taken(get_dataset_path(set_id(name))):
             raise SpringfootError(f"the Minari set {set_id(name)} exists already; minari delete {set_id(name)}")
+    if NAMESPACE not in namespace.list_local_namespaces():
+        namespace.create_namespace(NAMESPACE)
     told = {}
     environment = gym.make(ENVIRONMENT, **settings_to_json(settings))
     for name in names:
@@ -123,7 +135,8 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
             )
             for index, walk in enumerate(walks)
         ]
-        with warnings.catch_warnings():
+        out = get_dataset_path(set_id(name))
+        with whole_folder(out, out) as (part, _), _datasets_in(part), warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that an address is missing, and an evaluation's environment
             minari.create_dataset_from_buffers(
                 set_id(name),
@@ -136,6 +149,8 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
                 description=f"{episodes} episodes from seed {seed} on: {words}.",
                 requirements=[f"springfoot=={__version__}"],
             )
+            (part / set_id(name) / "data").rename(part / "data")
+            shutil.rmtree(part / NAMESPACE.split("/")[0])
         told[name] = {
             "episodes": episodes,
             "steps": sum(len(walk.rewards) for walk in walks),
@@ -144,6 +159,19 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
         }
     environment.close()
     return told
+
+
+@contextmanager
+def _datasets_in(folder: Path) -> Iterator[None]:
+    """Let Minari write below another folder until the block ends."""
+    before = os.environ.get(PLACE)
+    os.environ[PLACE] = str(folder)
+    try:
+        yield
+    finally:
+        os.environ.pop(PLACE)
+        if before is not None:
+            os.environ[PLACE] = before
 
 
 def _last(steps: int, value: bool) -> list[Any]:

@@ -27,7 +27,7 @@ NOT_FUZZED = {
     ("studies/feet/prosthesis.py", "_digest"): "takes a digest of the bytes",
     ("agents/policies/cards.py", "policy_card"): "takes a digest of a file of the package",
     (
-        "agents/training/rllib_training.py",
+        "agents/training/cluster/rllib_training.py",
         "resume",
     ): "reads a record beside Ray's pickles, in an environment of its own",
     ("cli/examples.py", "run_examples"): "reads files of the package alone",

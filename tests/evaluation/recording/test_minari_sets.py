@@ -66,6 +66,19 @@ def test_a_set_that_exists_is_kept(folder, capsys):
         write_sets(["random"], 1)
 
 
+def test_a_set_that_cannot_be_finished_leaves_nothing(folder, monkeypatch):
+    def fails(*given, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(minari.MinariDataset, "__init__", fails)  # Minari's last step
+    with pytest.raises(KeyboardInterrupt):
+        write_sets(["random"], 1)
+    monkeypatch.undo()
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder / "sets"))
+    assert not list((folder / "sets").rglob("*.hdf5"))
+    assert write_sets(["random"], 1)["random"]["episodes"] == 1
+
+
 @pytest.mark.slow
 def test_a_clone_of_the_expert_returns_as_much_in_a_fresh_process(folder):
     assert main(["datasets", "--sets", "expert"]) == 0

@@ -14,7 +14,7 @@ from ray.rllib.core.rl_module.apis import ValueFunctionAPI  # pyright: ignore[re
 from ray.rllib.core.rl_module.torch import TorchRLModule  # pyright: ignore[reportMissingImports]
 from torch import nn
 
-from ..policies.policy import VARIANCE_FLOOR
+from springfoot.agents.policies.policy import VARIANCE_FLOOR
 
 OBSERVATION_CLIP = 10.0
 """Largest magnitude of a normalised observation, as in stable-baselines3's VecNormalize."""

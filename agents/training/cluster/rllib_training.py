@@ -23,6 +23,9 @@ from ray.rllib.core.rl_module import RLModuleSpec  # pyright: ignore[reportMissi
 from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
 from tensorboardX import SummaryWriter  # pyright: ignore[reportMissingImports]
 
+from springfoot.agents.policies.conversion import ignoring_unvaried
+from springfoot.agents.policies.fingerprint import fingerprint
+from springfoot.agents.policies.policy import BEST, LAST, Policy, save_policy
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.physics.timing import ACTION_STEP
@@ -34,16 +37,13 @@ from springfoot.files.locks import owned
 from springfoot.files.provenance import source
 from springfoot.files.writing import remove_temporary, require_new, write_atomically
 
-from ..policies.conversion import ignoring_unvaried
-from ..policies.fingerprint import fingerprint
-from ..policies.policy import BEST, LAST, Policy, save_policy
-from .config import TrainingConfig, config_from_json, config_to_json, processors
-from .progress import Progress
-from .ray_cluster import joined
-from .returns import evaluation_of
+from ..config import TrainingConfig, config_from_json, config_to_json, processors
+from ..progress import Progress
+from ..returns import evaluation_of
+from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
+from ..stopping import Stopping
+from .nodes import joined
 from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
-from .run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
-from .stopping import Stopping
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray")
 """Packages whose versions decide the result of a training."""
@@ -131,6 +131,7 @@ def resume(
 def _newest(out: Path) -> Path | None:
     """Return the folder of the newest checkpoint; None if there is none."""
     numbers = [path.name.removeprefix(CHECKPOINT) for path in out.glob(f"{CHECKPOINT}*") if (path / _TOLD).is_file()]
+    numbers = [number for number in numbers if number.isdecimal()]
     return out / f"{CHECKPOINT}{max(map(int, numbers))}" if numbers else None
 
 
@@ -174,8 +175,12 @@ class _Run:
             self._writer = stack.enter_context(SummaryWriter(str(self._out), purge_step=self._trained or None))
             self._progress = Progress(self._config.timesteps, self._trained)
             stack.enter_context(self._stopping)  # after Ray, which has handlers of its own
-            with suppress(KeyboardInterrupt), self._progress:  # at the second signal: what is kept stands
-                self._learn()
+            try:
+                with suppress(KeyboardInterrupt), self._progress:  # at the second signal: what is kept stands
+                    self._learn()
+            except Exception:
+                self._write_record("failed")
+                raise
             self._write_record("finished" if self._finished else "interrupted")
         return self._record
 
@@ -305,7 +310,8 @@ class _Run:
         save_policy(self._out / LAST, self._policy())
         kept = self._out / f"{CHECKPOINT}{self._trained}"
         part = self._out / f".{kept.name}"
-        shutil.rmtree(part, ignore_errors=True)
+        for left in self._out.glob(f".{CHECKPOINT}*"):  # of a run that was killed while it saved
+            shutil.rmtree(left, ignore_errors=True)
         self._algorithm.save_to_path(str(part.absolute()))
         told = {name: self._record[name] for name in ("sessions", "evaluations")}
         told |= {"timesteps": self._trained, "seconds": self._seconds()}

@@ -24,7 +24,7 @@ from springfoot.errors import SpringfootError
 
 ray = pytest.importorskip("ray", reason="RLlib has an environment of its own: make test-rllib")
 
-from springfoot.agents.training import rllib_training  # noqa: E402
+from springfoot.agents.training.cluster import rllib_training  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # Ray's own
 SMALL = TrainingConfig(timesteps=8192, num_envs=8, update_steps=1024, eval_interval=4096, eval_episodes=2)
@@ -62,7 +62,7 @@ def test_the_first_policy_is_the_mean_action_of_the_untrained_network(tmp_path):
     import torch
     from ray.rllib.core.columns import Columns  # pyright: ignore[reportMissingImports]
 
-    from springfoot.agents.training.rllib_network import ActorCritic, actor_layers
+    from springfoot.agents.training.cluster.rllib_network import ActorCritic, actor_layers
 
     mean, variance = rllib_training.observed(SMALL)
     environments = SegmentedFootBipedVector(4)
