@@ -30,7 +30,7 @@ SETS = {
 }
 """Name of a set -> its policy, in words too."""
 NAMESPACE = "springfoot/walk"
-PLACE = "MINARI_DATASETS_PATH"
+DATASETS_FOLDER = "MINARI_DATASETS_PATH"
 """Variable of the folder of Minari's sets."""
 ENVIRONMENT = "springfoot/SegmentedFootBiped-v0"
 _BATCH = 50
@@ -164,14 +164,14 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
 @contextmanager
 def _datasets_in(folder: Path) -> Iterator[None]:
     """Let Minari write below another folder until the block ends."""
-    before = os.environ.get(PLACE)
-    os.environ[PLACE] = str(folder)
+    before = os.environ.get(DATASETS_FOLDER)
+    os.environ[DATASETS_FOLDER] = str(folder)
     try:
         yield
     finally:
-        os.environ.pop(PLACE)
+        os.environ.pop(DATASETS_FOLDER)
         if before is not None:
-            os.environ[PLACE] = before
+            os.environ[DATASETS_FOLDER] = before
 
 
 def _last(steps: int, value: bool) -> list[Any]:
