@@ -98,7 +98,6 @@ def run_training(flags: TrainFlags) -> int:
     if flags.resume and (fixed := sorted(set(settings) - RESUMED)):
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
-        end_in_order()
         folder = flags.resume
         record = _continued(flags, settings)
     else:
@@ -106,7 +105,6 @@ def run_training(flags: TrainFlags) -> int:
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
         if flags.seeds is not None:
             return run_seeds(config, flags.out, flags.seeds)
-        end_in_order()
         folder = flags.out
         record = _trained(flags, config)
     interrupted = record["status"] == "interrupted"
@@ -126,10 +124,8 @@ def _trained(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
     """Train a new run with the engine asked for; return its record."""
     assert flags.out is not None
     if flags.engine == "rllib":
-        return _rllib().train(config, flags.out, flags.num_env_runners)
-    from springfoot.agents.training import training  # not above: torch takes seconds, and bad flags need not wait
-
-    return training.train(config, flags.out)
+        return _engine(of_rllib=True).train(config, flags.out, flags.num_env_runners)
+    return _engine(of_rllib=False).train(config, flags.out)
 
 
 def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
@@ -141,19 +137,24 @@ def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
     if (flags.resume / RUN).is_file() and is_of_rllib(read_record(flags.resume)):
         if "reward_weights" in settings:
             raise SpringfootError("--resume of a run of RLlib goes on with its reward; drop --reward-weights")
-        return _rllib().resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
+        return _engine(of_rllib=True).resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
     if flags.num_env_runners is not None or flags.engine != "sb3":
         raise SpringfootError(f"{flags.resume} is no run of RLlib; drop --engine and --num-env-runners")
-    from springfoot.agents.training import training
-
-    return training.resume(flags.resume, **settings)
+    return _engine(of_rllib=False).resume(flags.resume, **settings)
 
 
-def _rllib() -> Any:
-    """Return the module that trains on Ray."""
-    with naming_extras():
-        from springfoot.agents.training.cluster import rllib_training
-    return rllib_training
+def _engine(of_rllib: bool) -> Any:
+    """Import and return the module that trains, on Ray or here; from then on signals end it in good order.
+
+    Not imported above: torch takes seconds, and bad flags need not wait for it.
+    """
+    if of_rllib:
+        with naming_extras():
+            from springfoot.agents.training.cluster import rllib_training as module
+    else:
+        from springfoot.agents.training import training as module
+    end_in_order()
+    return module
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
