@@ -122,7 +122,10 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | grf            | 5      | exp(-D/0.4), D body weights by which the feet's forces leave people's range     |
     | stiffness_rate | -0.1   | squared change of the action, per 20 ms                                         |
     | stiffness      | -0.02  | mean over legs of [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25                       |
-    | effort         | 0      | positive power of all joints over weight x commanded speed (cost of transport)  |
+    | effort         | 0      | positive work of all joints over weight x commanded way (cost of transport)     |
+    | fibre_work     | 0      | energy that muscle fibres spend on work, over weight x commanded way            |
+    | activation     | 0      | squared moment of the fibres over their strength, weighted by volume            |
+    | impact         | 0      | squared change of the feet's forces in a step [body weights], x (50 ms/step)^2  |
 
     ## Starting state
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at

@@ -88,12 +88,18 @@ class Setup:
             "last_action": np.zeros((n, 4)),
             "stiffness": np.tile([300.0, 60.0], (n, 2, 1)) * self.body.mass_scale * self.body.length_scale,
             "force_windows": self.people_force(left_phase),
+            "muscles": {},
+            "last_force": None,
         }
         values |= other
         task, controls, bodies = self.at(left_phase, measurement)
         controls["decision"]["action"], controls["decision"]["last_action"] = values["action"], values["last_action"]
         controls["springs"]["stiffness"] = values["stiffness"]
         controls["springs"]["acts"] = 1.0
+        for name, value in values["muscles"].items():
+            bodies["muscles"][name] = value
+        if values["last_force"] is not None:
+            task.rows["steps"], task.rows["force"] = 1, values["last_force"]
         terms = np.empty((n, len(TERMS)))
         judge(task.rows, controls, bodies, task.table, task.options, values["force_windows"], terms)
         return dict(zip(TERMS, terms.T, strict=True))

@@ -312,9 +312,17 @@ class Biped(ExactState):
         """Lay the ground of the next footfalls, and report the window to a listener."""
         self._ground.advance(self._simulation.now, self._legs.phase, self._random)
         if self.on_tick is not None and step.window_start is not None:
-            com = self._task.planned_com(self._simulation.arrays.bodies)
-            work = self._simulation.work
-            self.on_tick(Tick(measurement=self.measurement, work=work, com_reference=com, **step.window_start))
+            bodies = self._simulation.arrays.bodies
+            self.on_tick(
+                Tick(
+                    measurement=self.measurement,
+                    work=self._simulation.work,
+                    fibre_moment=bodies["muscles"]["moment"][:, 0].copy(),
+                    muscle_work=bodies["muscles"]["delivered"][:, 0].copy(),
+                    com_reference=self._task.planned_com(bodies),
+                    **step.window_start,
+                )
+            )
 
     def _judge(self, step: "_Step") -> StepResult:
         """End the last window: reward, observation, termination."""

@@ -74,7 +74,7 @@ def end_window(rows, physics, window, walking) -> None:
     rows = EnvironmentRows(*rows)
     physics = Physics(*physics)
     bodies = physics.bodies
-    measure_bodies(bodies, physics.state, physics.sensors, physics.warnings)
+    measure_bodies(bodies, physics.state, physics.sensors, physics.actuator, physics.velocity, physics.warnings)
     advance(rows.controls, bodies, walking)
     for i in range(len(bodies)):
         force = bodies[i].measured.force
@@ -143,7 +143,9 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
         outcome.terminated[i] = running[i] and terms[i, ALIVE] == 0.0
         outcome.truncated[i] = running[i] and not outcome.terminated[i] and tasks[i].steps >= task[0].most_steps
         any_terminated = any_terminated or outcome.terminated[i]
-        if not running[i]:
+        if running[i]:
+            bodies[i].muscles.judged = 1
+        else:
             outcome.reward[i] = 0.0
         decision = controls[i].decision
         for k in range(4):

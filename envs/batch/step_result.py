@@ -125,6 +125,10 @@ class Tick:
     """(N, side, joint) rest angle theta_eq held in the window, feed-forward torque included as torque / K [rad]."""
     work: WindowWork
     """Torque, work and energy over the window's physics steps."""
+    fibre_moment: NDArray
+    """(N, side, joint) mean moment of the muscles' fibres in the window, extension positive, 0 where none act [N m]."""
+    muscle_work: NDArray
+    """(N, side, joint) work in the window of muscles, tissue left out, on the joint [J]."""
     com_reference: NDArray
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray

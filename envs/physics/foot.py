@@ -38,13 +38,19 @@ class FootJoint:
     device: Spring | None = None
     """Spring in place of muscles; None for muscles, whose stiffness the policy sets."""
     rest: float | None = None
-    """Rest angle of the muscles' spring [rad], if there is no device; None for the planned one over the stride."""
+    """Rest angle of an adaptive device, whose stiffness the policy sets [rad]; None for muscles, which have the planned
+    one over the stride."""
     strength: float = 1.0
     """Largest torque of the muscles downwards (plantarflexion) over that of the sound joint [-]."""
     acts_in_swing: bool = True
     """False for muscles that are slack while the leg swings."""
     orthosis: Spring | None = None
     """Spring beside the joint, which always acts."""
+
+    @property
+    def has_muscles(self) -> bool:
+        """Return True without a device of either kind."""
+        return self.device is None and self.rest is None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from .contact import CONTACTS, contact_offsets
 from .foot import SOUND, Feet, leg_segments, total_mass
 from .kernel import kernel, part
 from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times_of, torque_ranges
+from .muscles import MUSCLE_ROW, work_muscles
 
 DEGREES = len(BASE) + len(SIDES) * len(JOINTS)
 """Degrees of freedom of the body."""
@@ -63,6 +64,7 @@ BODY_ROW = np.dtype(
         ("segments", SEGMENTS),
         ("ground", float, 1 + len(SIDES)),  # tangent of the slope [-], height of the ground below each foot [m]
         ("measured", MEASURED),
+        ("muscles", MUSCLE_ROW),
     ]
 )
 """Row of one body in the simulation."""
@@ -254,13 +256,15 @@ def plant_of(state, i) -> Any:
 
 
 @kernel
-def measure_bodies(bodies, state, sensors, warnings) -> None:
+def measure_bodies(bodies, state, sensors, actuator, velocity, warnings) -> None:
     """Measure N bodies after a control window.
 
     Args:
-        bodies: (N,) of `BODY_ROW`; `measured` is filled.
+        bodies: (N,) of `BODY_ROW`; `measured` is filled, and the window added to `muscles`.
         state: (N, numbers) MuJoCo's, whose rows begin as `PLANT`.
         sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
+        actuator: (N, S, D) generalised forces of the actuators in these steps [N, N m].
+        velocity: (N, S, D) velocities after them [m/s, rad/s].
         warnings: (N, kinds) how often MuJoCo has warned of each kind.
     """
     for i in range(len(bodies)):
@@ -274,6 +278,7 @@ def measure_bodies(bodies, state, sensors, warnings) -> None:
         _locate(segments, plant.qpos, plant.qvel, m)
         _above(bodies[i].ground, m)
         _average(sensors[i], m.force)
+        work_muscles(bodies[i].muscles, m, actuator[i], velocity[i], plant.control)
         m.diverged = -1
         for kind in range(warnings.shape[1] - 1, -1, -1):
             if warnings[i, kind] > 0:

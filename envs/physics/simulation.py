@@ -22,12 +22,17 @@ from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot import SOUND, Feet
 from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
+from .muscles import forget, muscles_of
 from .timing import CONTROL_WINDOW
 
 MjModel: TypeAlias = Any
 """A `mujoco.MjModel`; MuJoCo has no type stubs, and its unknown types would be unknown in our users' files."""
 MjData: TypeAlias = Any
 """A `mujoco.MjData`, likewise."""
+
+
+SENSORS = "sensordata"
+"""MuJoCo's field of the contact forces."""
 
 
 class Physics(NamedTuple):
@@ -39,6 +44,10 @@ class Physics(NamedTuple):
     """(N, numbers) MuJoCo's state, whose rows begin as `PLANT`."""
     sensors: NDArray
     """(N, S, side, contact, 3) contact forces of the last window's S physics steps [N]."""
+    actuator: NDArray
+    """(N, S, D) generalised forces of the actuators in those steps [N, N m]."""
+    velocity: NDArray
+    """(N, S, D) velocities after those steps [m/s, rad/s]."""
     warnings: NDArray
     """(N, kinds) how often MuJoCo has warned of each kind since the episode began."""
 
@@ -91,14 +100,20 @@ class Simulation:
         self._turn = self._batch.bind("mocap_quat")
         bodies = np.zeros(num, BODY_ROW)
         bodies["segments"] = np.concatenate([segments_of(body, pair) for pair in self.feet])
+        bodies["muscles"]["muscles"] = np.concatenate([muscles_of(body, pair) for pair in self.feet])
         self._parts = np.concatenate([parts_of(body, pair) for pair in self.feet])
         self._ground = bodies["ground"]
         sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
-        self.arrays = Physics(bodies, state, sensors, self._batch.warning[:, :, 1])
+        actuator, velocity = np.zeros((2, num, self._substeps, self.model.nv))
+        self.arrays = Physics(bodies, state, sensors, actuator, velocity, self._batch.warning[:, :, 1])
         """Arrays that kernels read and write."""
         self.now = Measurement.of(bodies["measured"])
         """The last measurement; its arrays change in place."""
-        self._record = {"sensordata": sensors.reshape(num, self._substeps, self.model.nsensordata)}
+        self._record = {
+            SENSORS: sensors.reshape(num, self._substeps, self.model.nsensordata),
+            "qfrc_actuator": actuator,
+            "qvel": velocity,
+        }
         self._held = np.full(self._control.shape, np.nan)  # in the last window that was watched
         self.kept = {"body": bodies, "mujoco": state, "warnings": self._batch.warning, "held": self._held}
         """Name -> array with N rows, of everything that changes."""
@@ -119,6 +134,7 @@ class Simulation:
             feet = self.feet[index]
             self.models[index] = self._built[feet] if body == self.body else build_model(body, self._friction, feet)
             self.arrays.bodies["segments"][index] = segments_of(body, feet)[0]
+            self.arrays.bodies["muscles"]["muscles"][index] = muscles_of(body, feet)[0]
             self._parts[index] = parts_of(body, feet)[0]
         self._batch.set_models(self.models)
 
@@ -178,8 +194,11 @@ class Simulation:
 
     def _roll_watched(self, ids: NDArray | None) -> None:
         """Run the physics steps of a window and sum their work."""
-        shape = self.num, self._substeps, self.model.nv
-        steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), *(np.zeros(shape) for _ in RECORDED))
+        actuator = self.arrays.actuator
+        velocity = self.arrays.velocity
+        passive = np.zeros_like(velocity)
+        constraint = np.zeros_like(velocity)
+        steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), velocity, actuator, passive, constraint)
         angle = self._qpos[:, 3:].reshape(self._control.shape[:3]).copy()
         self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))
         state = self._qpos, self._qvel
@@ -201,7 +220,7 @@ class Simulation:
             self._batch.rollout(self._substeps, record=list(out), out=out)
             return
         for name, values in out.items():
-            if name not in self._record:
+            if name != SENSORS:
                 values[:] = 0.0
         if len(ids):
             found = self._batch.rollout(self._substeps, record=list(out), ids=ids)
@@ -213,6 +232,7 @@ class Simulation:
         self.arrays.sensors[ids] = 0.0
         measure_bodies(*self.arrays)
         self.now.torque[ids] = 0.0
+        forget(self.arrays.bodies["muscles"], ids, self.now.angle, self.now.velocity)
         return self.now
 
     def data(self, index: int) -> MjData:

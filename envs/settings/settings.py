@@ -80,6 +80,9 @@ DEFAULT_WEIGHTS = {
     "stiffness_rate": -0.10,
     "stiffness": -0.02,
     "effort": 0.0,
+    "fibre_work": 0.0,
+    "activation": 0.0,
+    "impact": 0.0,
 }
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
 

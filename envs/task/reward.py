@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springfoot.arrays import NDArray
+from springfoot.gait.plan.effort import ACTIVATION_TIME
 
 from ..control.constants import LegConstants
 from ..control.foot_springs import muscle_stiffness
@@ -49,10 +50,11 @@ push-off far too strong costs hardly more than one a little too strong."""
 
 TERMS: tuple[str, ...] = (
     *("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf"),
-    *("stiffness_rate", "stiffness", "effort"),
+    *("stiffness_rate", "stiffness", "effort", "fibre_work", "activation", "impact"),
 )
 """Reward terms in the order of their sum: rewards, then costs."""
-ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, EFFORT = range(len(TERMS))
+ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, *_ = range(len(TERMS))
+EFFORT, FIBRE_WORK, ACTIVATION, IMPACT = range(STIFFNESS + 1, len(TERMS))
 TASK_OPTIONS = np.dtype(
     [
         ("weights", float, len(TERMS)),  # of the reward's terms
@@ -110,13 +112,23 @@ def _force_distance(scale, forces, i, side, target):
 
 
 @part
-def _positive_power(m):
-    """Return the positive power of all joints [W]; `m` is of `MEASURED`."""
-    power = 0.0
+def _impact(row, forces, i, seconds):
+    """Return the term `impact` of body `i`; 0 in an episode's first step.
+
+    `row` is of `TASK_ROW`, `forces` (W, N, side, contact, 2) [N] in the step's windows, `seconds` the time of the step.
+    """
+    if row.steps == 0:
+        return 0.0
+    impact = 0.0
     for side in range(2):
-        for joint in range(4):
-            power += max(m.torque[side, joint] * m.velocity[side, joint], 0.0)
-    return power
+        for axis in range(2):
+            change = 0.0
+            for contact in range(3):
+                change -= row.force[side, contact, axis]
+                for window in range(len(forces)):
+                    change += forces[window, i, side, contact, axis] / len(forces)
+            impact += (change / row.scales.weight * ACTIVATION_TIME / seconds) ** 2
+    return impact
 
 
 @part
@@ -131,8 +143,12 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
     [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of the muscles that act (a slack joint and a device in their place cost
-    nothing), scaled to 1.70 m and 63 kg; `effort`, positive power of hips, knees,
-    ankles and toes at the step's end over body weight times commanded speed: the cost of transport of that moment.
+    nothing), scaled to 1.70 m and 63 kg; `effort`, positive work of hips, knees, ankles and toes in the step over body
+    weight times commanded way: the cost of transport of that step. The price of the muscles
+    (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of their fibres over body
+    weight times commanded way; `activation`, mean over the step of the squared activation by volume, all joints
+    together. `impact`, sum over feet and directions of the squared change of the force since the last step [body
+    weights] x `ACTIVATION_TIME` over the time of a step.
 
     Args:
         rows: (N,) of `TASK_ROW`.
@@ -170,7 +186,12 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, GRF] = exp(-force_distance / FORCE_TOLERANCE)
         terms[i, STIFFNESS] = stiffness_cost
         terms[i, STIFFNESS_RATE] = stiffness_rate
-        terms[i, EFFORT] = _positive_power(m) / (scale.weight * control.subject.speed)
+        muscles = bodies[i].muscles
+        way = control.subject.speed * options[0].seconds
+        terms[i, EFFORT] = muscles.positive_work / (scale.weight * way)
+        terms[i, FIBRE_WORK] = muscles.energy.sum() / (scale.weight * way)
+        terms[i, ACTIVATION] = muscles.activation / options[0].seconds
+        terms[i, IMPACT] = _impact(rows[i], forces, i, options[0].seconds)
 
 
 @part

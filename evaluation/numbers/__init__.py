@@ -6,6 +6,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, numbers, unmet
+    from .effort import mean_effort
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, strides_within
@@ -24,6 +25,7 @@ __all__ = [
     "asymmetry",
     "foot_contacts",
     "leg_numbers",
+    "mean_effort",
     "measure",
     "number_text",
     "numbers",
@@ -47,6 +49,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "asymmetry": "per_leg",
             "foot_contacts": "series",
             "leg_numbers": "per_leg",
+            "mean_effort": "effort",
             "measure": "metrics",
             "number_text": "criteria",
             "numbers": "criteria",

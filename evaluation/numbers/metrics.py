@@ -22,6 +22,7 @@ from springfoot.gait.people.contacts import PERCENT
 from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
+from .effort import effort_numbers
 from .per_leg import ANGLE_COLUMNS, asymmetry, differ, kinds_of, leg_numbers
 from .tally import StrideTally, tally_strides
 
@@ -151,6 +152,8 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "moments": {name: moment(name) for name in MOMENT_CURVES},
         "ankle_work_J_kg": work["ankle"],
         "joint_work_J_kg": work,
+        "effort": effort_numbers(tally.effort, body_of(settings)),
+        "com_work_J_kg": {"push_off": _mean(tally.push_off), "collision": _mean(tally.collision)},
         "energy_J_kg": _energy(tally),
         "springs_J_kg": _springs(tally),
         "zmp": _zmp(recording.plan_zmp, tally),

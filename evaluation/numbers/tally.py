@@ -12,14 +12,15 @@ from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.contact import CONTACTS
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.model import SIDES, contact_material
-from springfoot.envs.settings.settings import body_of
+from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.envs.task.reward import TERMS
-from springfoot.gait import GRAVITY, Body
+from springfoot.gait import GRAVITY
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
 
 from ..recording.recording import REWARD, TICK, WARM_UP, Recording
 from .curves import StrideCurves
+from .effort import EpisodeEffort, episode_effort
 from .series import GAIT_CYCLE_COLUMNS, foot_contacts, mid_tick, stride_curves, strides_within
 
 SHORTEST_SPEED = 1.0
@@ -74,6 +75,12 @@ class StrideTally:
     """(joint, 2) positive and negative work of one leg in each of its strides [J/kg]."""
     energy: list[NDArray] = field(default_factory=list)
     """Change of each entry of the body's ledger (`springfoot.envs.physics.energy`) in each stride [J/kg]."""
+    effort: list[EpisodeEffort] = field(default_factory=list)
+    """What each episode cost its muscles."""
+    push_off: list[float] = field(default_factory=list)
+    """Positive work of the trailing leg's force on the CoM in the double support of each step [J/kg]."""
+    collision: list[float] = field(default_factory=list)
+    """Negative work of the leading leg's force likewise, a positive number [J/kg]."""
     travel: list[float] = field(default_factory=list)
     """Distance the loaded sole slides in each stance [m]."""
     clearance: list[float] = field(default_factory=list)
@@ -83,13 +90,12 @@ class StrideTally:
 def tally_strides(recording: Recording) -> StrideTally:
     """Tally every stride, step and episode of a recording: its steady walk, without the warm-up."""
     tally = StrideTally()
-    body = body_of(recording.settings)
     fell = recording.fall_reason != ""
     begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
         if ticks:
-            add_episode(tally, series, body, (begin + WARM_UP, end), bool(fell[episode]))
+            add_episode(tally, series, recording.settings, (begin + WARM_UP, end), bool(fell[episode]))
             tally.at_rest += not fell[episode] and score.at_rest(
                 series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
             )
@@ -97,17 +103,22 @@ def tally_strides(recording: Recording) -> StrideTally:
 
 
 def add_episode(
-    tally: StrideTally, series: dict[str, NDArray], body: Body, steady: tuple[float, float], fell: bool = False
+    tally: StrideTally,
+    series: dict[str, NDArray],
+    settings: BipedSettings,
+    steady: tuple[float, float],
+    fell: bool = False,
 ) -> None:
     """Add the strides and steps of one episode to a tally.
 
     Args:
         tally: to add to.
         series: name -> (T, ...), as in a recording.
-        body: that walked.
+        settings: of the environment: body, feet and slope.
         steady: time span [s]; strides and steps outside it do not count.
         fell: whether the episode ended in a fall.
     """
+    body = body_of(settings)
     weight = body.mass * GRAVITY
     com = series["com"]
     # Distance, work and speed of the whole steady span, by ticks.
@@ -119,6 +130,8 @@ def add_episode(
         tally.work += float(series["joint_work"][first_tick:last_tick, ..., 0].sum())
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
+        if effort := episode_effort(series, body, settings.feet, first_tick, last_tick):
+            tally.effort.append(effort)
 
     # Curves and numbers of each foot's strides, cut at its heel strikes.
     vertical = series["force"][..., 1].sum(axis=2)
@@ -145,13 +158,18 @@ def add_episode(
             tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
             first, last = (round(leave + part * (stop - leave)) for part in CLEARANCE_SWING)
             tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
-    _add_steps(tally, series, contacts, steady)
+    _add_steps(tally, series, contacts, settings, steady)
 
 
 def _add_steps(
-    tally: StrideTally, series: dict[str, NDArray], contacts: list[Contacts], steady: tuple[float, float]
+    tally: StrideTally,
+    series: dict[str, NDArray],
+    contacts: list[Contacts],
+    settings: BipedSettings,
+    steady: tuple[float, float],
 ) -> None:
-    """Add the steps of one episode: CoM, CoP and reward over the step, lengths, times, double support."""
+    """Add the steps of one episode: CoM, CoP and reward over the step, lengths, times, double support and its work."""
+    com_work = _com_work(series, settings) / body_of(settings).mass
     steps, sides = find_steps(contacts[0], contacts[1], after=steady[0])
     in_time = steps[:, 1] <= steady[1]
     steps = steps[in_time]
@@ -173,7 +191,23 @@ def _add_steps(
         tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
         support = next_after(contacts[1 - side].toe_offs, begin) - begin
-        tally.double_support += list(np.where(support < end - begin, support, 0.0))
+        support = np.where(support < end - begin, support, 0.0)
+        tally.double_support += list(support)
+        work = _sums(com_work, begin, begin + support)
+        tally.push_off += list(work[:, 1 - side, 0])
+        tally.collision += list(-work[:, side, 1])
+
+
+def _com_work(series: dict[str, NDArray], settings: BipedSettings) -> NDArray:
+    """Return (T, side, 2) the positive and the negative work of each leg's ground force on the CoM in each tick [J].
+
+    The individual limbs' work of Donelan, Kram & Kuo, J. Biomech. 35 (2002) 117-124.
+    """
+    velocity = mid_tick(series["com_velocity"])
+    # Recorded heights, and so upward velocities, are above the mean ground; work needs them in the world.
+    velocity[:, 1] += np.tan(np.radians(settings.slope_deg)) * velocity[:, 0]
+    work = (series["force"].sum(2) * velocity[:, None]).sum(-1) * TICK
+    return np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1)
 
 
 def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:

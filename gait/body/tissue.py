@@ -1,8 +1,10 @@
-"""Compute joint loads without muscle activity: passive elastic moments of tissue, and the tendon of the calf.
+"""Compute joint loads without muscle activity: passive elastic moments of tissue, and the tendons of calf and toes.
 
 Passive moments: Riener & Edrich, Journal of Biomechanics 32 (1999) 539-544, regressions over hip, knee and ankle angles
 of ten subjects, here for 1.70 m and 63 kg.
 """
+
+from typing import Any
 
 import numpy as np
 
@@ -13,18 +15,39 @@ from .body import Body
 TOE_STIFFNESS = 28.0
 """Stiffness of the toe joint under load [N m/rad] for 1.70 m and 63 kg; chosen, near the low end of barefoot estimates,
 25 to 60, as the thesis has no number of its own."""
-TENDON = 400.0
+ANKLE_TENDON = 400.0
 """Stiffness of the Achilles tendon about the ankle [N m/rad] for 1.70 m and 63 kg: 190 N/mm (Lichtwark & Wilson, J.
 Exp. Biol. 208 (2005) 4715-4725) at a lever of 46 mm."""
+
+
+TOE_TENDON = 25.0
+"""Stiffness of the tendons of the toes' flexors about the toe joint [N m/rad] at their largest force, for 1.70 m and 63
+kg: forces and tendon lengths of three flexors of D'Hondt et al., PLoS Comput. Biol. 20 (2024) e1012219 (model
+`DHondt_et_al_2024_4seg.osim`) at a lever of 9.5 mm. At a fifth of that force it is 9, at half of it 16; walks here
+reach and pass the largest force."""
+FASCIA = (5.6, 1.38)
+"""Passive moment of the toe [N m] at 1.70 m and 63 kg, first x (exp(second x angle [rad]) - 1): the plantar fascia of
+Natali et al. (2010) in the same model, round a head of 9.5 mm. Chosen: 0.6 of the moment with a rigid arch, as the arch
+rises; the whole would be a plausible upper end, 0.3 of it a lower."""
+DEGREES = 180.0 / np.pi
 
 
 def passive_moments(body: Body, angle: NDArray) -> NDArray:
     """Return (..., 4) passive moments of hip, knee, ankle and toe [N m], extension and plantarflexion positive.
 
-    `angle` (..., 4) [rad], flexion, dorsiflexion and toe up positive; the trunk is upright. The toe has
-    `TOE_STIFFNESS` and rests in line with the foot.
+    `angle` (..., 4) [rad], flexion, dorsiflexion and toe up positive; the trunk is upright.
     """
-    hip, knee, ankle, _ = np.moveaxis(np.degrees(angle), -1, 0)
+    return body.stiffness_scale * np.stack(tissue_moments(*np.moveaxis(angle, -1, 0)), -1)
+
+
+def tissue_moments(hip: Any, knee: Any, ankle: Any, toe: Any) -> Any:
+    """Return the passive moments of hip, knee, ankle and toe [N m] at 1.70 m and 63 kg, signs as of `passive_moments`.
+
+    The angles [rad] are numbers or arrays: the environment's kernels compile this function.
+    """
+    hip = DEGREES * hip
+    knee = DEGREES * knee
+    ankle = DEGREES * ankle
     of_hip = -np.exp(1.4655 - 0.0034 * knee - 0.0750 * hip) + np.exp(1.3403 - 0.0226 * knee + 0.0305 * hip) - 8.072
     of_knee = (
         -np.exp(1.800 + 0.0460 * ankle - 0.0352 * knee + 0.0217 * hip)
@@ -32,7 +55,7 @@ def passive_moments(body: Body, angle: NDArray) -> NDArray:
         + 4.820
         - np.exp(2.220 - 0.150 * knee)
     )
-    of_ankle = np.exp(2.1016 + 0.0843 * ankle - 0.0176 * knee)
-    of_ankle -= np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee) + 1.792
-    of_toe = TOE_STIFFNESS * angle[..., 3]
-    return body.stiffness_scale * np.stack([of_hip, of_knee, of_ankle, of_toe], -1)
+    of_ankle = (
+        np.exp(2.1016 + 0.0843 * ankle - 0.0176 * knee) - np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee) - 1.792
+    )
+    return of_hip, of_knee, of_ankle, FASCIA[0] * (np.exp(FASCIA[1] * toe) - 1.0)

@@ -1,9 +1,19 @@
-"""Compute the effort of a stride, planned or simulated: work and muscle excitation of its moments, joint accelerations.
+"""Compute the effort of a walk: what it costs the muscles, from joint moments and angles alone.
 
-Effort uses no data of people's walks. All terms are dimensionless, so the same prices suit every body and speed.
+The same price holds for a plan, a step of the environment, a recording, a search and a study. The moment of a joint's
+muscle fibres is the muscles' moment less that of passive tissue. At ankle and toe the fibres pull through a tendon, a
+spring in series: what it stores they supply, what it returns is free. So the work of the fibres in a time dt is
+
+    -M d(theta) + F dF / k,    F = max(M, 0) at ankle and toe,
+
+with M the fibres' moment (extension positive), theta the joint's angle (flexion positive) and k the tendon's stiffness;
+the first part is what fibres and tendon deliver to the joint.
+Each joint is priced alone: fibres of one joint cannot use what those of another give. Effort uses no data of people's
+walks. Its terms are dimensionless, so the same prices suit every body and speed.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,24 +21,27 @@ from springfoot.arrays import NDArray
 
 from ..body.body import GRAVITY, Body
 from ..body.leg import JOINTS, inverse_dynamics
-from ..body.tissue import TENDON, passive_moments
+from ..body.tissue import ANKLE_TENDON, TOE_TENDON, passive_moments
 from .kinetics import planned_leg
 from .plan import WalkPlan
 
 EFFORT_SAMPLES = 200
-"""Samples of the stride; chosen."""
+"""Samples of a planned stride; chosen."""
 MUSCLE_EFFICIENCY = (0.25, 1.2)
 """Joint work over metabolic energy of muscles that shorten and that are stretched (Margaria 1968)."""
-STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "toe": (0.015, 0.015)}
+STRENGTH = {"hip": (0.16, 0.11), "knee": (0.16, 0.09), "ankle": (0.10, 0.03), "toe": (0.014, 0.006)}
 """Largest moment in extension and flexion, plantarflexion and dorsiflexion, over body weight times height [-]; chosen,
-rounded: the order of the maximal voluntary moments of young adults on dynamometers; of the toe a guess."""
+rounded: the order of the maximal voluntary moments of young adults on dynamometers. Toes: flexors 14 N m (Goldmann &
+Brueggemann, J. Anat. 221 (2012) 187), extensors by the forces and levers of the model at `TOE_TENDON`."""
 VOLUME = {"hip": (0.25, 0.13), "knee": (0.25, 0.10), "ankle": (0.15, 0.033), "toe": (0.02, 0.015)}
 """Volume of the muscles that extend and that flex each joint, over the volume of all the leg's muscles [-]; rounded,
 after Handsfield et al., J. Biomech. 47 (2014) 631-638; of the toe a guess. The volume weighs the
 squared activation: a small muscle tires, but costs little."""
 ACTIVATION_TIME = 0.05
 """Time constant with which a muscle's activation follows its excitation [s]; chosen, as models of muscles have it."""
-_ANKLE = JOINTS.index("ankle")
+TENDON_GIVE = (0.0, 0.0, 1.0 / ANKLE_TENDON, 1.0 / TOE_TENDON)
+"""Turn of a joint for each N m that its muscles pull on their tendon [rad/(N m)] at 1.70 m and 63 kg, in the order of
+`JOINTS`; tendons of hip and knee do not give."""
 MOTION_RANGE_DEG = {"knee": (0.0, 135.0), "ankle": (-48.0, 18.0), "toe": (-30.0, 70.0)}
 """Least and largest angle [deg], dorsiflexion and toe up positive: ranges of motion of the American Academy of
 Orthopaedic Surgeons (1965)."""
@@ -40,14 +53,107 @@ PER_DEGREE = 0.1
 """Effort of a joint beyond its range, in a search [1/deg]; chosen."""
 
 
+# The price of a short interval --------------------------------------------------------------------------------
+
+
+def interval_work(before: Any, moment: Any, after: Any, delivered: Any, give: Any) -> Any:
+    """Return the work [J] of the fibres of a joint in one interval; numbers, as in kernels, or arrays.
+
+    Args:
+        before, moment, after: the fibres' moment, mean over the interval before, this one and the next [N m].
+        delivered: work of fibres and tendon on the joint in this interval [J].
+        give: of the tendon [rad/(N m)].
+    """
+    pull_change = 0.5 * (np.maximum(after, 0.0) - np.maximum(before, 0.0))
+    return delivered + give * np.maximum(moment, 0.0) * pull_change
+
+
+def metabolic_energy(work: Any) -> Any:
+    """Return the energy [J] that fibres spend on positive or negative `work` [J], by `MUSCLE_EFFICIENCY`."""
+    return np.maximum(work, 0.0) / MUSCLE_EFFICIENCY[0] + np.maximum(-work, 0.0) / MUSCLE_EFFICIENCY[1]
+
+
+def strengths(body: Body) -> NDArray:
+    """Return the largest moments (joint, 2) [N m] of a sound leg's muscles in extension and in flexion."""
+    return body.mass * GRAVITY * body.height * np.array([STRENGTH[joint] for joint in JOINTS])
+
+
+def volume_weights() -> NDArray:
+    """Return the weight (joint, 2) of a joint's extensors and flexors in the activation: `VOLUME` over its mean [-]."""
+    volume = np.array([VOLUME[joint] for joint in JOINTS])
+    return volume / volume.mean()
+
+
+# The price of a walk ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Muscle:
+    """Factors on properties of the muscles, to study their effect."""
+
+    tissue: float = 1.0
+    """Factor on passive moments (`tissue.passive_moments`)."""
+    tendon: float = 1.0
+    """Factor on the give of the Achilles tendon."""
+    toe_tendon: float = 1.0
+    """Factor on the give of the toes' tendons."""
+
+
+AS_IS = Muscle()
+"""Muscles without changes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MuscleUse:
+    """Use of the muscles of L legs over some time, by leg and joint; joints in the order of `JOINTS`."""
+
+    work: NDArray
+    """(L, joint, 2) positive and negative work of the fibres [J]."""
+    activation: NDArray
+    """(L, joint) integral over time of the squared activation, weighted by volume [s]."""
+    rate: NDArray
+    """(L, joint) the same of `ACTIVATION_TIME` times the activation's rate [s]."""
+
+    @property
+    def energy(self) -> NDArray:
+        """(L, joint) metabolic energy of the fibres' work [J]."""
+        return metabolic_energy(self.work).sum(-1)
+
+
+def muscle_use(
+    moment: NDArray, delivered: NDArray, tick: float, strength: NDArray, scale: float, muscle: Muscle = AS_IS
+) -> MuscleUse:
+    """Compute the use of muscles over consecutive intervals, without the first and the last.
+
+    Args:
+        moment: (S, L, 4) moment of the fibres, mean over each interval [N m], extension positive.
+        delivered: (S, L, 4) work of fibres and tendon on each joint in the interval [J].
+        tick: length of an interval [s].
+        strength: (L, 4, 2) largest moments of each leg's muscles, extension and flexion [N m].
+        scale: of stiffness, `Body.stiffness_scale`.
+        muscle: factors on its properties.
+    """
+    give = np.array(TENDON_GIVE) * [1.0, 1.0, muscle.tendon, muscle.toe_tendon] / scale
+    work = interval_work(moment[:-2], moment[1:-1], moment[2:], delivered[1:-1], give)
+    extends = moment > 0.0
+    activation = moment / np.where(extends, strength[..., 0], strength[..., 1])
+    change = activation[2:] - activation[:-2]
+    weight = np.where(extends, *np.moveaxis(volume_weights(), -1, 0))[1:-1]
+    return MuscleUse(
+        work=np.stack([np.maximum(work, 0.0).sum(0), np.minimum(work, 0.0).sum(0)], -1),
+        activation=(weight * activation[1:-1] ** 2).sum(0) * tick,
+        rate=(weight * (ACTIVATION_TIME * change / (2 * tick)) ** 2).sum(0) * tick,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """Terms of the effort of one stride, both legs together."""
+    """Terms of the effort of a walk, both legs together."""
 
     work: float
-    """Metabolic energy of the work of hips, knees and ankles over body weight times distance [-]."""
+    """Metabolic energy of the fibres' work over body weight times distance [-]."""
     activation: float
-    """Sum over joints of the mean squared activation, moment over `STRENGTH`; the toe's without its tissue [-]."""
+    """Sum over joints of the mean squared activation: the fibres' moment over `STRENGTH`, weighted by volume [-]."""
     rate: float
     """Sum over joints of the mean squared `ACTIVATION_TIME` times rate of the activation [-]. A first-order muscle's
     mean squared excitation is the sum of this and `activation`."""
@@ -55,7 +161,7 @@ class Effort:
     """Sum over hip, knee and ankle of the mean squared `ACTIVATION_TIME`^2 times angular acceleration [-]; joint
     accelerations cost in the simulations of Falisse et al., J. R. Soc. Interface 16 (2019) 20190402, too."""
     beyond_range: float
-    """Sum over joints of the largest angle beyond `MOTION_RANGE_DEG` [deg]."""
+    """Sum over joints of the largest angle beyond `MOTION_RANGE_DEG` [deg]; searches alone price it."""
 
     @property
     def total(self) -> float:
@@ -68,18 +174,20 @@ class Effort:
         return self.work, self.activation, self.rate, self.acceleration
 
 
-@dataclass(frozen=True, kw_only=True)
-class Muscle:
-    """Factors on properties of the muscles, to study their effect."""
-
-    tissue: float = 1.0
-    """Factor on passive moments (`tissue.passive_moments`)."""
-    tendon: float = 1.0
-    """Factor on the give of the Achilles tendon."""
+def mean_squared_acceleration(velocity: NDArray, tick: float) -> float:
+    """Return `Effort.acceleration` of the joint velocities of L legs (S, L, 4) [rad/s] every `tick` [s]."""
+    change = np.diff(velocity[..., : JOINTS.index("toe")], axis=0) / tick
+    return float(ACTIVATION_TIME**4 * (change**2).mean(0).sum())
 
 
-AS_IS = Muscle()
-"""Muscles without changes."""
+def beyond_range(angle: NDArray) -> float:
+    """Return `Effort.beyond_range` [deg] of joint angles (S, 4) [rad]."""
+    angle_deg = np.degrees(angle)
+    beyond = 0.0
+    for joint, (least, most) in MOTION_RANGE_DEG.items():
+        curve = angle_deg[:, JOINTS.index(joint)]
+        beyond += max(0.0, float(curve.max()) - most) + max(0.0, least - float(curve.min()))
+    return beyond
 
 
 def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
@@ -96,7 +204,7 @@ def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
 def effort_of_stride(
     body: Body,
     angle: NDArray,
-    rate: NDArray | None,
+    rate: NDArray,
     moment: NDArray,
     stride_time: float,
     distance: float,
@@ -106,42 +214,24 @@ def effort_of_stride(
 
     Columns of `angle`, `rate` and `moment` (S, 4) are hip (thigh to the vertical), knee, ankle and toe of one leg, rows
     even samples of the stride. Flexion and dorsiflexion [rad], [rad/s] are positive; in moments [N m] extension and
-    plantarflexion. Without a `rate` the angle is differentiated.
+    plantarflexion.
     """
     tick = stride_time / len(angle)
-    toe = JOINTS.index("toe")
-    rate = _change(angle, tick) if rate is None else rate
-    acceleration = _change(rate[:, :toe], tick)
-    # Muscles supply the moments beyond those of passive tissue.
-    moment = moment - muscle.tissue * passive_moments(body, angle)
-    power = (-moment * rate)[:, :toe]
-    # Calf fibres also supply the rate of the tendon's elastic energy, pull^2 / (2 K).
-    pull = np.maximum(moment[:, _ANKLE], 0.0)
-    power[:, _ANKLE] += muscle.tendon * pull * _change(pull, tick) / (TENDON * body.stiffness_scale)
-    # metabolic energy [J] of one leg
-    spent = (
-        np.maximum(power, 0.0).sum() / MUSCLE_EFFICIENCY[0] + np.maximum(-power, 0.0).sum() / MUSCLE_EFFICIENCY[1]
-    ) * tick
-    activation = moment / _strength(body, moment)
-    change = _change(activation, tick)
-    angle_deg = np.degrees(angle)
-    beyond = 0.0
-    for joint, (least, most) in MOTION_RANGE_DEG.items():
-        curve = angle_deg[:, JOINTS.index(joint)]
-        beyond += max(0.0, float(curve.max()) - most) + max(0.0, least - float(curve.min()))
-    weight = _of_groups(VOLUME, moment) / np.mean(list(VOLUME.values()))
+    fibres = moment - muscle.tissue * passive_moments(body, angle)
+    moments, delivered = (_around(values)[:, None] for values in (fibres, -fibres * rate * tick))
+    use = muscle_use(moments, delivered, tick, strengths(body), body.stiffness_scale, muscle)
     return Effort(
-        work=float(2 * spent / (body.total_mass * GRAVITY * distance)),
-        activation=float(2 * np.mean(weight * activation**2, 0).sum()),
-        rate=float(2 * ACTIVATION_TIME**2 * np.mean(weight * change**2, 0).sum()),
-        acceleration=float(2 * ACTIVATION_TIME**4 * np.mean(acceleration**2, 0).sum()),
-        beyond_range=beyond,
+        work=float(2 * use.energy.sum() / (body.total_mass * GRAVITY * distance)),
+        activation=float(2 * use.activation.sum() / stride_time),
+        rate=float(2 * use.rate.sum() / stride_time),
+        acceleration=2 * mean_squared_acceleration(_around(rate)[:-1], tick),
+        beyond_range=beyond_range(angle),
     )
 
 
-def _change(values: NDArray, tick: float) -> NDArray:
-    """Return the time derivative, by central differences, of values (S, ...) that repeat every stride."""
-    return (np.roll(values, -1, 0) - np.roll(values, 1, 0)) / (2 * tick)
+def _around(values: NDArray) -> NDArray:
+    """Return values (S, ...) of a stride with the last one in front and the first one behind, as strides repeat."""
+    return np.concatenate([values[-1:], values, values[:1]])
 
 
 def _joints(turns: NDArray) -> NDArray:
@@ -151,14 +241,3 @@ def _joints(turns: NDArray) -> NDArray:
     """
     thigh, shank, foot, toe = np.moveaxis(turns, -1, 0)
     return np.stack([thigh, thigh - shank, foot - shank, toe - foot], -1)
-
-
-def _strength(body: Body, moment: NDArray) -> NDArray:
-    """Return the strength (..., 4) [N m] of the muscles that make the moments (..., 4), by their signs."""
-    return body.mass * GRAVITY * body.height * _of_groups(STRENGTH, moment)
-
-
-def _of_groups(table: dict[str, tuple[float, float]], moment: NDArray) -> NDArray:
-    """Return the table's number (..., 4) for extensors where the moment (..., 4) is positive, else for flexors."""
-    extending, flexing = np.array([table[joint] for joint in JOINTS]).T
-    return np.where(moment > 0.0, extending, flexing)

@@ -128,20 +128,22 @@ class Walks:
 
     def speed(self, index: int) -> float:
         """Return the evaluation's mean forward speed of walk `index` from `SETTLED` on [m/s]."""
-        return tally_from(self.episode(index), self.biped.body, SETTLED).speed[0]
+        return tally_from(self.episode(index), self.biped.settings, SETTLED).speed[0]
 
 
-def tally_from(series: dict[str, NDArray], body: Body, settled: float) -> StrideTally:
+def tally_from(series: dict[str, NDArray], settings: BipedSettings, settled: float) -> StrideTally:
     """Return the evaluation's tally of one walk from `settled` [s] on."""
     tally = StrideTally()
-    add_episode(tally, series, body, (settled, np.inf))
+    add_episode(tally, series, settings, (settled, np.inf))
     return tally
 
 
 def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED) -> StrideTally | None:
-    """Return the evaluation's tally of one walk from `settled` [s] on; None if a leg takes fewer than two strides."""
-    tally = tally_from(series, biped.body, settled)
-    return None if min(curves.count for curves in tally.feet) < 2 else tally
+    """Return the evaluation's tally of one walk from `settled` [s] on; None if a leg takes fewer than two strides, or
+    the body gets no further."""
+    tally = tally_from(series, biped.settings, settled)
+    walked = min(curves.count for curves in tally.feet) >= 2 and tally.distance > 0.0
+    return tally if walked else None
 
 
 def mean_speed(tally: StrideTally) -> float:

@@ -88,7 +88,7 @@ def walk(
     }
     for index in np.flatnonzero(numbers["missing"] == 0.0).tolist():
         series = episodes.episode(index)
-        numbers["speed"][index] = tally_from(series, biped.body, SETTLED).speed[0] - settings.speed
+        numbers["speed"][index] = tally_from(series, biped.settings, SETTLED).speed[0] - settings.speed
         numbers["heel"][index] = _heel_peak(series, biped.body)
     return {name: values.reshape(len(slopes_deg), walks) for name, values in numbers.items()}
 

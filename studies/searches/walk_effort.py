@@ -9,16 +9,14 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.batch import Biped
-from springfoot.evaluation.numbers import MOMENT_CURVES, StrideTally, foot_contacts, strides_within
+from springfoot.evaluation.numbers import StrideTally, foot_contacts, mean_effort, strides_within
 from springfoot.evaluation.recording import TICK
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.people import on_percent
-from springfoot.gait.plan import ACTIVATION_TIME, PER_DEGREE, Effort, effort_of_stride
+from springfoot.gait.plan import ACTIVATION_TIME, PER_DEGREE, Effort
 
 from .leg_walks import SETTLED, mean_speed
 
-ANGLE_CURVES = ("thigh_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg", "mtp_dorsiflexion_deg")
-"""The evaluation's curves of a leg's angles; the thigh's is to the vertical."""
 PER_EFFORT = 10.0
 """Cost of one unit of effort and impact; chosen, so that every walk costs less than a fall."""
 TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "skipped": 0.01, "travel": 0.01, "unsteady": 0.05}
@@ -54,8 +52,7 @@ def impact_of(force: NDArray, tick: float) -> float:
 def effort_and_impact(
     series: dict[str, NDArray], tally: StrideTally, biped: Biped, settled: float = SETTLED
 ) -> tuple[Effort, float, dict[str, float]]:
-    """Return the effort of the mean stride, the impact (`impact_of`), both means of the legs, and the errors of the
-    task.
+    """Return the effort of the walk, the impact (`impact_of`, mean of the legs), and the errors of the task.
 
     The errors have the names of `TASK_TOLERANCE`. `tally` is the evaluation's, of the walk's `series` from `settled`
     [s] on.
@@ -64,19 +61,12 @@ def effort_and_impact(
     weight = body.mass * GRAVITY
     speed = mean_speed(tally)
     ahead = series["com"][:, 0] - series["com_reference"][:, 0]
-    sides = np.array(tally.stride_sides)
-    efforts: list[Effort] = []
     impacts: list[float] = []
     places: list[float] = []
     landings: list[float] = []
     for side, foot in enumerate(foot_contacts(series["force"][..., 1].sum(axis=2), body)):
         strides = strides_within(foot, (settled, np.inf))
         begin, _, end = strides.T
-        curves = tally.feet[side]
-        angle = np.radians(np.stack([curves.mean(name) for name in ANGLE_CURVES], -1))[:-1]
-        torque = np.stack([curves.mean(name) for name in MOMENT_CURVES.values()], -1)[:-1] * body.mass
-        period = float(np.mean(np.array(tally.stride_time)[sides == side]))
-        efforts.append(effort_of_stride(body, angle, None, torque, period, speed * period))
         off = on_percent(ahead, begin, end, TICK, first=TICK).mean(0)[:-1]
         places.append(float(np.sqrt(np.mean(off**2))))
         force = series["force"][:, side].sum(1) / weight
@@ -84,7 +74,8 @@ def effort_and_impact(
         impacts.append(impact_of(force[first : last + 1], TICK))
         phase = series["phase"][:, side]
         landings += [phase[leave:land].max() for _, leave, land in np.floor(strides / TICK).astype(int)]
-    effort = Effort(**{name: float(np.mean([getattr(each, name) for each in efforts])) for name in vars(efforts[0])})
+    effort = mean_effort(tally.effort, body)
+    assert effort is not None  # `measured` lets no such walk pass
     held = {
         "speed": speed - biped.settings.speed,
         "period": float(np.mean(tally.stride_time)) / biped.plan.stride_time - 1,

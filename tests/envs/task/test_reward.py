@@ -114,12 +114,28 @@ def test_costs_count_what_they_say(thesis_body):
 
 
 @pytest.mark.parametrize("height", [1.7, 1.3])
-def test_effort_is_the_cost_of_transport_of_the_moment(height):
+def test_what_muscles_did_is_paid_over_weight_and_commanded_way(height):
     setup, random = Setup(height=height, mass=45, speed=1.0), np.random.default_rng(0)
-    torque, velocity = 50 * random.normal(size=(2, len(PHASES), 2, 4))
-    terms = setup.terms(setup.measurement(PHASES, torque=torque, velocity=velocity), PHASES)
-    power = np.maximum(torque * velocity, 0.0).sum((1, 2))
-    np.testing.assert_allclose(terms["effort"], power / (45 * GRAVITY * 1.0), rtol=1e-12)
+    energy = random.uniform(0.0, 1.0, (len(PHASES), 2, 4))
+    work, activation = random.uniform(0.0, 1.0, (2, len(PHASES)))
+    did = {"energy": energy, "positive_work": work, "activation": activation}
+    terms = setup.terms(setup.measurement(PHASES), PHASES, muscles=did)
+    carried = 45 * GRAVITY * 1.0 * 0.02
+    np.testing.assert_allclose(terms["effort"], work / carried, rtol=1e-12)
+    np.testing.assert_allclose(terms["fibre_work"], energy.sum((1, 2)) / carried, rtol=1e-12)
+    np.testing.assert_allclose(terms["activation"], activation / 0.02, rtol=1e-12)
+
+
+def test_impact_is_the_squared_change_of_the_feets_forces_but_in_the_first_step(thesis_body):
+    weight = thesis_body.body.mass * GRAVITY
+    forces, before = np.zeros((2, len(PHASES), 2, 3, 2)), np.zeros((len(PHASES), 2, 3, 2))
+    forces[:, :, LEFT, 0, 1], before[:, LEFT, 2, 1] = 0.7 * weight, 0.4 * weight
+    forces[0, :, RIGHT, 1, 0] = 0.2 * weight  # in one of two windows
+    measured = thesis_body.measurement(PHASES)
+    terms = thesis_body.terms(measured, PHASES, force_windows=forces, last_force=before)
+    np.testing.assert_allclose(terms["impact"], (0.3**2 + 0.1**2) * (0.05 / 0.02) ** 2, rtol=1e-9)
+    first = thesis_body.terms(measured, PHASES, force_windows=forces)
+    np.testing.assert_array_equal(first["impact"], 0.0)
 
 
 def test_force_is_rewarded_within_people_and_less_with_each_body_weight_beyond(thesis_body):

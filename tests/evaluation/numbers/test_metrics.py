@@ -15,7 +15,9 @@ from springfoot.evaluation.numbers.tally import tally_strides
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
 from springfoot.gait import GRAVITY, Body, human_gait
+from springfoot.gait.body.tissue import passive_moments
 from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, PERCENT
+from springfoot.gait.plan.effort import effort_of_stride
 
 BODY = Body()
 HUMAN = human_gait(1.2)
@@ -48,6 +50,7 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None, **settings) -> Recording
         mean_torque[..., joint] = -HUMAN.mean(f"{name}_moment", middle) * BODY.mass
     rate = joints(lambda name: HUMAN.rate(name, middle) / HUMAN.stride_time)
     work = mean_torque * rate * 0.01
+    tissue = passive_moments(BODY, joints(lambda name: HUMAN.mean(name, middle)))
     energy = np.zeros((count, len(ledger_entries())))
     energy[:, [ledger_entries().index(name) for name in ("actuators", "contact")]] = 0.3, -0.1  # J a tick
     energy[:, ledger_entries().index("mechanical")] = 600.0 + 0.25 * np.arange(count)
@@ -74,6 +77,8 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None, **settings) -> Recording
         "torque": torque,
         "joint_torque": mean_torque,
         "joint_work": np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1),
+        "fibre_moment": -mean_torque - tissue,
+        "muscle_work": work + tissue * rate * 0.01,
         "energy": energy,
         "com": com,
         "com_velocity": np.gradient(com, 0.01, axis=0),
@@ -154,6 +159,40 @@ def test_centre_of_mass_on_its_plan_has_no_error(gait):
     assert com["z_rmse_m"] < 0.001
     assert com["z_r"] > 0.995
     assert com["rise_m"] == pytest.approx(0.04, abs=5e-4)
+
+
+def test_effort_is_the_plans_price_of_peoples_curves(gait):
+    effort = gait.metrics["effort"]
+    phase = np.arange(400) / 400
+    angle, rate = (
+        np.stack([curve(name, phase) for name in ("thigh", "knee", "ankle", "toe")], -1)
+        for curve in (HUMAN.mean, HUMAN.rate)
+    )
+    moment = np.stack([HUMAN.mean(f"{name}_moment", phase) for name in ("hip", "knee", "ankle")] + [0 * phase], -1)
+    own = effort_of_stride(BODY, angle, rate / HUMAN.stride_time, moment * BODY.mass, HUMAN.stride_time, STRIDE_LENGTH)
+    assert effort["fibre_J_kg_m"] == pytest.approx(own.work * GRAVITY, rel=0.02)
+    assert effort["activation"] == pytest.approx(own.activation, rel=0.02)
+    assert effort["rate"] == pytest.approx(own.rate, rel=0.02)
+    assert effort["acceleration"] == pytest.approx(own.acceleration, rel=0.03)
+    assert effort["total"] == pytest.approx(own.total, rel=0.02)
+    for parts in (effort["per_joint"], effort["per_leg"]):
+        for name in ("fibre_J_kg_m", "net_joint_J_kg_m", "activation"):
+            assert sum(part[name] for part in parts.values()) == pytest.approx(effort[name])
+
+
+def test_work_on_the_com_is_that_of_each_legs_force_in_double_support(gait):
+    phase = np.linspace(0.0, gait.metrics["double_support_s"] / HUMAN.stride_time, 1000)  # of the leading leg
+    velocity = np.stack([np.full_like(phase, SPEED), 0.08 * np.pi / HUMAN.stride_time * np.sin(4 * np.pi * phase)])
+
+    def power(leg_phase):
+        force = np.stack([HUMAN.mean(name, leg_phase) for name in ("grf_forward", "grf_vertical")])
+        return GRAVITY * (force * velocity).sum(0)
+
+    seconds = gait.metrics["double_support_s"]
+    push_off = np.maximum(power(phase + 0.5), 0.0).mean() * seconds
+    collision = -np.minimum(power(phase), 0.0).mean() * seconds
+    assert gait.metrics["com_work_J_kg"]["push_off"] == pytest.approx(push_off, rel=0.03)
+    assert gait.metrics["com_work_J_kg"]["collision"] == pytest.approx(collision, rel=0.03)
 
 
 def test_energies_of_a_stride_are_the_sums_of_its_ticks(gait):

@@ -45,7 +45,7 @@ def test_effort_is_the_same_for_froude_equal_bodies():
 
 
 def test_effort_counts_energy_and_joints_beyond_their_range():
-    own, bare = effort_of(PLAN), effort_of(PLAN, Muscle(tissue=0.0, tendon=0.0))
+    own, bare = effort_of(PLAN), effort_of(PLAN, Muscle(tissue=0.0, tendon=0.0, toe_tendon=0.0))
     assert own.beyond_range < 0.5 and own.total == pytest.approx(
         own.work + own.activation + own.rate + 3 * own.acceleration
     )

@@ -1,0 +1,145 @@
+"""Measure what the muscles of N bodies do in each control window: the moment of their fibres, and its price.
+
+The price is that of `springfoot.gait.plan.effort`, compiled. A window of 10 ms is one of its intervals: moments are
+means over the physics steps, work is their sum. The moments of single steps are no muscle's: rest angles are held for a
+window, so that torques are saw teeth. A window's price needs the moment of the next one too, so it is known one window
+later.
+"""
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.gait.body.body import Body
+from springfoot.gait.body.tissue import tissue_moments
+from springfoot.gait.plan.effort import TENDON_GIVE, interval_work, metabolic_energy, strengths, volume_weights
+
+from .foot import Feet
+from .kernel import part
+from .model import JOINTS, SIDES, joints_of, torque_ranges
+from .timing import CONTROL_WINDOW
+
+_LEGS = (len(SIDES), len(JOINTS))
+MUSCLES = np.dtype(
+    [
+        ("tissue", float),  # factor on `tissue_moments`
+        ("present", np.int64, _LEGS),  # 1 for a joint with muscles, 0 for a device in their place
+        ("give", float, len(JOINTS)),  # of the tendons [rad/(N m)]
+        ("activation", float, (*_LEGS, 2)),  # volume weight over squared strength, extensors and flexors [1/(N m)^2]
+    ]
+)
+"""Constants of the muscles of one body on its feet."""
+MUSCLE_ROW = np.dtype(
+    [
+        ("muscles", MUSCLES),
+        ("time", float),  # at the end of the last window [s]
+        ("windows", np.int64),  # since the episode began
+        ("judged", np.int64),  # 1 once a step has used the sums below, which then begin anew
+        ("angle", float, _LEGS),  # at the end of the last window [rad]
+        ("velocity", float, _LEGS),  # likewise [rad/s]
+        ("delivered", float, (2, *_LEGS)),  # work of fibres and tendon in the last window and the one before [J]
+        ("moment", float, (3, *_LEGS)),  # mean moment of the fibres in the last three windows, the last first [N m]
+        ("energy", float, _LEGS),  # metabolic, of the fibres' work in the step, one window late [J]
+        ("activation", float),  # time integral of the squared activation, likewise [s]
+        ("positive_work", float),  # of all actuators in the step [J]
+    ]
+)
+"""What the muscles of one body did lately."""
+
+_tissue_moments = part(tissue_moments)
+_interval_work = part(interval_work)
+_metabolic_energy = part(metabolic_energy)
+
+
+def muscles_of(body: Body, feet: Feet) -> NDArray:
+    """Return (1,) of `MUSCLES`, of a body on its feet."""
+    row = np.zeros(1, MUSCLES)
+    row["tissue"] = body.stiffness_scale
+    row["give"] = np.array(TENDON_GIVE) / body.stiffness_scale
+    row["present"] = [[joint.has_muscles for joint in joints_of(foot)] for foot in feet]
+    row["activation"] = volume_weights() / leg_strengths(body, feet) ** 2
+    return row
+
+
+def leg_strengths(body: Body, feet: Feet) -> NDArray:
+    """Return the largest moments (side, joint, 2) [N m] of the muscles above these feet, in extension and in flexion:
+    a sound leg's, or the largest torque of the joint's actuator where that is less."""
+    most = np.abs(torque_ranges(body, feet))  # downwards, which is extension, and upwards
+    return np.minimum(strengths(body), most)
+
+
+@part
+def _price_last_but_one(row):
+    """Add the price of the last window but one to the sums of the step."""
+    for side in range(2):
+        for joint in range(4):
+            moment = row.moment[1, side, joint]
+            work = _interval_work(
+                row.moment[2, side, joint],
+                moment,
+                row.moment[0, side, joint],
+                row.delivered[1, side, joint],
+                row.muscles.give[joint],
+            )
+            row.energy[side, joint] += _metabolic_energy(work)
+            row.activation += row.muscles.activation[side, joint, 0 if moment > 0.0 else 1] * moment**2 * CONTROL_WINDOW
+
+
+@part
+def work_muscles(row, m, actuator, velocity, control) -> None:
+    """Add a control window to what the muscles of one body did; nothing if no time has passed.
+
+    Args:
+        row: of `MUSCLE_ROW`.
+        m: of `MEASURED`, at the window's end.
+        actuator: (S, D) generalised forces of the actuators in the window's physics steps [N, N m].
+        velocity: (S, D) velocities after these steps [m/s, rad/s].
+        control: (side, joint, 2) K [N m/rad] and K theta_eq [N m] of the window; muscles without K are slack.
+    """
+    if m.time <= row.time:
+        return
+    row.time = m.time
+    if row.judged:
+        row.judged = 0
+        row.activation = row.positive_work = 0.0
+        row.energy[:] = 0.0
+    timestep = CONTROL_WINDOW / len(actuator)
+    muscles = row.muscles
+    middle = np.empty(4)
+    for side in range(2):
+        for joint in range(4):
+            middle[joint] = 0.5 * (row.angle[side, joint] + m.angle[side, joint])
+        tissue = _tissue_moments(middle[0], middle[1], middle[2], middle[3])
+        for joint in range(4):
+            dof = 3 + 4 * side + joint
+            mean_torque = work = 0.0
+            before = row.velocity[side, joint]
+            for step in range(len(actuator)):
+                after = velocity[step, dof]
+                mean_torque += actuator[step, dof] / len(actuator)
+                work += actuator[step, dof] * 0.5 * (before + after) * timestep
+                before = after
+            row.positive_work += max(work, 0.0)
+            turn = m.angle[side, joint] - row.angle[side, joint]
+            row.angle[side, joint] = m.angle[side, joint]
+            row.velocity[side, joint] = before
+            row.delivered[1, side, joint] = row.delivered[0, side, joint]
+            row.moment[2, side, joint] = row.moment[1, side, joint]
+            row.moment[1, side, joint] = row.moment[0, side, joint]
+            row.moment[0, side, joint] = row.delivered[0, side, joint] = 0.0
+            if muscles.present[side, joint] and control[side, joint, 0] > 0.0:
+                of_tissue = muscles.tissue * tissue[joint]
+                row.moment[0, side, joint] = -mean_torque - of_tissue
+                row.delivered[0, side, joint] = work + of_tissue * turn
+    row.windows += 1
+    if row.windows >= 3:
+        _price_last_but_one(row)
+
+
+def forget(rows: NDArray, ids: NDArray | slice, angle: NDArray, velocity: NDArray) -> None:
+    """Let the muscles of `rows` (N,) of `MUSCLE_ROW` begin anew in simulations `ids` (K,), at joint angles `angle` and
+    velocities `velocity` (N, side, joint) [rad, rad/s]."""
+    for name in MUSCLE_ROW.names or ():
+        if name != "muscles":
+            rows[name][ids] = 0
+    rows["angle"][ids] = angle[ids]
+    rows["velocity"][ids] = velocity[ids]

@@ -1,0 +1,176 @@
+"""The price of the muscles in a simulated walk: against every physics step, part by part, and with planted devices."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from springfoot.envs import Biped
+from springfoot.envs.physics.model import ANKLE, JOINTS, RIGHT, SIDES, TOE, passive_damping
+from springfoot.envs.physics.muscles import leg_strengths
+from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
+from springfoot.envs.settings.settings import body_of, settings_from
+from springfoot.envs.task.reward import TERMS
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.recording import TICK, record
+from springfoot.gait import GRAVITY, Body
+from springfoot.gait.body.tissue import passive_moments
+from springfoot.gait.plan.effort import TENDON_GIVE, metabolic_energy, muscle_use
+
+WALKS = (
+    ("pretrained", {}),
+    ("schedule", {}),
+    ("schedule", {"slope_deg": 3.0}),
+    ("schedule", {"height": 1.9, "mass": 100.0, "speed": 1.4}),
+    ("schedule", {"right_foot": {"kind": "weak", "strength": 0.5, "orthosis": {"ankle_stiffness": 100.0}}}),
+)
+DEVICES = (
+    ("rigid_toe", {"kind": "rigid_toe"}, [TOE]),
+    ("adaptive", {"kind": "adaptive"}, [ANKLE, TOE]),
+    ("passive", {"kind": "passive", "ankle_stiffness": 400.0}, [ANKLE, TOE]),
+    ("rigid", {"kind": "rigid"}, [ANKLE, TOE]),
+)
+
+
+def replayed(biped, act, windows):
+    """Return torque of the actuators (T, side, joint) and angle (T + 1, side, joint) of every physics step, and the
+    ticks."""
+    replay, controls, ticks = biped.data(0), [], []
+
+    def keep(tick):
+        ticks.append(tick)
+        controls.append(biped.data(0).ctrl.copy())
+
+    biped.on_tick = keep
+    observation = biped.observe()
+    for _ in range(windows // biped.windows_per_step):
+        observation = biped.step(act(observation)).observation
+    torque, angle = [], [replay.qpos[3:].copy()]
+    for control in controls:
+        replay.ctrl[:] = control
+        for _ in range(PHYSICS_STEPS_PER_WINDOW):
+            mujoco.mj_step(biped.model, replay)
+            torque.append(replay.qfrc_actuator[3:].copy())
+            angle.append(replay.qpos[3:].copy())
+    shape = -1, len(SIDES), len(JOINTS)
+    return np.reshape(torque, shape), np.reshape(angle, shape), ticks
+
+
+@pytest.mark.parametrize("name", ["schedule", "predicted"])
+def test_windows_price_a_walk_as_every_physics_step_does(name):
+    act, settings = prepare(name, {"episode_seconds": 7.0})
+    biped, windows = Biped(settings, 1), 600
+    biped.reset(np.array([0]), [0])
+    torque, angle, ticks = replayed(biped, act, windows)
+    middle = 0.5 * (angle[1:] + angle[:-1])
+    turn = np.diff(angle, axis=0)
+    fibres = -torque - passive_moments(biped.body, middle)
+    by_window = (windows, PHYSICS_STEPS_PER_WINDOW, *fibres.shape[1:])
+    moment = fibres.reshape(by_window).mean(1)
+    delivered = (-fibres * turn).reshape(by_window).sum(1)
+    strength = leg_strengths(biped.body, settings.feet)
+    scale = biped.body.stiffness_scale
+    coarse = muscle_use(moment, delivered, TICK, strength, scale)
+    # Rest angles are held for 10 ms, so torques of single steps are saw teeth around the muscles' force.
+    step = np.arange(len(fibres)) + 0.5
+    window = PHYSICS_STEPS_PER_WINDOW * (np.arange(windows) + 0.5)
+    smooth = np.stack([np.interp(step, window, curve) for curve in moment.reshape(windows, -1).T], -1)
+    smooth = smooth.reshape(fibres.shape)
+    fine = muscle_use(smooth, -smooth * turn, PHYSICS_STEP, strength, scale)
+    assert coarse.activation.sum() == pytest.approx(fine.activation.sum(), rel=0.02)
+    # Within a window fibres shorten and are stretched by turns, as the ankle's do nearly isometrically in stance.
+    assert coarse.energy.sum() == pytest.approx(fine.energy.sum(), rel=0.05)
+    kept = np.stack([tick.fibre_moment[0] for tick in ticks]), np.stack([tick.muscle_work[0] for tick in ticks])
+    own = muscle_use(*kept, TICK, strength, scale)
+    assert own.energy.sum() == pytest.approx(coarse.energy.sum(), rel=0.02)
+
+
+def test_the_reward_pays_what_a_recording_measures():
+    act, settings = prepare("schedule", {"episode_seconds": 4.0, "push_newton": 100.0})
+    recording = record(act, settings, name="schedule", episodes=2, seed=3)
+    body = body_of(settings)
+    for episode in range(2):
+        series = {key: values[episode].astype(float) for key, values in recording.series.items()}
+        use = muscle_use(
+            series["fibre_moment"],
+            series["muscle_work"],
+            TICK,
+            leg_strengths(body, settings.feet),
+            body.stiffness_scale,
+        )
+        terms = dict(zip(TERMS, series["reward"].T, strict=True))
+        way = settings.speed * 2 * TICK
+        paid = terms["fibre_work"][::2].sum() * body.mass * GRAVITY * way
+        assert paid == pytest.approx(use.energy.sum(), rel=1e-4)  # of single precision
+        assert terms["activation"][::2].sum() * 2 * TICK == pytest.approx(use.activation.sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize(("name", "given"), WALKS, ids=str)
+def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
+    act, settings = prepare(name, {"episode_seconds": 14.0} | given)
+    recording = record(act, settings, name=name, episodes=1)
+    assert recording.fall_reason[0] == ""
+    body = body_of(settings)
+    series = {key: values[0, 300:].astype(float) for key, values in recording.series.items()}
+    angle, work = series["angle"], series["joint_work"][1:].sum(-1)
+    turn, middle = np.diff(angle, axis=0), 0.5 * (angle[1:] + angle[:-1])
+    moment = series["fibre_moment"][1:]
+    give = np.array(TENDON_GIVE) / body.stiffness_scale
+    pull = np.maximum(moment, 0.0)
+    tendon = (pull[1:-1] * 0.5 * (pull[2:] - pull[:-2]) * give).sum(0)
+    fibres = series["muscle_work"][2:-1].sum(0) + tendon
+    tissue = -(passive_moments(body, middle) * turn)[1:-1].sum(0)
+    damping = -(passive_damping(body) * turn**2 / TICK)[1:-1].sum(0)
+    orthosis = settings.right_foot.foot.ankle.orthosis
+    device = np.zeros((2, 4))
+    if orthosis:
+        beta = 0.02 * np.sqrt(body.length_scale)
+        brace = orthosis.stiffness * (orthosis.rest - middle - beta * turn / TICK) * turn
+        device[RIGHT, ANKLE] = brace[1:-1, RIGHT, ANKLE].sum()
+    parts = fibres - tendon + tissue + damping + device
+    whole = work[1:-1].sum(0)
+    size = np.abs(series["joint_work"][1:]).sum((0, -1))
+    np.testing.assert_allclose(parts, whole, rtol=0, atol=0.01 * size.max())
+    assert np.abs(tendon).max() < 0.02 * size.max()  # a tendon stores and returns
+
+
+@pytest.mark.parametrize(("name", "foot", "joints"), DEVICES, ids=[name for name, *_ in DEVICES])
+def test_a_planted_device_costs_its_muscles_nothing(name, foot, joints):
+    act, settings = prepare("schedule", {"episode_seconds": 1.5, "right_foot": foot})
+    recording = record(act, settings, name=name, episodes=2)
+    moment = recording.series["fibre_moment"][:, :, RIGHT]
+    for joint in range(len(JOINTS)):
+        fibres = np.nan_to_num(moment[..., joint])
+        assert fibres.any() != (joint in joints)
+
+
+def test_a_brace_that_carries_the_whole_moment_leaves_nothing_to_slack_muscles():
+    foot = {"kind": "drop", "orthosis": {"ankle_stiffness": 20.0}}
+    act, settings = prepare("schedule", {"episode_seconds": 3.0, "right_foot": foot})
+    series = record(act, settings, name="drop", episodes=1).series
+    slack = series["stiffness"][0, :, RIGHT, 0] == 0.0
+    carried, fibres = (series[name][0, :, RIGHT, ANKLE] for name in ("joint_torque", "fibre_moment"))
+    assert slack.sum() > 50 and not fibres[slack].any() and fibres[~slack].all()
+    assert np.abs(carried[slack]).max() > 1.0
+
+
+def test_a_weak_calf_has_its_own_strength():
+    body = Body()
+    feet = settings_from(right_foot={"kind": "weak", "strength": 0.25}).feet
+    left, right = leg_strengths(body, feet)
+    assert left[ANKLE, 0] == pytest.approx(0.10 * 63.0 * GRAVITY * 1.70)
+    assert right[ANKLE, 0] == pytest.approx(0.25 * 200.0) and right[ANKLE, 1] == left[ANKLE, 1]
+    np.testing.assert_array_equal(left[:ANKLE], right[:ANKLE])
+
+
+def test_effort_per_kg_does_not_depend_on_mass_if_devices_scale_with_it():
+    def effort(mass):
+        scale = mass / 63.0
+        brace = {"kind": "intact", "orthosis": {"ankle_stiffness": 150.0 * scale}}
+        act, settings = prepare("schedule", {"episode_seconds": 6.0, "mass": mass, "right_foot": brace})
+        return measure(record(act, settings, name="schedule", episodes=1)).metrics["effort"]
+
+    own, other = effort(63.0), effort(63.0 * 1.3)
+    for name in ("fibre_J_kg_m", "net_joint_J_kg_m", "activation", "total"):
+        assert other[name] == pytest.approx(own[name], rel=1e-5), name
+    assert metabolic_energy(np.array([1.0, -1.2])) == pytest.approx([4.0, 1.0])
