@@ -42,7 +42,8 @@ ASKED = (
     Asked(key="sound_peak_bw", label="sound-side peak BW", pattern=".2f", better=-1),
     Asked(key="step_asymmetry", label="step-length asymmetry", pattern=".3f", better=-1),
     Asked(key="hip_work_J_kg_m", label="hip work J/kg/m", pattern=".2f", better=-1),
-    Asked(key="cost_of_transport", label="cost of transport", pattern=".3f", better=-1),
+    Asked(key="fibre_J_kg_m", label="fibre work J/kg/m", pattern=".2f", better=-1),
+    Asked(key="effort", label="effort", pattern=".2f", better=-1),
     Asked(key="falls_pushed", label="falls, pushed", pattern=".2f", better=-1),
 )
 """Numbers that the study of prostheses compares; all are of the right foot but the sound side's force."""
@@ -79,7 +80,8 @@ def numbers_of(gait: Gait) -> dict[str, float | None]:
         "sound_peak_bw": sound["vertical_max_mean_bw"],
         "step_asymmetry": None if apart is None else abs(apart),
         "hip_work_J_kg_m": None,
-        "cost_of_transport": metrics["cost_of_transport"],
+        "fibre_J_kg_m": metrics["effort"]["fibre_J_kg_m"],
+        "effort": metrics["effort"]["total"],
         "ankle_range_deg": other["joint_range_deg"]["ankle"],
         "toe_range_deg": other["joint_range_deg"]["toe"],
         "clearance_m": other["toe_clearance_m"],

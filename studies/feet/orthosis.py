@@ -12,7 +12,7 @@ such a foot, without an orthosis.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise, permutations, product
+from itertools import permutations, product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -22,11 +22,10 @@ import tyro
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
 
-from springfoot.envs.physics import ANKLE, RIGHT, Spring, damping_times
-from springfoot.envs.settings import ADAPTED, body_of, committed_feet, without_person
+from springfoot.envs.settings import ADAPTED, committed_feet, without_person
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record_feet
+from springfoot.evaluation.recording import prepare, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
@@ -35,6 +34,7 @@ from ..base.intervals import share_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_walks import ABOUT_STOPS, NAMES, SCHEDULE, TOLD, UNSEARCHED, numbers_of, walked
+from .walked_speeds import PRICES, Row, at_walked_speeds
 
 PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
@@ -56,8 +56,6 @@ SWING_SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
 """Stiffness of an orthosis for a drop foot [N m/rad]."""
 SWING_RESTS = (-5.0, 0.0, 5.0, 10.0)
 """Rest angle of an orthosis for a drop foot, dorsiflexion positive [deg]."""
-EFFICIENCY = {"positive": 0.25, "negative": 1.2}
-"""Mechanical work of muscles over their energy (Margaria 1968, Int. Z. angew. Physiol. 25:339)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,19 +96,21 @@ class Orthosis(WalkingStudy):
         elsewhere = replace(dropping, seed=UNSEARCHED)
         weak = self._weak(kept, progress)
         drop = dropping._drop(kept, progress)
-        even = at_walked_speeds(weak, (1.1,) if self.quick else WALKED_SPEEDS)
+        even = at_walked_speeds(weak, SPRING_OF_A_BODY, (1.1,) if self.quick else WALKED_SPEEDS)
         best = best_springs(even)
+        by_effort = best_springs(even, "effort")
         as_asked = best_springs([row for row in weak if row["speed_m_s"] in DROP_SPEEDS])
         files = {
             "weak.csv": _csv(weak),
             "best.csv": _csv(best),
+            "best-by-effort.csv": _csv(by_effort),
             "best-as-asked.csv": _csv(as_asked),
             "drop.csv": _csv(drop),
             "weak.png": partial(draw_weak, rows=even, best=best),
             "drop.png": partial(draw_drop, rows=drop),
         }
         text = {
-            "WEAK": weak_text(weak, best, as_asked, self.what_ran),
+            "WEAK": weak_text(weak, best, by_effort, as_asked, self.what_ran),
             "DROP": drop_text(drop, self.episodes_drop, dropping.what_ran, self.push_newton),
             "ADAPTED": people_text(elsewhere._adapted(kept, progress), elsewhere.what_ran, self.push_newton),
         }
@@ -184,41 +184,10 @@ class Orthosis(WalkingStudy):
         def make() -> dict[str, Any]:
             acting, settings = prepare(self.policy, {**given, "episode_seconds": self.seconds})
             recordings = record_feet(acting, settings, feet, name=self.policy, progress=progress, **self.how)
-            return {
-                "walks": [{**numbers_of(measure(each)), "energy_J_kg_m": muscle_energy(each)} for each in recordings]
-            }
+            return {"walks": [numbers_of(measure(recording)) for recording in recordings]}
 
         how = {**self.how, "threads": 0, "policy": self.policy, "seconds": self.seconds}
-        return kept.get([how, given, feet], make)["walks"]
-
-
-def muscle_energy(recording: Recording) -> float | None:
-    """Compute the energy of the muscles after `WARM_UP` [J/kg/m]: work of every joint less the orthosis's, by
-    `EFFICIENCY`.
-
-    The right ankle's work is the mean torque times the change of angle in each 10 ms. Returns None without progress.
-    """
-    settings = recording.settings
-    first = round(WARM_UP / TICK)
-    orthosis = settings.right_foot.foot.ankle.orthosis or Spring()
-    beta = damping_times(body_of(settings))[ANKLE] if orthosis.damping_time is None else orthosis.damping_time
-    energy = way = 0.0
-    for episode, end in enumerate(recording.ticks):
-        if end <= first + 1:
-            continue
-        work = recording.series["joint_work"][episode, first + 1 : end].astype(float)
-        angle = recording.series["angle"][episode, first:end, RIGHT, ANKLE].astype(float)
-        torque = recording.series["joint_torque"][episode, first + 1 : end, RIGHT, ANKLE].astype(float)
-        change = np.diff(angle)
-        middle = 0.5 * (angle[1:] + angle[:-1])
-        spring = orthosis.stiffness * (orthosis.rest - middle - beta * change / TICK)
-        muscle = (torque - spring) * change
-        work[:, RIGHT, ANKLE] = np.stack([np.maximum(muscle, 0.0), np.minimum(muscle, 0.0)], -1)
-        up = work[..., 0].sum()
-        down = -work[..., 1].sum()
-        energy += up / EFFICIENCY["positive"] + down / EFFICIENCY["negative"]
-        way += float(recording.series["com"][episode, end - 1, 0] - recording.series["com"][episode, first, 0])
-    return energy / (body_of(settings).mass * way) if way > 0.5 else None
+        return kept.get([how, given, feet, NAMES], make)["walks"]
 
 
 def _renamed(numbers: Mapping[str, Any]) -> dict[str, Any]:
@@ -229,60 +198,29 @@ def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return csv_text(list(rows[0]), [list(row.values()) for row in rows])
 
 
-Row = Mapping[str, Any]
 OF_A_CELL = ("mass_kg", "speed_m_s", "strength")
+SPRING_OF_A_BODY = ("mass_kg", "strength", "spring_Nm_deg")
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#555555")
 
 
-def at_walked_speeds(rows: Sequence[Row], speeds: Sequence[float]) -> list[dict[str, Any]]:
-    """Return rows like `rows`, for walked `speeds` [m/s] in place of commanded ones.
+def best_springs(rows: Sequence[Row], price: str = PRICES[0]) -> list[dict[str, Any]]:
+    """Return the best spring without a fall for each body, speed and strength, by one of `PRICES`.
 
-    The energy of a spring is linear between two neighbouring commanded speeds without a fall. A spring that reaches a
-    speed nowhere counts as falling there.
-    """
-    found = []
-    keys = ("mass_kg", "strength", "spring_Nm_deg")
-    for speed in speeds:
-        for own in dict.fromkeys(tuple(row[key] for key in keys) for row in rows):
-            walks = sorted(
-                (row for row in rows if tuple(row[key] for key in keys) == own), key=lambda row: row["speed_m_s"]
-            )
-            line = {**dict(zip(keys, own, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
-            energy = next((e for pair in pairwise(walks) if (e := _energy_at(speed, *pair)) is not None), None)
-            found.append({**line, "falls": float(energy is None), "energy_J_kg_m": energy})
-    return found
-
-
-def _energy_at(speed: float, slow: Row, fast: Row) -> float | None:
-    """Return a spring's energy at a walked `speed`, linear between two walks; None unless it lies between them, without
-    falls."""
-    if slow["falls"] or fast["falls"] or None in (slow["energy_J_kg_m"], fast["energy_J_kg_m"]):
-        return None
-    low = slow["walked_m_s"]
-    high = fast["walked_m_s"]
-    if not low <= speed <= high:
-        return None
-    return float(np.interp(speed, [low, high], [slow["energy_J_kg_m"], fast["energy_J_kg_m"]]))
-
-
-def best_springs(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the best spring without a fall for each body, speed and strength.
-
-    A row has the spring of least energy for a metre, the energy that the worst one takes more, and the spring that
-    slows the walk least.
+    A row has the spring of the least price, the percentage that the worst one costs more, and the spring that slows the
+    walk least.
     """
     found = []
     for cell in _cells(rows):
-        walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row["energy_J_kg_m"] is not None]
+        walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row[price] is not None]
         line = {**dict(zip(OF_A_CELL, cell, strict=True)), "springs_without_falls": len(walking)}
-        names = ("best_Nm_deg", "energy_J_kg_m", "walked_m_s", "worst_Nm_deg", "worst_more_percent", "fastest_Nm_deg")
+        names = ("best_Nm_deg", price, "walked_m_s", "worst_Nm_deg", "worst_more_percent", "fastest_Nm_deg")
         line |= dict.fromkeys(names)
         if walking:
-            best, worst = (of(walking, key=lambda row: row["energy_J_kg_m"]) for of in (min, max))
+            best, worst = (of(walking, key=lambda row: row[price]) for of in (min, max))
             line |= {"best_Nm_deg": best["spring_Nm_deg"], "worst_Nm_deg": worst["spring_Nm_deg"]}
-            line |= {"energy_J_kg_m": best["energy_J_kg_m"], "walked_m_s": best["walked_m_s"]}
+            line |= {price: best[price], "walked_m_s": best["walked_m_s"]}
             line["fastest_Nm_deg"] = max(walking, key=lambda row: row["walked_m_s"])["spring_Nm_deg"]
-            line["worst_more_percent"] = 100 * (worst["energy_J_kg_m"] / best["energy_J_kg_m"] - 1)
+            line["worst_more_percent"] = 100 * (worst[price] / best[price] - 1)
         found.append(line)
     return found
 
@@ -295,11 +233,13 @@ def _of(rows: Sequence[Row], cell: tuple[float, ...]) -> list[Row]:
     return [row for row in rows if tuple(row[name] for name in OF_A_CELL) == cell]
 
 
-def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row], what_ran: str) -> str:
+def weak_text(
+    rows: Sequence[Row], best: Sequence[Row], by_effort: Sequence[Row], as_asked: Sequence[Row], what_ran: str
+) -> str:
     """Return the report's section on the weak calf.
 
-    `rows` are the walks, `best` the best springs at equal walked speeds, `as_asked` those at equal commanded speeds,
-    and `what_ran` tells the numbers of walks.
+    `rows` are the walks, `best` the springs of least fibre work at equal walked speeds, `by_effort` those of least
+    effort, `as_asked` those of least fibre work at equal commanded speeds, and `what_ran` tells the numbers of walks.
     """
     speeds = sorted({row["speed_m_s"] for row in best})
     lines = []
@@ -320,23 +260,24 @@ def weak_text(rows: Sequence[Row], best: Sequence[Row], as_asked: Sequence[Row],
     fallen = sum(1 for row in alone if row["falls"] > 0)
     return (
         f"![The best orthosis](weak.png)\n\n{table(head, lines)}\n\nIn each cell, of the springs that walk that fast "
-        "without a fall, that with which muscles take least energy for a metre; in brackets, by how much the worst "
+        "without a fall, that with which muscle fibres work least for a metre; in brackets, by how much the worst "
         "takes more, and how many they are. It is the stiffest of the map and the weakest, where a best one may lie "
         f"beyond, in {at_the_ends(best, springs)}.\n\n"
-        f"The spring of least energy where all walk equally fast, against {directions(best, 'best_Nm_deg')}.\n\n"
+        f"The spring of least fibre work where all walk equally fast, against {directions(best, 'best_Nm_deg')}.\n\n"
+        f"The spring of least effort there, activation counted, against {directions(by_effort, 'best_Nm_deg')}.\n\n"
         "The same where all are asked for the same speed, and walk the slower the more a spring slows them, against "
         f"{directions(as_asked, 'best_Nm_deg')}.\n\n"
         f"The spring that slows the walk asked for least, against {directions(as_asked, 'fastest_Nm_deg')}.\n\n"
         "ρ is Spearman's correlation over the cells, in brackets the mean at each level [N·m/deg] and, of pairs of "
         "cells that differ in nothing else, in how many the spring is stiffer, softer or the same with more weakness, "
-        "mass or speed. Waterval et al. found more with weakness, mass and speed, by energy. Energy at the speed asked "
-        "for was looked at first, slowing second, equal speeds last. Without a spring someone falls in "
+        "mass or speed. Waterval et al. (2023) found more with weakness, mass and speed in a planar simulation of both "
+        "calves; in their people (2019) stiffness had no effect on the group's energy. With mass and every device "
+        "scaled alike a walk is the same, so mass is an identity. Without a spring someone falls in "
         f"{fallen} of {len(alone)} cells. "
         f"{what_ran} of each of {len(springs)} springs of 0 to {springs[-1]:g} N·m/deg at rest at 0°, and each of "
-        f"{len(asked)} speeds asked for, {asked[0]:g} to {asked[-1]:g} m/s, between which energy is linear in the "
+        f"{len(asked)} speeds asked for, {asked[0]:g} to {asked[-1]:g} m/s, between which prices are linear in the "
         "speed walked; legs and stiffness of both feet as of sound feet. A calf's strength is a share of the largest "
-        "moment that the model's calf can give, of which a sound walk at 1.2 m/s needs 40 %. Energy: positive work of "
-        "all muscles / 0.25 + negative / 1.2, without the orthosis's own."
+        "moment that the model's calf can give, of which a sound walk at 1.2 m/s needs 40 %."
     )
 
 
@@ -457,14 +398,14 @@ def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
             for strength, color in zip(sorted({row["strength"] for row in rows}), COLORS * 9, strict=False):
                 own = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
                 x = [row["spring_Nm_deg"] for row in own]
-                y = [row["energy_J_kg_m"] for row in own]
+                y = [row["fibre_J_kg_m"] for row in own]
                 ax.plot(x, y, "o-", color=color, ms=3.5, lw=1.3, label=f"a calf of {100 * strength:.0f} %")
                 for row in _of(best, (mass, speed, strength)):
                     if row["best_Nm_deg"] is not None:
-                        ax.plot(row["best_Nm_deg"], row["energy_J_kg_m"], "o", color=color, ms=9, mfc="none")
+                        ax.plot(row["best_Nm_deg"], row["fibre_J_kg_m"], "o", color=color, ms=9, mfc="none")
             ax.set(title=f"walking {speed:g} m/s, {mass:g} kg", xlabel="orthosis (N·m/deg)")
             ax.grid(color="#ededed", lw=0.6)
-        figure.axes[0].set_ylabel("energy of muscles (J/kg/m)")
+        figure.axes[0].set_ylabel("fibre work (J/kg/m)")
         figure.axes[0].legend(frameon=False)
         figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
 

@@ -2,58 +2,30 @@
 
 import csv
 
-import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.envs.physics.model import ANKLE, RIGHT
-from springfoot.evaluation.recording.policies import prepare
-from springfoot.evaluation.recording.recording import TICK, WARM_UP, record_feet
 from springfoot.studies.feet.orthosis import (
-    EFFICIENCY,
+    SPRING_OF_A_BODY,
     at_the_ends,
-    at_walked_speeds,
     best_springs,
     directions,
-    muscle_energy,
     weak_text,
     weakest_cure,
 )
-
-
-def walk(foot, **given):
-    acting, settings = prepare("pretrained", {"episode_seconds": 6.0, **given})
-    return record_feet(acting, settings, [foot], name="x", episodes=1, threads=1)[0]
-
-
-def test_without_an_orthosis_the_energy_is_that_of_all_joints():
-    recording = walk("intact")
-    first = round(WARM_UP / TICK) + 1
-    work = recording.series["joint_work"][0, first:].astype(float).sum((0, 1, 2))
-    com = recording.series["com"][0, :, 0]
-    energy = work[0] / EFFICIENCY["positive"] - work[1] / EFFICIENCY["negative"]
-    expected = energy / (recording.settings.mass * (com[-1] - com[first - 1]))
-    assert muscle_energy(recording) == pytest.approx(expected, rel=0.01)  # the right ankle's is of each 10 ms
-
-
-def test_what_the_spring_does_no_muscle_pays():
-    spring = {"kind": "drop", "orthosis": {"ankle_stiffness": 40.0, "ankle_deg": 5.0}}
-    recording = walk(spring)
-    phase, force = recording.series["phase"][0, :, RIGHT], recording.series["force"][0, :, RIGHT, :, 1].sum(-1)
-    swings = (phase > 0.7) & (phase < 0.9) & (force == 0.0)
-    torque = recording.series["joint_torque"][0, swings, RIGHT, ANKLE]
-    angle = recording.series["angle"][0, swings, RIGHT, ANKLE]
-    rate = recording.series["velocity"][0, swings, RIGHT, ANKLE]
-    left = torque - 40.0 * (np.deg2rad(5.0) - angle)  # muscles are slack: what is left is damping
-    slope = np.polyfit(rate, left, 1)
-    assert slope[0] < 0
-    assert np.std(left - np.polyval(slope, rate)) < 0.1 * np.std(torque)
+from springfoot.studies.feet.walked_speeds import at_walked_speeds
 
 
 def rows(energies: dict[float, float], falls=(), strength=0.3, mass=63.0, speed=1.2) -> list[dict]:
     cell = {"mass_kg": mass, "speed_m_s": speed, "strength": strength, "walked_m_s": speed}
     return [
-        {**cell, "spring_Nm_deg": spring, "energy_J_kg_m": energy, "falls": 0.25 if spring in falls else 0.0}
+        {
+            **cell,
+            "spring_Nm_deg": spring,
+            "fibre_J_kg_m": energy,
+            "effort": -energy,
+            "falls": 0.25 if spring in falls else 0.0,
+        }
         for spring, energy in energies.items()
     ]
 
@@ -63,6 +35,7 @@ def test_the_best_spring_takes_least_energy_of_those_that_nobody_falls_with():
     assert best["best_Nm_deg"] == 2.0
     assert best["worst_Nm_deg"] == 4.0
     assert best["worst_more_percent"] == pytest.approx(50.0)
+    assert best_springs(rows({2.0: 2.0, 4.0: 3.0}), "effort")[0]["best_Nm_deg"] == 4.0
     assert best["springs_without_falls"] == 2
     fast = [row | {"walked_m_s": 1.0 - 0.1 * abs(row["spring_Nm_deg"] - 4.0)} for row in rows({2.0: 2.0, 4.0: 3.0})]
     assert best_springs(fast)[0]["fastest_Nm_deg"] == 4.0
@@ -76,7 +49,7 @@ def test_the_report_says_none_where_every_spring_falls():
         *rows({0.0: 1.0, 2.0: 2.0}, strength=0.3),
     ]
     best = best_springs(walks)
-    lines = weak_text(walks, best, best, "One walk").splitlines()
+    lines = weak_text(walks, best, best, best, "One walk").splitlines()
     assert [line for line in lines if line.startswith("| 20 %")] == ["| 20 % | 63 | none |"]
     assert [line for line in lines if line.startswith("| 30 %")] == ["| 30 % | 63 | 0 (+100 %, 2) |"]
 
@@ -86,14 +59,14 @@ def test_springs_are_compared_where_they_walk_equally_fast():
     for asked, slow, fast in ((1.2, (1.0, 4.0), (1.1, 4.1)), (1.4, (1.2, 5.0), (1.3, 5.3))):  # walked, energy
         for spring, (walked, energy) in ((8.7, slow), (0.9, fast)):
             walks += [row | {"walked_m_s": walked} for row in rows({spring: energy}, speed=asked)]
-    even = {row["spring_Nm_deg"]: row for row in at_walked_speeds(walks, (1.15,))}
-    assert even[8.7]["energy_J_kg_m"] == pytest.approx(4.75)
-    assert even[0.9]["energy_J_kg_m"] == pytest.approx(4.4)
+    even = {row["spring_Nm_deg"]: row for row in at_walked_speeds(walks, SPRING_OF_A_BODY, (1.15,))}
+    assert even[8.7]["fibre_J_kg_m"] == pytest.approx(4.75)
+    assert even[0.9]["fibre_J_kg_m"] == pytest.approx(4.4)
     assert best_springs(walks)[0]["best_Nm_deg"] == 8.7  # it is the slower walk that takes less
     assert best_springs(list(even.values()))[0]["best_Nm_deg"] == 0.9
     fallen = [row | {"falls": 0.2} if row["spring_Nm_deg"] == 0.9 else row for row in walks]
-    assert [row["falls"] for row in at_walked_speeds(fallen, (1.15,))] == [0.0, 1.0]
-    assert all(row["energy_J_kg_m"] is None for row in at_walked_speeds(walks, (1.5,)))
+    assert [row["falls"] for row in at_walked_speeds(fallen, SPRING_OF_A_BODY, (1.15,))] == [0.0, 1.0]
+    assert all(row["fibre_J_kg_m"] is None for row in at_walked_speeds(walks, SPRING_OF_A_BODY, (1.5,)))
 
 
 def test_directions_have_their_sign():

@@ -63,7 +63,7 @@ def test_feet_side_by_side_walk_as_alone_and_the_same_episodes():
 def test_a_walk_that_falls_has_its_falls_and_no_other_numbers():
     own = walked("thesis_printed", SHORT, episodes=1)
     assert own["falls"] == own["falls_pushed"] == 1.0
-    assert own["cost_of_transport"] is None or own["push_off_J_kg"] is None
+    assert own["fibre_J_kg_m"] is None or own["push_off_J_kg"] is None
 
 
 @pytest.mark.parametrize(("name", "least", "most"), [("rigid", 0.0, 0.0), (TOE_HELD, 0.05, 0.15)])

@@ -1,0 +1,46 @@
+"""Compare feet where they walk equally fast: a spring slows a walk, and effort for a metre depends on the speed."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+Row = Mapping[str, Any]
+PRICES = ("fibre_J_kg_m", "effort")
+"""Columns of the two prices of a walk: fibre work, and all of the effort."""
+
+
+def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[float]) -> list[dict[str, Any]]:
+    """Return a row for each case and each of the walked `speeds` [m/s], with `PRICES` and `falls`.
+
+    Prices are linear between two neighbouring commanded speeds without a fall. A case that reaches a speed nowhere
+    counts as falling there (`falls` 1, prices None).
+
+    Args:
+        rows: walks with `keys`, `PRICES`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
+        keys: columns that tell one case from another.
+        speeds: at which cases are compared.
+    """
+    compared = []
+    for speed in speeds:
+        for case in dict.fromkeys(tuple(row[key] for key in keys) for row in rows):
+            walks = [row for row in rows if tuple(row[key] for key in keys) == case]
+            walks.sort(key=lambda row: row["speed_m_s"])
+            prices = next((found for pair in pairwise(walks) if (found := _prices_at(speed, *pair)) is not None), None)
+            line = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
+            compared.append({**line, "falls": float(prices is None), **(prices or dict.fromkeys(PRICES))})
+    return compared
+
+
+def _prices_at(speed: float, slow: Row, fast: Row) -> dict[str, float] | None:
+    """Return the prices at a walked `speed` [m/s], linear between two walks; None unless it lies between them, without
+    falls."""
+    unmeasured = any(walk[price] is None for walk in (slow, fast) for price in PRICES)
+    if slow["falls"] or fast["falls"] or unmeasured:
+        return None
+    low = slow["walked_m_s"]
+    high = fast["walked_m_s"]
+    if not low <= speed <= high:
+        return None
+    return {price: float(np.interp(speed, [low, high], [slow[price], fast[price]])) for price in PRICES}
