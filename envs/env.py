@@ -204,6 +204,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `stiffness_joints`        | `"both"`        | joints the action decides: `"both"`, `"ankle"` or `"toe"`          |
     | `ankle_stiffness_range`   | `(20.0, 800.0)` | ankle stiffness at action -1 and +1 [N m/rad]                      |
     | `toe_stiffness_range`     | `(5.0, 200.0)`  | toe stiffness at action -1 and +1 [N m/rad]                        |
+    | `ankle_tendon`            | `None`          | stiffness of the Achilles tendon, which bounds K [N m/rad]         |
     | `schedule`                | `None`          | a stiffness schedule in JSON form                                  |
     | **episode**               |                 |                                                                    |
     | `episode_seconds`         | `20.0`          | time until truncation [s]                                          |

@@ -6,6 +6,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
+from springfoot.gait.body.tissue import TENDON_SHARE, ankle_tissue_stiffness
 from springfoot.gait.people.human import FootHabits, HumanGait, foot_habits
 
 from ..physics.model import ANKLE, TOE, damping_times
@@ -59,9 +60,25 @@ def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, Refe
     for constants, walk in rows:
         rest, stiffness = foot_curves(settings, constants, walk)
         feed = foot_feed(settings, constants, walk)
+        if settings.ankle_tendon is not None:
+            _bound(rest, stiffness, settings.ankle_tendon, walk, feeds=feed is not None)
         rests.append(rest if feed is None else np.concatenate([rest, feed], axis=-1))
         stiffnesses.append(stiffness)
     return np.stack(rests), np.stack(stiffnesses)
+
+
+def _bound(rest: NDArray, stiffness: NDArray, tendon: float, walk: ReferenceWalk, *, feeds: bool) -> None:
+    """Bound the ankle's scheduled stiffness (SAMPLES, 2) [N m/rad] by its `tendon` [N m/rad] and tissue, in place.
+
+    Unless torques are fed beside the springs, the rest angles (SAMPLES, 2) [rad] move so that the ankle has the same
+    torque at the target's angle.
+    """
+    ankle = walk.target.mean("ankle", GRID)
+    tissue = ankle_tissue_stiffness(walk.target.mean("knee", GRID), ankle)
+    bounded = np.minimum(stiffness[:, 0], walk.body.stiffness_scale * (TENDON_SHARE * tendon + tissue))
+    if not feeds:
+        rest[:, 0] = ankle + stiffness[:, 0] / bounded * (rest[:, 0] - ankle)
+    stiffness[:, 0] = bounded
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:

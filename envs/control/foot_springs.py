@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
+from springfoot.gait.body.tissue import TENDON_SHARE
 
 from ..physics.foot import Feet
 from ..physics.kernel import kernel, part
-from ..physics.model import ANKLE
+from ..physics.model import ANKLE, KNEE
+from ..physics.muscles import tissue_stiffness
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.settings import BipedSettings
 from .foot_rows import device, foot_lines, foot_rows
@@ -63,6 +65,8 @@ def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
 SPRING_OPTIONS = np.dtype(
     [
         ("middle", float, 2),  # stiffness of ankle and toe at action 0 [N m/rad] where no schedule sets it
+        ("tendon", float),  # largest stiffness of the calf with its tendon [N m/rad]; infinite without a bound
+        ("tissue", float),  # factor on the stiffness of the ankle's passive tissue beside it [-]
         ("scheduled", np.int64, 2),  # 1 where the schedule sets that of ankle, of toe
         ("follows", np.int64),  # 1 if the rest angles move with the slope: a constant equilibrium does not
         ("held", np.int64),  # 1 if the rest angles are those of the phases at which K was set
@@ -130,6 +134,21 @@ def _arrive(own, angle):
 
 
 @part
+def _bound_by_tendon(row, option, angle):
+    """Lower the K of ankles to that of tendon and tissue at the joint angles `angle` (2, 4) [rad]."""
+    own = row.springs
+    for side in range(2):
+        tissue = option.tissue * tissue_stiffness(angle[side, KNEE], angle[side, ANKLE])
+        most = row.subject.scale.torque * (option.tendon + tissue)
+        if own.stiffness[side, 0] > most:
+            deflection = own.equilibrium[side, 0] - angle[side, ANKLE]
+            change = most - own.stiffness[side, 0]
+            own.stiffness[side, 0] = most
+            if not own.fresh:
+                own.work_stiffness[side, 0] += own.acts[side, 0] * 0.5 * change * deflection**2
+
+
+@part
 def _swings(row, force, side):
     """Tell whether a leg swings: past mid-stride and unloaded."""
     load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]
@@ -164,8 +183,9 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
     """Begin a control window: put K and K theta_eq of ankles and toes into the control.
 
     K is the requested stiffness of `delay` windows ago, theta_eq the rest angle at the legs' phases or the foot's own.
-    Moving the rest angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles
-    that go slack as the leg begins to swing lose their stored energy. A device has its own K and theta_eq.
+    An ankle's tendon may bound K, at the angles now. Moving the rest angle, so that the deflection goes from x to x',
+    puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack as the leg begins to swing lose their stored energy.
+    A device has its own K and theta_eq.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
@@ -190,6 +210,8 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         angle = bodies[i].measured.angle
         if walking[i] and own.delay > 0:
             _arrive(own, angle)
+        if walking[i] and option.tendon < np.inf:
+            _bound_by_tendon(rows[i], option, angle)
         for side in range(2):
             if not option.held:
                 own.rest_phase[side] = rows[i].legs.phase[side]
@@ -285,7 +307,9 @@ class FootSprings:
         fixed = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
         follows = settings.equilibrium in ("planned", "angle")
         held = settings.equilibrium == "phase"
-        self.options = np.array([(middle, fixed, follows, held)], SPRING_OPTIONS)
+        tendon = np.inf if settings.ankle_tendon is None else TENDON_SHARE * settings.ankle_tendon
+        scale = body.stiffness_scale
+        self.options = np.array([(middle, tendon * scale, scale, fixed, follows, held)], SPRING_OPTIONS)
         """(1,) of `SPRING_OPTIONS`."""
         self.rest = PhaseTable(equilibrium)
         self.schedule = PhaseTable(schedule)

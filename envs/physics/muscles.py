@@ -10,7 +10,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
-from springfoot.gait.body.tissue import tissue_moments
+from springfoot.gait.body.tissue import ankle_tissue_stiffness, tissue_moments
 from springfoot.gait.plan.effort import TENDON_GIVE, interval_work, metabolic_energy, strengths, volume_weights
 
 from .foot import Feet
@@ -48,6 +48,8 @@ MUSCLE_ROW = np.dtype(
 _tissue_moments = part(tissue_moments)
 _interval_work = part(interval_work)
 _metabolic_energy = part(metabolic_energy)
+tissue_stiffness = part(ankle_tissue_stiffness)
+"""`ankle_tissue_stiffness`, compiled."""
 
 
 def muscles_of(body: Body, feet: Feet) -> NDArray:

@@ -69,6 +69,8 @@ MOST_SENSOR_NOISE = 0.1
 LONGEST_DELAY = 0.04
 """Longest delay of a stiffness behind its command [s]; chosen, two steps of 20 ms."""
 
+TENDON_RANGE = (100.0, 2000.0)
+"""Stiffness of a tendon that the setting `ankle_tendon` takes [N m/rad]; chosen: a fourth and five times people's."""
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
     "speed": 0.40,
@@ -153,6 +155,10 @@ class BipedSettings:
     """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     toe_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[1], 200.0), metadata=_SPRINGS)
     """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
+    ankle_tendon: float | None = field(default=None, metadata=_SPRINGS)
+    """Stiffness of the Achilles tendon about the ankle, for 1.70 m and 63 kg, [100..2000 N m/rad], such as 400. In
+    walking K then stays below that of tendon and passive tissue, and the term `stiffness` charges the calf's own K
+    beyond what its torque brings. None for no bound."""
     schedule: StiffnessSchedule | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
@@ -280,6 +286,8 @@ class BipedSettings:
         check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
         require_number("unevenness_m", self.unevenness_m, 0.0, MOST_UNEVENNESS, "m")
         require_number("sensor_noise", self.sensor_noise, 0.0, MOST_SENSOR_NOISE, "(observation units)")
+        if self.ankle_tendon is not None:
+            require_number("ankle_tendon", self.ankle_tendon, *TENDON_RANGE, "N m/rad")
         require_number("stiffness_delay_s", self.stiffness_delay_s, 0.0, LONGEST_DELAY, "s")
         check_span("stiffness_delay_range_s", self.stiffness_delay_range_s, (0.0, LONGEST_DELAY), "s")
         check_windows("stiffness_delay_s", self.stiffness_delay_s)

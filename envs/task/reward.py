@@ -11,6 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springfoot.arrays import NDArray
+from springfoot.gait.body.tissue import (
+    RELAXED_STIFFNESS,
+    STIFFNESS_PER_TORQUE,
+    TENDON_SHARE,
+    muscle_in_series,
+)
 from springfoot.gait.plan.effort import ACTIVATION_TIME
 
 from ..control.constants import LegConstants
@@ -19,7 +25,8 @@ from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
 from ..physics.kernel import part
-from ..physics.model import HIP, LEFT, RIGHT
+from ..physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT
+from ..physics.muscles import tissue_stiffness
 from ..physics.timing import ACTION_STEP
 from ..settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from .episode_end import TOO_LOW, TOO_TILTED, divergence
@@ -61,6 +68,7 @@ TASK_OPTIONS = np.dtype(
         ("seconds", float),  # time of one step [s]
         ("share", float),  # of it in `ACTION_STEP`
         ("most_steps", float),  # beyond which an episode is truncated
+        ("tendon", float),  # stiffness of the Achilles tendon at 1.70 m and 63 kg [N m/rad], 0 for no bound
     ]
 )
 """Numbers of the settings that rewards need."""
@@ -131,6 +139,28 @@ def _impact(row, forces, i, seconds):
     return impact
 
 
+_muscle_in_series = part(muscle_in_series)
+
+
+@part
+def _charged_stiffness(scale, controls, body, tendon, side, joint):
+    """Return the K of the muscles at one joint that the term `stiffness` charges [N m/rad].
+
+    All of it; of an ankle with a `tendon` [N m/rad], 0 for none, the calf's own K in series with it, beyond
+    `RELAXED_STIFFNESS` and what its torque brings.
+    """
+    stiffness = muscle_stiffness(controls.springs, side, joint)
+    if joint > 0 or tendon == 0.0 or stiffness == 0.0:
+        return stiffness
+    angle = body.measured.angle[side]
+    unit = scale.stiffness_scale
+    together = stiffness - unit * tissue_stiffness(angle[KNEE], angle[ANKLE])
+    together = min(max(together, 0.0), TENDON_SHARE * unit * tendon)
+    torque = abs(body.muscles.moment[0, side, ANKLE])
+    own = _muscle_in_series(together, unit * tendon)
+    return max(own - unit * RELAXED_STIFFNESS - STIFFNESS_PER_TORQUE * torque, 0.0)
+
+
 @part
 def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     """Fill `terms` (N, len(TERMS)): the reward's terms, unweighted and dimensionless, in the order of `TERMS`.
@@ -143,12 +173,12 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
     [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of the muscles that act (a slack joint and a device in their place cost
-    nothing), scaled to 1.70 m and 63 kg; `effort`, positive work of hips, knees, ankles and toes in the step over body
-    weight times commanded way: the cost of transport of that step. The price of the muscles
-    (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of their fibres over body
-    weight times commanded way; `activation`, mean over the step of the squared activation by volume, all joints
-    together. `impact`, sum over feet and directions of the squared change of the force since the last step [body
-    weights] x `ACTIVATION_TIME` over the time of a step.
+    nothing; with a tendon see `_charged_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive work of hips,
+    knees, ankles and toes in the step over body weight times commanded way: the cost of transport of that step. The
+    price of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
+    their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by
+    volume, all joints together. `impact`, sum over feet and directions of the squared change of the force since the
+    last step [body weights] x `ACTIVATION_TIME` over the time of a step.
 
     Args:
         rows: (N,) of `TASK_ROW`.
@@ -178,7 +208,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
             pose_error += 0.5 * _pose_error(scale, m.base[2], m.angle[side], targets[side])
             force_distance += _force_distance(scale, forces, i, side, targets[side])
             for joint in range(2):
-                k = muscle_stiffness(control.springs, side, joint) / scale.stiffness_unit[joint]
+                k = _charged_stiffness(scale, control, bodies[i], options[0].tendon, side, joint)
+                k /= scale.stiffness_unit[joint]
                 stiffness_cost += 0.5 * scale.stiffness_share[joint] * k**2
         for k in range(4):
             stiffness_rate += ((control.decision.action[k] - control.decision.last_action[k]) / share) ** 2
@@ -229,7 +260,8 @@ class Task:
         seconds = settings.step_seconds
         share = seconds / ACTION_STEP
         limit = settings.max_episode_steps
-        self.options = np.array([(weights, seconds, share, limit)], TASK_OPTIONS)
+        tendon = settings.ankle_tendon or 0.0
+        self.options = np.array([(weights, seconds, share, limit, tendon)], TASK_OPTIONS)
         """(1,) of `TASK_OPTIONS`."""
         curves = {walk: target_curves(walk.target, walk.plan, seconds) for _, walk in rows}
         self.table = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows])).table

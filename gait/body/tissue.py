@@ -27,8 +27,17 @@ kg: forces and tendon lengths of three flexors of D'Hondt et al., PLoS Comput. B
 reach and pass the largest force."""
 FASCIA = (5.6, 1.38)
 """Passive moment of the toe [N m] at 1.70 m and 63 kg, first x (exp(second x angle [rad]) - 1): the plantar fascia of
-Natali et al. (2010) in the same model, round a head of 9.5 mm. Chosen: 0.6 of the moment with a rigid arch, as the arch
-rises; the whole would be a plausible upper end, 0.3 of it a lower."""
+Natali et al. (2010) in the same model, round a head of 9.5 mm. Chosen: 0.6 of the moment with a rigid arch, as the
+arch rises; the whole would be a plausible upper end, 0.3 of it a lower."""
+TENDON_SHARE = 0.9
+"""Largest stiffness of a muscle with its tendon over that of the tendon [-]; chosen: the muscle's own is then nine
+times the tendon's. Muscle and tendon in series are always softer than the tendon."""
+RELAXED_STIFFNESS = 36.0
+"""Stiffness of a relaxed calf about the ankle [N m/rad] for 1.70 m and 63 kg: 13 % of the load's toppling torque
+an angle (Loram, Maganaris & Lakie, J. Physiol. 584 (2007) 677-692)."""
+STIFFNESS_PER_TORQUE = 5.0
+"""Rise of a muscle's stiffness with its torque [1/rad]; chosen. That it is proportional is Weiss, Hunter & Kearney's,
+J. Biomech. 21 (1988) 539-544; readings of the slope lie between 2.5 and 14."""
 DEGREES = 180.0 / np.pi
 
 
@@ -59,3 +68,22 @@ def tissue_moments(hip: Any, knee: Any, ankle: Any, toe: Any) -> Any:
         np.exp(2.1016 + 0.0843 * ankle - 0.0176 * knee) - np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee) - 1.792
     )
     return of_hip, of_knee, of_ankle, FASCIA[0] * (np.exp(FASCIA[1] * toe) - 1.0)
+
+
+def ankle_tissue_stiffness(knee: Any, ankle: Any) -> Any:
+    """Return the stiffness of the ankle's passive tissue [N m/rad] at 1.70 m and 63 kg, the slope of `tissue_moments`.
+
+    The angles [rad] are numbers or arrays.
+    """
+    knee = DEGREES * knee
+    ankle = DEGREES * ankle
+    rising = 0.0843 * np.exp(2.1016 + 0.0843 * ankle - 0.0176 * knee)
+    return DEGREES * (rising + 0.1949 * np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee))
+
+
+def muscle_in_series(stiffness: Any, tendon: Any) -> Any:
+    """Return K K_t / (K_t - K) [N m/rad]: the stiffness of a muscle that has the given one together with its tendon.
+
+    The `tendon` in series is the stiffer one.
+    """
+    return stiffness * tendon / (tendon - stiffness)

@@ -109,8 +109,10 @@ class Controls(WalkingStudy):
 
 
 def controls_table(even: Sequence[Row]) -> str:
-    """Return the Markdown table of prices at equal walked speeds: a row for each condition, with its difference from the
-    sound walk in percent."""
+    """Return the Markdown table of prices at equal walked speeds, with their differences from the sound walk.
+
+    `even` are rows of `at_walked_speeds`.
+    """
     speeds = list(dict.fromkeys(row["speed_m_s"] for row in even))
     prices = {(row["condition"], row["speed_m_s"]): row for row in even}
     lines = []

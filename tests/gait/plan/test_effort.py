@@ -6,7 +6,7 @@ import pytest
 from springfoot.gait import Body
 from springfoot.gait.body.body import GRAVITY
 from springfoot.gait.body.leg import JOINTS
-from springfoot.gait.body.tissue import passive_moments
+from springfoot.gait.body.tissue import ankle_tissue_stiffness, muscle_in_series, passive_moments
 from springfoot.gait.plan.effort import (
     ACTIVATION_TIME,
     MUSCLE_EFFICIENCY,
@@ -94,3 +94,16 @@ def test_prices_of_one_joint_cannot_pay_for_another():
     delivered[1, 0, :2] = 1.0, -1.0
     use = muscle_use(moment, delivered, 0.01, strengths(BODY)[None], 1.0)
     assert use.energy[0].tolist() == pytest.approx([1 / MUSCLE_EFFICIENCY[0], 1 / MUSCLE_EFFICIENCY[1], 0.0, 0.0])
+
+
+def test_the_tissues_stiffness_is_the_slope_of_its_moment():
+    angle = np.tile([0.3, 0.4, 0.0, 0.2], (400, 1))
+    angle[:, ANKLE] = np.linspace(-0.4, 0.3, 400)
+    slope = np.gradient(passive_moments(BODY, angle)[:, ANKLE], angle[:, ANKLE], edge_order=2)
+    np.testing.assert_allclose(ankle_tissue_stiffness(0.4, angle[:, ANKLE]), slope, rtol=1e-3)
+
+
+def test_a_muscle_in_series_with_its_tendon_has_the_stiffness_of_both():
+    own = muscle_in_series(np.array([1.0, 200.0, 360.0]), 400.0)
+    np.testing.assert_allclose(1.0 / (1.0 / own + 1.0 / 400.0), [1.0, 200.0, 360.0], rtol=1e-12)
+    assert own[2] == pytest.approx(9 * 400.0)

@@ -1,0 +1,104 @@
+"""The tendon bounds the ankle's K, in tables and in steps, and the reward charges the calf's own K."""
+
+import numpy as np
+import pytest
+
+from springfoot.envs import Biped
+from springfoot.envs.control.equilibrium import foot_tables
+from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.reference_walk import reference_walks, rows
+from springfoot.envs.physics.model import ANKLE, KNEE, SIDES
+from springfoot.envs.settings.settings import settings_from
+from springfoot.evaluation.recording.policies import prepare
+from springfoot.gait.body.tissue import (
+    RELAXED_STIFFNESS,
+    STIFFNESS_PER_TORQUE,
+    TENDON_SHARE,
+    ankle_tissue_stiffness,
+    muscle_in_series,
+)
+
+
+def tissue(biped):
+    angle = biped.measurement.angle
+    return biped.body.stiffness_scale * ankle_tissue_stiffness(angle[..., KNEE], angle[..., ANKLE])
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.02])
+@pytest.mark.parametrize("mass", [63.0, 90.0])
+def test_k_is_at_most_that_of_tendon_and_tissue_in_every_window_on_any_action(mass, delay):
+    tendon = 300.0
+    settings = settings_from(ankle_tendon=tendon, mass=mass, stiffness_delay_s=delay, episode_seconds=4.0)
+    biped, random = Biped(settings, 5), np.random.default_rng(0)
+    biped.reset(np.arange(5), list(range(5)))
+    bounds, held = [tissue(biped)], []
+
+    def keep(tick):
+        held.append(tick.stiffness[..., ANKLE])
+        bounds.append(tissue(biped))
+
+    biped.on_tick = keep
+    for _ in range(60):
+        biped.step(random.uniform(0.0, 1.0, (5, 4)))
+    most = biped.body.stiffness_scale * TENDON_SHARE * tendon + np.stack(bounds[:-1])
+    assert (np.stack(held) <= most * (1 + 1e-12)).all()
+    assert (np.stack(held) > 0.999 * most).sum() > 100
+
+
+@pytest.mark.parametrize("name", ["pretrained", "predicted"])
+def test_k_stays_below_tendon_and_tissue_at_every_step_of_five_walks(name):
+    act, settings = prepare(name, {"ankle_tendon": 400.0, "episode_seconds": 5.0})
+    biped = Biped(settings, 5)
+    biped.reset(np.arange(5), list(range(5)))
+    observation = biped.observe()
+    for _ in range(200):
+        result = biped.step(act(observation))
+        observation = result.observation
+        applied = np.stack([result.info[f"stiffness/ankle_{side}"] for side in SIDES], -1)
+        assert (applied <= 400.0 + tissue(biped)).all()
+
+
+def test_without_a_tendon_or_with_a_stiff_one_nothing_changes():
+    walked = []
+    for tendon in (None, 2000.0):
+        act, settings = prepare("schedule", {"ankle_tendon": tendon, "episode_seconds": 2.0})
+        biped = Biped(settings, 1)
+        biped.reset(np.array([0]), [0])
+        observation = biped.observe()
+        for _ in range(80):
+            observation = biped.step(act(observation)).observation
+        walked.append(observation)
+    np.testing.assert_array_equal(*walked)
+
+
+@pytest.mark.parametrize("guide", ["people", "plan"])
+def test_a_bounded_schedule_gives_the_same_torque_at_the_planned_angle(guide):
+    free, bound = settings_from(guide=guide), settings_from(guide=guide, ankle_tendon=250.0)
+    tables = []
+    for settings in (free, bound):
+        row = list(rows(reference_walks(settings)))
+        ankle = row[0][1].target.mean("ankle", GRID)
+        rest, stiffness = (values[0] for values in foot_tables(settings, row))
+        torque = stiffness[:, 0] * (rest[:, 0] - ankle)
+        if rest.shape[-1] > 2:
+            torque = rest[:, 2]  # fed at any K; the spring itself rests at the planned angle
+        tables.append((torque, stiffness[:, 0]))
+    assert (tables[1][1] < tables[0][1] - 1.0).any()
+    np.testing.assert_allclose(tables[1][0], tables[0][0], rtol=0, atol=1e-10)
+
+
+def test_the_reward_charges_the_calfs_own_k_beyond_what_its_torque_brings():
+    settings = settings_from(ankle_tendon=400.0, stiffness_joints="ankle", episode_seconds=4.0)
+    biped = Biped(settings, 1)
+    biped.reset(np.array([0]), [0])
+    for _ in range(40):
+        result = biped.step(np.array([[0.6, 0.0, 0.6, 0.0]]))
+        info = {name: value[0] for name, value in result.info.items()}
+        charged = 0.0
+        for side, name in enumerate(SIDES):
+            together = min(max(info[f"stiffness/ankle_{name}"] - tissue(biped)[0, side], 0.0), TENDON_SHARE * 400.0)
+            torque = abs(biped._simulation.arrays.bodies["muscles"]["moment"][0, 0, side, ANKLE])
+            own = muscle_in_series(together, 400.0) - RELAXED_STIFFNESS - STIFFNESS_PER_TORQUE * torque
+            toe = info[f"stiffness/toe_{name}"]
+            charged += 0.5 * ((max(own, 0.0) / 300.0) ** 2 + 0.25 * (toe / 60.0) ** 2) / 1.25
+        assert info["reward/stiffness"] == pytest.approx(charged, rel=1e-12)
