@@ -19,6 +19,7 @@ from springfoot.gait.people.contacts import PERCENT
 
 from ..numbers.criteria import fault
 
+
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
     """Print the evaluation as a table, people beside the model; plain text where the output is no terminal."""
     console = console or Console(highlight=False)

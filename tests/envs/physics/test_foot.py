@@ -63,7 +63,9 @@ def test_a_contact_meets_a_locked_joint_as_if_it_were_welded(kind, joint):
         mujoco.mj_jacGeom(model, data, up, None, model.geom("toe_right").id)
         every = np.arange(model.nv)
         welded = np.delete(every, model.joint(f"{joint}_right").dofadr[0])
-        return [1 / (up[2, dofs] @ np.linalg.solve(inertia[np.ix_(dofs, dofs)], up[2, dofs])) for dofs in (every, welded)]
+        return [
+            1 / (up[2, dofs] @ np.linalg.solve(inertia[np.ix_(dofs, dofs)], up[2, dofs])) for dofs in (every, welded)
+        ]
 
     met, welded = masses(worn)
     assert met == pytest.approx(welded, rel=0.06)

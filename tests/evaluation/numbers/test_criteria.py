@@ -51,10 +51,16 @@ def test_each_limit_alone_is_missed(path, value, said):
     assert unmet(metrics, WALKS) == [said]
 
 
-@pytest.mark.parametrize(("work", "said"), [(-0.05, ""), (0.0, ""), (None, ""), (1e-6, "1e-06 J/kg"), (0.168, "0.168 J/kg")])
+@pytest.mark.parametrize(
+    ("work", "said"), [(-0.05, ""), (0.0, ""), (None, ""), (1e-6, "1e-06 J/kg"), (0.168, "0.168 J/kg")]
+)
 def test_ground_that_gives_energy_is_a_fault(work, said):
     found = fault({"energy_J_kg": {"contact": work}})
-    assert found.startswith(f"Fault of the simulation: ground and joint stops put {said} a stride") if said else found == ""
+    assert (
+        found.startswith(f"Fault of the simulation: ground and joint stops put {said} a stride")
+        if said
+        else found == ""
+    )
 
 
 def test_a_loosened_limit_is_wider_at_each_of_its_ends():
