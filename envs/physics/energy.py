@@ -16,7 +16,7 @@ from springfoot.gait.body.body import GRAVITY, Body
 
 from .foot import SOUND, Feet, leg_segments
 from .kernel import kernel, part
-from .model import ARMATURE, JOINTS, KNEE, SIDES, damping_times_of, joints_of
+from .model import JOINTS, KNEE, SIDES, armatures_of, damping_times_of, joints_of
 
 LEDGER = np.dtype(
     [
@@ -99,7 +99,7 @@ PARTS = np.dtype(
         ("upper", PART, 2),  # trunk, load
         ("leg", PART, _LEGS),  # thigh, shank, foot, toe
         ("end", float, (len(JOINTS), 2)),  # from a leg segment's joint to the next one [m], in its own frame
-        ("armature", float, len(JOINTS)),  # [kg m^2]
+        ("armature", float, _LEGS),  # [kg m^2]
         ("beta", float, _LEGS),  # [s]
         ("table", np.int64, _LEGS),  # 1 for a device with a torque-angle line: of its own, so that nothing changes it
     ]
@@ -119,7 +119,7 @@ def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
             parts["leg"][name][:, side] = getattr(leg, name)
     toe_joint = (body.ankle_to_toe_joint, body.toe_joint_height - body.ankle_height)
     parts["end"] = [(0.0, -body.thigh_length), (0.0, -body.shank_length), toe_joint, (0.0, 0.0)]
-    parts["armature"] = np.array(ARMATURE) * body.mass_scale * body.length_scale**2
+    parts["armature"] = armatures_of(body, feet)
     parts["beta"] = damping_times_of(body, feet)
     parts["table"] = [[bool(joint.device and joint.device.table) for joint in joints_of(foot)] for foot in feet]
     return parts
@@ -228,7 +228,7 @@ def _add_mechanical(parts, position, rate, energy):
                 turn = turn + sign * q[dof]
                 spin = spin + sign * v[dof]
                 total += _part_energy(own.leg[side, joint], x, z, x_rate, z_rate, turn, spin)
-                total += 0.5 * own.armature[joint] * v[dof] ** 2
+                total += 0.5 * own.armature[side, joint] * v[dof] ** 2
                 forward, up = own.end[joint]
                 along = forward * cos(turn) - up * sin(turn)
                 above = forward * sin(turn) + up * cos(turn)

@@ -90,6 +90,13 @@ def torque_ranges(body: Body, feet: Feet) -> NDArray:
     return np.array([list(leg) for leg in pairs])
 
 
+def armatures_of(body: Body, feet: Feet) -> NDArray:
+    """Return the armature of the joints of both legs [kg m^2], (side, joint)."""
+    own = np.array(ARMATURE) * body.mass_scale * body.length_scale**2
+    devices = [[joint.device.armature if joint.device else 0.0 for joint in joints_of(foot)] for foot in feet]
+    return own + np.array(devices)
+
+
 def passive_damping(body: Body) -> np.ndarray:
     """Return joint damping [N m s/rad] in the order of `JOINTS`, shape (4,)."""
     return np.array(PASSIVE_DAMPING) * body.strength_scale * sqrt(body.length_scale)
@@ -240,7 +247,7 @@ def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
         name=f"{joint}_{side}",
         type=mujoco.mjtJoint.mjJNT_HINGE,
         axis=(0, _SIGN_AXIS[joint], 0),
-        armature=ARMATURE[index] * body.mass_scale * body.length_scale**2,
+        armature=float(armatures_of(body, feet)[which, index]),
         damping=damping,
         limited=True,
         range=tuple(np.deg2rad(JOINT_RANGE_DEG[index])),

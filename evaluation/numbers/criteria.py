@@ -120,9 +120,26 @@ def _r(name: str, path: tuple[str, ...], low: float) -> Criterion:
 
 
 NO_FALLS = Criterion(name="falls", path=("falls",), high=0, pattern=".0f")
+GROUND_GIVES_NOTHING = Criterion(
+    name="contact work", path=("energy_J_kg", "contact"), high=0.0, unit=" J/kg", pattern=".3g"
+)
+"""Ground and joint stops can only take energy: over a stride of both legs they do no work on the body. More than that
+is a fault of the simulation, most often of a physics step too coarse for stiff or strongly damped joints."""
+
+
+def fault(metrics: dict[str, Any]) -> str:
+    """Return in a sentence the fault of the simulation that an evaluation shows; empty if it shows none."""
+    if GROUND_GIVES_NOTHING.value(metrics) is None or GROUND_GIVES_NOTHING.holds(metrics):
+        return ""
+    return (
+        f"Fault of the simulation: ground and joint stops put {number_text(GROUND_GIVES_NOTHING, metrics)} a stride "
+        "into the body, and can only take energy; its forces and energies are not to be trusted."
+    )
+
 
 WALKS = (
     NO_FALLS,
+    GROUND_GIVES_NOTHING,
     Criterion(name="speed off by", path=("off", "speed_m_s"), high=0.03, unit=" m/s", pattern=".3f"),
     _rmse("thigh", 3.5),
     _rmse("knee", 4.5),

@@ -13,7 +13,15 @@ from typing import Any
 from springfoot.envs.settings.settings import reference_gait, settings_from
 from springfoot.files.provenance import source
 
-from ..numbers.criteria import LOADS_LIKE_PEOPLE, MOVES_LIKE_PEOPLE, WORKS_LIKE_PEOPLE, Criterion, number_text, numbers
+from ..numbers.criteria import (
+    LOADS_LIKE_PEOPLE,
+    MOVES_LIKE_PEOPLE,
+    WORKS_LIKE_PEOPLE,
+    Criterion,
+    fault,
+    number_text,
+    numbers,
+)
 from ..numbers.metrics import Gait
 from ..recording.recording import Recording
 from ..report.gait_table import leg_rows, people_metrics, table_rows
@@ -67,7 +75,7 @@ def _verdict(index: int, metrics: dict[str, Any]) -> str:
 
 
 def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
-    """Return falls, body and feet, speed, joints, forces and energy in words."""
+    """Return falls, body and feet, a fault of the simulation, speed, joints, forces and energy in words."""
     environment = metrics["environment"]
     settings = settings_from(**environment)
     people = people_metrics(reference_gait(settings))
@@ -89,6 +97,8 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     angles = ", ".join(f"{name} {_text(each['rmse_deg'], '.1f')}°" for name, each in joints.items())
     peaks = " / ".join(_text(grf[name], ".2f") for name in _PEAKS)
     theirs = " / ".join(_text(people["grf"][name], ".2f") for name in _PEAKS)
+    if found := fault(metrics):
+        said["Warning"] = found
     return said | {
         "Speed": f"{_text(metrics['speed_m_s']['mean'], '.2f')} m/s, asked for {environment['speed']:.2f}.",
         "Joints": f"Off people's mean by {angles} (rms). {_judged(metrics, MOVES_LIKE_PEOPLE, judged)}",

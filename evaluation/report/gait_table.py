@@ -17,6 +17,8 @@ from springfoot.gait import HumanGait
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.contacts import PERCENT
 
+from ..numbers.criteria import fault
+
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
     """Print the evaluation as a table, people beside the model; plain text where the output is no terminal."""
@@ -49,6 +51,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     console.print(table)
     if metrics["per_leg"] is not None:
         console.print(_leg_table(metrics, narrow))
+    if found := fault(metrics):
+        console.print(f"[bold red]{escape(found)}[/]", soft_wrap=not console.is_terminal)
     for reason, count in metrics["fall_reasons"].items():
         console.print(f"{count} × {reason}")
     if environment["human"] is not None:

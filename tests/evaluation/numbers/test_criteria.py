@@ -6,7 +6,7 @@ import pytest
 
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings.settings import BipedSettings, settings_to_json
-from springfoot.evaluation.numbers.criteria import HUMAN_LIKE, WALKS, Criterion, numbers, unmet
+from springfoot.evaluation.numbers.criteria import HUMAN_LIKE, WALKS, Criterion, fault, numbers, unmet
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import record
@@ -18,6 +18,7 @@ METRICS = {
     "step_length_m": PLAN.step_length,
     "cadence_steps_min": 60 / PLAN.step_time,
     "double_support_s": 0.1,
+    "energy_J_kg": {"contact": 0.0},
     "environment": settings_to_json(BipedSettings()),
     "joints": {"thigh": {"rmse_deg": 3.5}, "knee": {"rmse_deg": 4.5}, "ankle": {"rmse_deg": 4.0}},
     "grf": {"vertical_peak1_bw": 1.3, "vertical_peak2_bw": 1.0, "vertical_r": 0.93},
@@ -32,6 +33,7 @@ def test_limits_hold_to_their_very_value():
     ("path", "value", "said"),
     [
         (("falls",), 1, "falls 1"),
+        (("energy_J_kg", "contact"), 0.0004, "contact work 0.0004 J/kg"),
         (("speed_m_s", "mean"), 1.231, "speed off by 0.031 m/s"),
         (("speed_m_s", "mean"), None, "speed off by ?"),
         (("joints", "knee", "rmse_deg"), 4.51, "knee 4.51°"),
@@ -47,6 +49,18 @@ def test_each_limit_alone_is_missed(path, value, said):
         place = place[key]
     place[path[-1]] = value
     assert unmet(metrics, WALKS) == [said]
+
+
+@pytest.mark.parametrize(
+    ("work", "said"), [(-0.05, ""), (0.0, ""), (None, ""), (1e-6, "1e-06 J/kg"), (0.168, "0.168 J/kg")]
+)
+def test_ground_that_gives_energy_is_a_fault(work, said):
+    found = fault({"energy_J_kg": {"contact": work}})
+    assert (
+        found.startswith(f"Fault of the simulation: ground and joint stops put {said} a stride")
+        if said
+        else found == ""
+    )
 
 
 def test_a_loosened_limit_is_wider_at_each_of_its_ends():
