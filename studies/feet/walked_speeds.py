@@ -27,9 +27,11 @@ def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[
         for case in dict.fromkeys(tuple(row[key] for key in keys) for row in rows):
             walks = [row for row in rows if tuple(row[key] for key in keys) == case]
             walks.sort(key=lambda row: row["speed_m_s"])
-            prices = next((found for pair in pairwise(walks) if (found := _prices_at(speed, *pair)) is not None), None)
-            line = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
-            compared.append({**line, "falls": float(prices is None), **(prices or dict.fromkeys(PRICES))})
+            between = [prices for pair in pairwise(walks) if (prices := _prices_at(speed, *pair)) is not None]
+            line: dict[str, Any] = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
+            line["falls"] = 0.0 if between else 1.0
+            line |= between[0] if between else dict.fromkeys(PRICES)
+            compared.append(line)
     return compared
 
 
