@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from springfoot.envs.settings.settings import reference_gait, settings_from
+from springfoot.envs.settings.settings import settings_from
 from springfoot.files.provenance import source
 
 from ..numbers.criteria import (
@@ -78,7 +78,7 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     """Return falls, body and feet, a fault of the simulation, speed, joints, forces and energy in words."""
     environment = metrics["environment"]
     settings = settings_from(**environment)
-    people = people_metrics(reference_gait(settings))
+    people = people_metrics(settings)
     judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
     falls = metrics["falls"]
     episodes = metrics["episodes"]

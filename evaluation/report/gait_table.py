@@ -10,12 +10,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from springfoot.envs.settings.settings import reference_gait, settings_from
+from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait, settings_from
 from springfoot.errors import printable
 from springfoot.files.markdown import plus_minus, text_of
-from springfoot.gait import HumanGait
+from springfoot.gait import GRAVITY, HumanGait
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.plan.effort import effort_of_people
 
 from ..numbers.criteria import fault
 
@@ -129,7 +130,7 @@ TableRow = tuple[str, str, str, str, str, str]
 
 def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     """Return the table's rows, in groups."""
-    people = people_metrics(reference_gait(settings_from(**metrics["environment"])))
+    people = people_metrics(settings_from(**metrics["environment"]))
     grf = metrics["grf"]
     their_grf = people["grf"]
     com = metrics["com"]
@@ -197,7 +198,13 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             for name, work in metrics["joint_work_J_kg"].items()
             for sign in ("positive", "negative")
         ]
-        + [row("cost of transport", "", metrics["cost_of_transport"], ".3f")],
+        + [
+            row("cost of transport", "", metrics["cost_of_transport"], ".3f"),
+            row("fibre work", "J/kg/m", metrics["effort"]["fibre_J_kg_m"], ".2f", people["fibre_J_kg_m"]),
+            row("effort", "", metrics["effort"]["total"], ".2f", people["effort"]),
+            row("push-off on the CoM", "J/kg", metrics["com_work_J_kg"]["push_off"], ".2f"),
+            row("collision of the CoM", "J/kg", metrics["com_work_J_kg"]["collision"], ".2f"),
+        ],
         [
             row(f"energy, {name.replace('_', ' ')}", "J/kg", metrics["energy_J_kg"][name], "+.3f")
             for name in ("actuators", "passive_damping", "contact", "residual")
@@ -222,8 +229,14 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     ]
 
 
-def people_metrics(human: HumanGait) -> dict[str, Any]:
-    """Return the numbers of people, or of own data, from their mean curves; keys as in metrics.json."""
+def people_metrics(settings: BipedSettings) -> dict[str, Any]:
+    """Return the numbers of people, or of own data, at the body and speed of `settings`; keys as in metrics.json.
+
+    They are of mean curves. Effort is without the toe, whose moment is not measured.
+    """
+    human = reference_gait(settings)
+    body = body_of(settings)
+    effort = effort_of_people(human, body)
     phase = PERCENT / 100
     features = score.force_features(human.mean("grf_vertical", phase), human.mean("grf_forward", phase))
     work = {name: _people_work(human, name) for name in ("hip", "knee", "ankle")}
@@ -243,6 +256,8 @@ def people_metrics(human: HumanGait) -> dict[str, Any]:
         "moments": {name: score.largest(human.mean(f"{name}_moment", phase))[0] for name in ("hip", "knee", "ankle")},
         "ankle_work_J_kg": work["ankle"],
         "joint_work_J_kg": work,
+        "fibre_J_kg_m": effort.work * GRAVITY * body.total_mass / body.mass,
+        "effort": effort.total,
     }
 
 

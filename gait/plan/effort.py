@@ -19,9 +19,10 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..body.body import GRAVITY, Body
+from ..body.body import ANGLES, GRAVITY, Body
 from ..body.leg import JOINTS, inverse_dynamics
 from ..body.tissue import ANKLE_TENDON, TOE_TENDON, passive_moments
+from ..people.human import HumanGait
 from .kinetics import planned_leg
 from .plan import WalkPlan
 
@@ -199,6 +200,21 @@ def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
     angle, rate = (_joints(turns) for turns in (motion.turn, motion.rate))
     return effort_of_stride(body, angle, rate, moment, plan.stride_time, 2 * plan.step_length, muscle)
+
+
+def effort_of_people(human: HumanGait, body: Body) -> Effort:
+    """Compute the effort of people's mean curves, on a body of their height.
+
+    The toe's moment is not measured and costs nothing here.
+    """
+    phase = np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
+    angle, rate = (np.stack([curve(name, phase) for name in ANGLES], -1) for curve in (human.mean, human.rate))
+    moment = passive_moments(body, angle)
+    moment[:, : JOINTS.index("toe")] = body.mass * np.stack(
+        [human.mean(f"{joint}_moment", phase) for joint in JOINTS if joint != "toe"], -1
+    )
+    time = human.stride_time
+    return effort_of_stride(body, angle, rate / time, moment, time, 2 * human.step_length)
 
 
 def effort_of_stride(

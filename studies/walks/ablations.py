@@ -20,7 +20,7 @@ import tyro
 from springfoot.agents.training import PRESETS, TrainingConfig, is_finished
 from springfoot.envs.control import GRID, PLATEAUS, LegConstants, foot_curves, reference_walk_at
 from springfoot.envs.physics import ACTION_STEP
-from springfoot.envs.settings import BipedSettings, reference_gait, settings_from, settings_to_json
+from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.report import people_metrics
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
@@ -197,7 +197,7 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
             cells.append(plus_minus(mean_sd(values), ".0f" if whole else each.pattern))
         lines.append(cells)
     if people:
-        theirs = people_metrics(reference_gait(BipedSettings()))
+        theirs = people_metrics(BipedSettings())
         known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
         known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
         lines.append(["people", MISSING, *(_known(known, each) for each in ABLATION_COLUMNS)])

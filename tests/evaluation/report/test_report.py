@@ -22,7 +22,7 @@ from springfoot.evaluation.recording.policies import prepare
 from springfoot.evaluation.recording.recording import load_recording, record
 from springfoot.evaluation.report.gait_table import people_metrics, print_table
 from springfoot.evaluation.report.report import write_report
-from springfoot.gait import SpringfootError, human_gait
+from springfoot.gait import SpringfootError
 from springfoot.studies.walks.bodies import draw_pairs, walk_pairs
 
 FILES = {
@@ -121,10 +121,11 @@ def test_a_narrow_terminal_cuts_no_number_of_the_table(recording):
 
 
 def test_people_beside_the_model_are_those_of_the_reference():
-    people = people_metrics(human_gait(1.2, 1.70))
+    people = people_metrics(BipedSettings())
     assert people["step_length_m"] == pytest.approx(0.655, abs=0.005)
     assert people["toe_off_percent"] == pytest.approx(63.3, abs=0.2)
     assert people["moments"]["ankle"] == pytest.approx(1.31, abs=0.02)
+    assert people["fibre_J_kg_m"] == pytest.approx(2.99, abs=0.05)
 
 
 def test_an_episode_is_the_same_whatever_runs_beside_it(recording):
