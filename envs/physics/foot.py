@@ -29,7 +29,7 @@ class Spring:
     table: tuple[tuple[float, float], ...] = ()
     """Angles [rad], ascending, and torques [N m], falling, in place of stiffness and rest angle; lines between them."""
     engages: str | None = None
-    """Way beyond `rest` in which alone it acts, one of `WAYS` (of a toe: up, down); None for both. An orthosis alone may
+    """Way beyond `rest` in which alone it acts, one of `WAYS` (of a toe: up, down); None for both. Only an orthosis may
     act one way, then without damping."""
 
     @property
