@@ -40,7 +40,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     ## Feet
     `left_foot` and `right_foot` are each one of these kinds, or a dictionary of `kind` and numbers. Stiffness [N m/rad]
     and rest angle [deg] of a device are the same on everybody. Every kind may have an `orthosis`, a dictionary of the
-    numbers of `passive`: a spring beside the joints. `shank_mass_ratio`, `shank_com_ratio`, `shank_inertia_ratio`,
+    numbers of `passive`: a spring beside the joints. With `engages`, "dorsiflexion" or "plantarflexion", it acts only
+    beyond its angle that way, without damping. `shank_mass_ratio`, `shank_com_ratio`, `shank_inertia_ratio`,
     `foot_mass_ratio` and `foot_inertia_ratio` say how much of an intact one's a prosthesis has.
 
     | Kind      | Ankle                            | Toe                      | Numbers of its own                     |

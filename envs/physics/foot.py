@@ -5,10 +5,13 @@ every body: they do not scale.
 """
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, pi
 
 from springfoot.gait.body.body import Body
 from springfoot.gait.springs.stiffness import StiffnessSchedule
+
+WAYS = ("dorsiflexion", "plantarflexion")
+"""Ways in which a spring may engage."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +28,14 @@ class Spring:
     """Inertia of the joint beside its own [kg m^2]."""
     table: tuple[tuple[float, float], ...] = ()
     """Angles [rad], ascending, and torques [N m], falling, in place of stiffness and rest angle; lines between them."""
+    engages: str | None = None
+    """Way beyond `rest` in which alone it acts, one of `WAYS` (of a toe: up, down); None for both. Only an orthosis may
+    act one way, then without damping."""
+
+    @property
+    def slack(self) -> tuple[float, float]:
+        """Return the lowest and the highest angle without torque [rad]; no joint reaches pi."""
+        return -pi if self.engages == WAYS[0] else self.rest, pi if self.engages == WAYS[1] else self.rest
 
 
 LOCK = Spring(stiffness=50_000.0, damping_time=0.01, armature=0.2)
@@ -93,6 +104,11 @@ INTACT = Foot()
 Feet = tuple[Foot, Foot]
 """The left and the right foot."""
 SOUND: Feet = (INTACT, INTACT)
+
+
+def act_one_way(feet: Feet) -> bool:
+    """Return whether any orthosis of these feet acts one way."""
+    return any(joint.orthosis is not None and joint.orthosis.engages for foot in feet for joint in foot.joints)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ from springfoot.gait.body.body import GRAVITY, Body
 from springfoot.gait.body.leg import JOINTS
 
 from .contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
-from .foot import INTACT, SOUND, Feet, Foot, FootJoint, leg_segments, torque_range
+from .foot import INTACT, SOUND, Feet, Foot, FootJoint, Spring, act_one_way, leg_segments, torque_range
 from .scene import DEVICE, FLESH, add_scene, bone, box
 from .timing import PHYSICS_STEP
 
@@ -114,11 +114,13 @@ def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray
     return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
-def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mujoco.MjSpec:
+def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False) -> mujoco.MjSpec:
     """Return the model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force
     sensors.
 
-    Either foot has a ground of its own, a plane that is moved from outside (mocap).
+    Either foot has a ground of its own, a plane that is moved from outside (mocap). With `one_way`, or an orthosis that
+    acts one way, ankles and toes have a tendon each, slack where there is no such spring: in a batch all models have
+    them, or none.
     """
     length = body.length_scale
     mass = body.mass_scale
@@ -167,6 +169,10 @@ def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mu
     for side, times in zip(SIDES, damping_times_of(body, feet), strict=True):
         for joint, beta in zip(JOINTS, times, strict=True):
             _add_spring(spec, f"{joint}_{side}", float(beta))
+    if one_way or act_one_way(feet):
+        for side, foot in zip(SIDES, feet, strict=True):
+            for joint, own in zip(JOINTS[ANKLE:], foot.joints, strict=True):
+                _add_tendon(spec, f"{joint}_{side}", own.orthosis)
     for side in SIDES:
         for contact in CONTACTS:
             spec.add_sensor(
@@ -183,9 +189,9 @@ def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mu
     return spec
 
 
-def build_model(body: Body, friction: float = FRICTION, feet: Feet = SOUND) -> mujoco.MjModel:
-    """Return the compiled model of `body` with these feet."""
-    return build_spec(body, friction, feet).compile()
+def build_model(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False) -> mujoco.MjModel:
+    """Return the compiled model of `body` with these feet, as `build_spec` says."""
+    return build_spec(body, friction, feet, one_way=one_way).compile()
 
 
 def _load(trunk, body: Body) -> None:
@@ -238,7 +244,7 @@ def _segment(parent, name, pos, mass, com, inertia):
 
 
 def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
-    """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with the orthosis there, if any."""
+    """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with an orthosis that acts both ways."""
     which = SIDES.index(side)
     low, high = torque_ranges(body, feet)[which, index].tolist()
     joint = JOINTS[index]
@@ -254,12 +260,21 @@ def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
         actfrclimited=np.isfinite(high),
         actfrcrange=(low, high) if np.isfinite(high) else (0.0, 0.0),
     )
-    if orthosis := joints_of(feet[which])[index].orthosis:
+    if (orthosis := joints_of(feet[which])[index].orthosis) and not orthosis.engages:
         time = orthosis.damping_time
         beta = float(damping_times(body)[index]) if time is None else time
         hinge.springref = orthosis.rest
         hinge.stiffness[0] = orthosis.stiffness
         hinge.damping[0] = damping + beta * orthosis.stiffness  # no higher powers
+
+
+def _add_tendon(spec: mujoco.MjSpec, joint: str, orthosis: Spring | None) -> None:
+    """Add a tendon as long as the joint's angle, taut where an orthosis that acts one way engages."""
+    tendon = spec.add_tendon(name=f"orthosis_{joint}")
+    tendon.wrap_joint(joint, 1.0)
+    if orthosis and orthosis.engages:
+        tendon.stiffness[0] = orthosis.stiffness  # no higher powers
+        tendon.springlength = orthosis.slack
 
 
 def _add_spring(spec: mujoco.MjSpec, joint: str, beta: float) -> None:

@@ -11,7 +11,14 @@ from .simulation import MjModel
 ARRAY_OF: Mapping[str, Mapping[str, str]] = {
     "body": {"pos": "body_pos", "quat": "body_quat"},
     "inertial": {"pos": "body_ipos", "mass": "body_mass", "diaginertia": "body_inertia"},
-    "joint": {"armature": "dof_armature", "damping": "dof_damping", "axis": "jnt_axis"},
+    "joint": {
+        "armature": "dof_armature",
+        "damping": "dof_damping",
+        "stiffness": "jnt_stiffness",
+        "springref": "qpos_spring",
+        "axis": "jnt_axis",
+    },
+    "fixed": {"stiffness": "tendon_stiffness", "springlength": "tendon_lengthspring"},
     "geom": {"size": "geom_size", "pos": "geom_pos", "quat": "geom_quat"},
     "pair": {
         "friction": "pair_friction",
@@ -39,12 +46,14 @@ def model_text(spec: mujoco.MjSpec) -> str:
         if inertial is not None:
             _write(inertial, model, index)
     for joint in world.iter("joint"):
-        index = model.joint(joint.get("name", "")).id
+        index = model.joint(joint.get("name", "")).id  # every joint has one coordinate
         _write(joint, model, index, LIMITS if model.jnt_limited[index] else {})
     for index, geom in enumerate(_in_order(world)):
         _write(geom, model, index)
     for index, pair in enumerate(_found(root, "contact").iter("pair")):
         _write(pair, model, index)
+    for tendon in root.iter("fixed"):
+        _write(tendon, model, model.tendon(tendon.get("name", "")).id)
     for actuator in _found(root, "actuator"):
         _write(actuator, model, model.actuator(actuator.get("name", "")).id)
     for index, key in enumerate(root.iter("key")):

@@ -6,6 +6,7 @@ fields lag one physics step, and the mean contact forces of the window's steps, 
 """
 
 from collections.abc import Sequence
+from functools import partial
 from math import cos, sin, tan
 from typing import Any, NamedTuple, TypeAlias
 
@@ -19,7 +20,7 @@ from springfoot.gait.body.body import Body
 
 from .contact import CONTACTS, FRICTION
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
-from .foot import SOUND, Feet
+from .foot import SOUND, Feet, act_one_way
 from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
 from .model import JOINTS, SIDES, build_model
 from .muscles import forget, muscles_of
@@ -78,14 +79,15 @@ class Simulation:
         self.num = num
         self.feet = [SOUND] * num if feet is None else list(feet)
         """The left and the right foot of each simulation."""
-        built = {pair: model or build_model(body, friction, pair) for pair in dict.fromkeys(self.feet)}
+        one_way = any(map(act_one_way, self.feet))  # all models of a batch have the same elements
+        self._build = partial(build_model, friction=friction, one_way=one_way)
+        built = {pair: model or self._build(body, feet=pair) for pair in dict.fromkeys(self.feet)}
         self.model = built[self.feet[0]]
         self.models = [built[pair] for pair in self.feet]
         """The compiled model of each simulation."""
         if (self.model.nq, self.model.nv, self.model.na, self.model.nu) != (DEGREES, DEGREES, 0, 2 * (DEGREES - 3)):
             raise SpringfootError("a custom model must have the joints and the actuators of the default one")
         self._own_options = model is not None
-        self._friction = friction
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
         self._built = built
         self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
@@ -132,7 +134,7 @@ class Simulation:
             )
         for index, body in zip(ids, bodies, strict=True):
             feet = self.feet[index]
-            self.models[index] = self._built[feet] if body == self.body else build_model(body, self._friction, feet)
+            self.models[index] = self._built[feet] if body == self.body else self._build(body, feet=feet)
             self.arrays.bodies["segments"][index] = segments_of(body, feet)[0]
             self.arrays.bodies["muscles"]["muscles"][index] = muscles_of(body, feet)[0]
             self._parts[index] = parts_of(body, feet)[0]

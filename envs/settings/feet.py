@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from springfoot.errors import SpringfootError, require_within
 from springfoot.gait.springs.stiffness import SPRINGS, StiffnessSchedule
 
-from ..physics.foot import LOCK, Feet, Foot, FootJoint, Spring
+from ..physics.foot import LOCK, WAYS, Feet, Foot, FootJoint, Spring
 from .adapted import ADAPTED, adapted_setting
 
 FOOT_SETTINGS = ("left_foot", "right_foot")
@@ -58,6 +58,10 @@ ORTHOSIS_NUMBERS = SPRING_NUMBERS | {
 }
 """Numbers of an orthosis, a spring beside the joint; 0.9 to 8.7 N m/deg at the ankle (Waterval et al. 2019) are 52 to
 498 N m/rad."""
+ENGAGES = "engages"
+"""Way beyond the rest angles in which alone the springs of an orthosis act, one of `envs.physics.foot.WAYS`, without
+damping: a stop, or an exoskeleton such as that of Nuckols & Sawicki 2020 (J. Neuroeng. Rehabil. 17:75). Without it they
+act both ways, with damping."""
 SEGMENT_RATIOS = {
     f"{part}_ratio": Number(1.0, 0.1, 3.0, "(of the intact one)")
     for part in ("shank_mass", "shank_com", "shank_inertia", "foot_mass", "foot_inertia")
@@ -157,14 +161,27 @@ def _plain(name: str, value: Any) -> str | dict[str, Any]:
                 raise SpringfootError(f"{name}: give {key} or {both[0]}, not both")
             plain[key] = _schedule(name, value[key]) if key == "schedule" else _table(f"{name}: {key}", value[key])
     if (orthosis := value.get("orthosis")) is not None:
-        if not isinstance(orthosis, Mapping):
-            raise SpringfootError(
-                f"{name}: orthosis must be a dictionary of {', '.join(ORTHOSIS_NUMBERS)}, got {orthosis!r:.60}"
-            )
-        plain["orthosis"] = _numbers(f"{name}: orthosis", "an orthosis", orthosis, ORTHOSIS_NUMBERS)
+        plain["orthosis"] = _orthosis(f"{name}: orthosis", orthosis)
     if value.get(ADAPTED) is not None:
         plain[ADAPTED] = adapted_setting(name, kind, value[ADAPTED])
     return kind if len(plain) == 1 else plain
+
+
+def _orthosis(name: str, value: Any) -> dict[str, Any]:
+    """Return an orthosis's plain form, checked: its numbers, and the way in which it engages, if it acts one way."""
+    if not isinstance(value, Mapping):
+        raise SpringfootError(
+            f"{name} must be a dictionary of {', '.join([*ORTHOSIS_NUMBERS, ENGAGES])}, got {value!r:.60}"
+        )
+    given = {key: number for key, number in value.items() if key != ENGAGES}
+    plain: dict[str, Any] = _numbers(name, "an orthosis", given, ORTHOSIS_NUMBERS, (ENGAGES,))
+    if (way := value.get(ENGAGES)) is not None:
+        if not isinstance(way, str) or way not in WAYS:
+            raise SpringfootError(f"{name}: {ENGAGES} must be one of {', '.join(map(repr, WAYS))}, got {way!r:.60}")
+        if "damping_time" in plain:
+            raise SpringfootError(f"{name}: give {ENGAGES} or damping_time, not both")
+        plain[ENGAGES] = way
+    return plain
 
 
 def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
@@ -285,6 +302,6 @@ def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
         time = value["damping_time"]
         if points:
             return Spring(table=points, damping_time=time)
-        return Spring(stiffness=value[f"{joint}_stiffness"], rest=rest, damping_time=time)
+        return Spring(stiffness=value[f"{joint}_stiffness"], rest=rest, damping_time=time, engages=value.get(ENGAGES))
 
     return spring("ankle"), spring("toe")

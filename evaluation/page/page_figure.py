@@ -10,7 +10,7 @@ from springfoot.envs.control.foot_springs import stiffness_ranges
 from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.foot import LOCK, FootJoint
 from springfoot.envs.physics.model import SIDES
-from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
+from springfoot.envs.settings.feet import ENGAGES, KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.gait import GRAVITY
 from springfoot.gait.people.contacts import PERCENT
@@ -124,8 +124,10 @@ def foot_words(setting: FootSetting) -> str:
     words += [f"{_plain(name)} of {len(given[name])} points" for name in given if name.endswith("_table")]
     words += ["on a schedule of its own"] if "schedule" in given else []
     if "orthosis" in given:
-        its = [f"{_plain(name)} {value:g} {ORTHOSIS_NUMBERS[name].unit}" for name, value in given["orthosis"].items()]
-        words.append(f"in an orthosis with {' and '.join(its) or 'no spring'}")
+        own = given["orthosis"]
+        its = [f"{_plain(name)} {own[name]:g} {ORTHOSIS_NUMBERS[name].unit}" for name in own if name != ENGAGES]
+        alone = f" in {own[ENGAGES]} alone" if ENGAGES in own else ""
+        words.append(f"in an orthosis with {' and '.join(its) or 'no spring'}{alone}")
     return f"{_plain(setting.kind)} ({', '.join(words)})" if words else _plain(setting.kind)
 
 

@@ -2,15 +2,17 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from walked_ticks import walked_ticks
 
+from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.energy import LEDGER
-from springfoot.envs.physics.foot import SOUND, total_mass
+from springfoot.envs.physics.foot import SOUND, WAYS, total_mass
 from springfoot.envs.physics.measurement import segments_of
 from springfoot.envs.physics.model import (
     ANKLE,
@@ -32,7 +34,10 @@ SPRING = {"kind": "passive", "ankle_stiffness": 400.0, "ankle_deg": 4.0, "toe_st
 PROSTHESIS = SPRING | dict.fromkeys(("shank_mass_ratio", "shank_com_ratio", "foot_mass_ratio"), 0.6)
 PROSTHESIS |= {"shank_inertia_ratio": 0.4, "foot_inertia_ratio": 0.5}
 BRACED = {"kind": "weak", "strength": 0.2, "orthosis": {"ankle_stiffness": 200.0, "ankle_deg": 3.0}}
+ONE_WAY = {"ankle_stiffness": 200.0, "ankle_deg": -5.0, "toe_stiffness": 10.0, "engages": "dorsiflexion"}
+STOPPED = {"kind": "drop", "orthosis": {"ankle_stiffness": 100.0, "engages": "plantarflexion"}}
 FEET_SEEN: list[Any] = [*KINDS, PROSTHESIS, BRACED, {"kind": "drop", "orthosis": {"ankle_stiffness": 20.0}}]
+FEET_SEEN += [{"kind": "intact", "orthosis": ONE_WAY}, STOPPED]
 MIXED = [("intact", foot) for foot in FEET_SEEN] + [("passive", "rigid"), ("weak", "no_toe")]
 
 
@@ -188,6 +193,55 @@ def test_an_orthosis_is_a_spring_beside_the_joint_and_outside_the_moment_limit()
     assert np.abs(beside[0]) > 5.0
 
 
+def in_orthosis(**changed: Any) -> dict[str, Any]:
+    return {"kind": "intact", "orthosis": ONE_WAY | changed}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("joint", ["ankle", "toe"])
+def test_a_spring_that_acts_one_way_is_taut_beyond_its_angle_and_slack_below(joint, way):
+    numbers = {"ankle_stiffness": 0.0, f"{joint}_stiffness": 70.0, f"{joint}_deg": -6.0}
+    model = build_model(Body(), feet=settings_from(right_foot=in_orthosis(**numbers, engages=way)).feet)
+    data = mujoco.MjData(model)
+    dof = model.joint(f"{joint}_right").dofadr[0]
+    for beyond in (-0.3, -0.1, -1e-6, 0.0, 1e-6, 0.1, 0.3):
+        data.qpos[dof] = np.radians(-6.0) + beyond
+        mujoco.mj_forward(model, data)
+        taut = beyond > 0.0 if way == "dorsiflexion" else beyond < 0.0
+        assert data.qfrc_passive[dof] == pytest.approx(-70.0 * beyond if taut else 0.0, abs=1e-12)
+        assert not np.delete(data.qfrc_passive, dof).any()
+
+
+def walked_bits(**feet: Any) -> tuple[list[bytes], NDArray]:
+    """Bits of a walk of two bodies, and its (T, N, side, (ankle, toe)) angles."""
+    ticks = walked_ticks(Biped(settings_from(**feet), 2), 40)
+    seen = [getattr(tick.measurement, name) for tick in ticks for name in ("angle", "torque", "force")]
+    seen += [value for tick in ticks for value in (tick.stiffness, tick.work.torque, tick.work.energy)]
+    return [each.tobytes() for each in seen], np.stack([tick.measurement.angle[..., FEET] for tick in ticks])
+
+
+@pytest.mark.parametrize("sides", [["left"], ["right"], ["left", "right"]], ids="-".join)
+def test_a_slack_spring_is_none_to_the_last_bit(sides):
+    def walk(**changed):
+        return walked_bits(**{f"{side}_foot": in_orthosis(**changed) for side in sides})
+
+    none, angle = walked_bits()
+    beyond = {"ankle_deg": 30.0, "toe_deg": 45.0}
+    assert np.degrees(angle.max((0, 1, 2)) - np.radians([30.0, 45.0])).max() < 0.0
+    assert walk(**beyond)[0] == none
+    assert walk(ankle_stiffness=0.0, toe_stiffness=0.0)[0] == none
+    assert walk(**beyond | {"ankle_deg": np.degrees(angle[..., 0].max()) - 1.0})[0] != none
+
+
+def test_a_spring_that_is_always_taut_is_one_that_acts_both_ways_without_damping():
+    low = {"ankle_deg": -30.0, "toe_deg": -30.0}
+    one_way = walked_bits(right_foot=in_orthosis(**low))[1]
+    both = {name: number for name, number in ONE_WAY.items() if name != "engages"}
+    both_ways = walked_bits(right_foot={"kind": "intact", "orthosis": both | low | {"damping_time": 0.0}})[1]
+    assert np.degrees(one_way.min()) > -30.0
+    np.testing.assert_allclose(one_way, both_ways, atol=1e-8)
+
+
 @pytest.mark.parametrize("foot", FEET_SEEN, ids=named)
 def test_the_energy_ledger_is_closed(foot):
     biped = Biped(settings_from(right_foot=foot), 3)
@@ -255,6 +309,7 @@ def test_every_number_of_a_foot_changes_the_foot():
         orthosis = {"ankle_stiffness": 50.0, "toe_stiffness": 5.0}
         other = {"kind": "intact", "orthosis": orthosis | {name: 0.45 * number.high}}
         assert physical(other) != physical({"kind": "intact", "orthosis": orthosis}), name
+    assert len({physical(in_orthosis(engages=way)) for way in (None, *WAYS)}) == 3
 
 
 def test_a_neighbours_reset_and_a_pause_leave_a_drop_foot_as_it_is():

@@ -107,6 +107,60 @@ def test_energy_closes_over_ten_strides(name, given):
     assert both == pytest.approx(own["actuators"].sum() + own["passive_damping"].sum(), rel=1e-9)
 
 
+@pytest.mark.parametrize("sides", [["right"], ["left", "right"]], ids="-".join)
+@pytest.mark.parametrize(("way", "angle"), [("dorsiflexion", -5.7), ("plantarflexion", 0.0)])
+def test_energy_closes_with_springs_that_act_one_way_and_they_give_back_what_they_take(way, angle, sides):
+    spring = {"ankle_stiffness": 200.0, "ankle_deg": angle, "toe_stiffness": 10.0, "engages": way}
+    policy, settings = prepare("pretrained", {f"{side}_foot": {"kind": "intact", "orthosis": spring} for side in sides})
+    biped, ticks, controls = Biped(settings, 1), [], []
+    biped.reset(np.array([0]), [0])
+    replay = biped.data(0)
+
+    def keep(tick):
+        ticks.append(tick)
+        controls.append(biped.data(0).ctrl.copy())
+
+    biped.on_tick = keep
+    observation = biped.observe()
+    for _ in range(400):
+        result = biped.step(policy(observation))
+        observation = result.observation
+        assert not result.terminated.any()
+
+    worn = [
+        (3 + len(JOINTS) * side + ANKLE + at, joint.orthosis)
+        for side, foot in enumerate(settings.feet)
+        for at, joint in enumerate(foot.joints)
+        if joint.orthosis
+    ]
+
+    def stored() -> float:
+        sign = 1.0 if way == "dorsiflexion" else -1.0
+        beyond = [max(sign * (replay.qpos[dof] - own.rest), 0.0) for dof, own in worn]
+        return sum(0.5 * own.stiffness * x**2 for x, (_, own) in zip(beyond, worn, strict=True))
+
+    held, taken, damped = [stored()], [0.0], 0.0
+    for control in controls:
+        replay.ctrl[:] = control
+        for _ in range(PHYSICS_STEPS_PER_WINDOW):
+            before = replay.qvel.copy()
+            mujoco.mj_step(biped.model, replay)
+            moved = 0.5 * (before + replay.qvel) * biped.model.opt.timestep
+            damping = -biped.model.dof_damping * before
+            damped += damping @ moved
+            taken.append(taken[-1] - (replay.qfrc_passive - damping) @ moved)
+            held.append(stored())
+    turned_over = np.abs(np.diff(held)).sum()
+    assert max(held) > 1.0 and turned_over > 20.0
+    np.testing.assert_allclose(np.array(held) - held[0], taken, atol=0.1 * max(held))
+    assert taken[-1] == pytest.approx(held[-1] - held[0], abs=0.002 * turned_over)
+    energy = np.concatenate([tick.work.energy for tick in ticks])
+    assert energy["passive_damping"].sum() == pytest.approx(damped - taken[-1], rel=1e-9)
+    change = energy["mechanical"][-1] - energy["mechanical"][0]
+    works = sum(energy[part][1:].sum() for part in ("actuators", "passive_damping", "contact", "pushes"))
+    assert abs(change - works) / settings.mass / 7 <= 0.01  # seven strides
+
+
 def test_changes_of_springs_are_those_that_every_step_reports():
     policy, settings = prepare("schedule", {"episode_seconds": 3.0})
     biped, ticks, reported = Biped(settings, 2), [], {}

@@ -23,6 +23,10 @@ WALKS = (
     ("schedule", {"slope_deg": 3.0}),
     ("schedule", {"height": 1.9, "mass": 100.0, "speed": 1.4}),
     ("schedule", {"right_foot": {"kind": "weak", "strength": 0.5, "orthosis": {"ankle_stiffness": 100.0}}}),
+    (
+        "schedule",
+        {"right_foot": {"kind": "intact", "orthosis": {"ankle_stiffness": 100.0, "engages": "dorsiflexion"}}},
+    ),
 )
 DEVICES = (
     ("rigid_toe", {"kind": "rigid_toe"}, [TOE]),
@@ -124,8 +128,8 @@ def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
     orthosis = settings.right_foot.foot.ankle.orthosis
     device = np.zeros((2, 4))
     if orthosis:
-        beta = 0.02 * np.sqrt(body.length_scale)
-        brace = orthosis.stiffness * (orthosis.rest - middle - beta * turn / TICK) * turn
+        beta = 0.0 if orthosis.engages else 0.02 * np.sqrt(body.length_scale)
+        brace = orthosis.stiffness * (np.clip(middle, *orthosis.slack) - middle - beta * turn / TICK) * turn
         device[RIGHT, ANKLE] = brace[1:-1, RIGHT, ANKLE].sum()
     parts = fibres - tendon + tissue + damping + device
     whole = work[1:-1].sum(0)

@@ -22,8 +22,10 @@ PASSIVE = {"kind": "passive", "ankle_stiffness": 400}
 KIND_LIST = ", ".join(map(repr, KINDS))
 OF_A_SPRING = "ankle_stiffness, ankle_deg, toe_stiffness, toe_deg, damping_time"
 RATIOS = "shank_mass_ratio, shank_com_ratio, shank_inertia_ratio, foot_mass_ratio, foot_inertia_ratio"
+OF_AN_ORTHOSIS = f"{OF_A_SPRING}, engages"
 OF_A_FOOT = f"{RATIOS}, orthosis, adapted"
 OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis, adapted"
+WAY_LIST = "one of 'dorsiflexion', 'plantarflexion'"
 OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis, adapted"
 
 WRONG_KINDS: list[tuple[Any, str]] = [
@@ -62,19 +64,23 @@ WRONG_KEYS: list[tuple[Any, str]] = [
     ({"kind": "no_toe", "mass": 1.0}, f"right_foot: a foot of kind 'no_toe' has no 'mass'; valid: {OF_A_FOOT}"),
     (
         {"kind": "drop", "orthosis": 20},
-        f"right_foot: orthosis must be a dictionary of {OF_A_SPRING}, got 20",
+        f"right_foot: orthosis must be a dictionary of {OF_AN_ORTHOSIS}, got 20",
     ),
     (
         {"kind": "drop", "orthosis": [20, 0]},
-        f"right_foot: orthosis must be a dictionary of {OF_A_SPRING}, got [20, 0]",
+        f"right_foot: orthosis must be a dictionary of {OF_AN_ORTHOSIS}, got [20, 0]",
     ),
     (
         {"kind": "drop", "orthosis": {"stiffness": 20}},
-        f"right_foot: orthosis: an orthosis has no 'stiffness'; valid: {OF_A_SPRING}",
+        f"right_foot: orthosis: an orthosis has no 'stiffness'; valid: {OF_AN_ORTHOSIS}",
     ),
     (
         {"kind": "drop", "orthosis": {"kind": "passive"}},
-        f"right_foot: orthosis: an orthosis has no 'kind'; valid: {OF_A_SPRING}",
+        f"right_foot: orthosis: an orthosis has no 'kind'; valid: {OF_AN_ORTHOSIS}",
+    ),
+    (
+        PASSIVE | {"engages": "dorsiflexion"},
+        f"right_foot: a foot of kind 'passive' has no 'engages'; valid: {OF_PASSIVE}",
     ),
 ]
 WRONG_NUMBERS: list[tuple[Any, str]] = [
@@ -108,6 +114,17 @@ WRONG_NUMBERS: list[tuple[Any, str]] = [
     (
         {"kind": "weak", "orthosis": {"ankle_deg": nan}},
         "right_foot: orthosis: ankle_deg must be in [-30, 30] deg, got nan",
+    ),
+    *(
+        (
+            {"kind": "weak", "orthosis": {"engages": way}},
+            f"right_foot: orthosis: engages must be {WAY_LIST}, got {way!r}",
+        )
+        for way in ("up", "", 1, True, ["dorsiflexion"])
+    ),
+    (
+        {"kind": "weak", "orthosis": {"engages": "dorsiflexion", "damping_time": 0}},
+        "right_foot: orthosis: give engages or damping_time, not both",
     ),
 ]
 WRONG = [*WRONG_KINDS, *WRONG_KEYS, *WRONG_NUMBERS]
@@ -163,6 +180,10 @@ def test_json_round_trip_keeps_a_foot_and_numbers_become_floats():
         "shank_mass_ratio": 0.6,
     }
     settings = settings_from(left_foot=foot, right_foot={"kind": "rigid"})
+    both_ways, one_way = ({"kind": "drop", "orthosis": {"engages": way}} for way in (None, "plantarflexion"))
+    assert settings_from(left_foot=both_ways).left_foot.plain == {"kind": "drop", "orthosis": {}}
+    worn = settings_from(left_foot=one_way)
+    assert settings_from(**json.loads(json.dumps(settings_to_json(worn)))) == worn and worn.left_foot.plain == one_way
     assert settings_from(**json.loads(json.dumps(settings_to_json(settings), allow_nan=False))) == settings
     assert settings.right_foot.plain == "rigid"
     foot["orthosis"]["ankle_stiffness"] = 99

@@ -163,6 +163,10 @@ def test_feet_of_other_kinds_are_told_drawn_and_measured_apart(tmp_path):
         ({"kind": "passive", "ankle_deg": 3.0}, "passive (ankle rest angle 3 deg)"),
         ({"kind": "passive", "ankle_table": [[-10, 60], [10, -60]]}, "passive (ankle table of 2 points)"),
         ({"kind": "drop", "orthosis": {}}, "drop (in an orthosis with no spring)"),
+        (
+            {"kind": "drop", "orthosis": {"ankle_stiffness": 90, "engages": "dorsiflexion"}},
+            "drop (in an orthosis with ankle stiffness 90 N m/rad in dorsiflexion alone)",
+        ),
     ],
 )
 def test_a_foot_in_words(setting, words):

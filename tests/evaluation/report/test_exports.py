@@ -106,7 +106,11 @@ BODIES = [
 ]
 
 
-@pytest.mark.parametrize("feet", [("intact", "intact"), ("no_toe", "rigid")])
+BRACED = {"kind": "weak", "orthosis": {"ankle_stiffness": 100 / 3, "ankle_deg": 1.7, "toe_stiffness": 9.1}}
+STOPPED = {"kind": "intact", "orthosis": {**BRACED["orthosis"], "engages": "dorsiflexion"}}
+
+
+@pytest.mark.parametrize("feet", [("intact", "intact"), ("no_toe", "rigid"), (BRACED, STOPPED)])
 @pytest.mark.parametrize("body", BODIES)
 def test_a_model_file_has_every_number_that_moves_the_body_to_the_last_bit(body, feet):
     left, right = feet
