@@ -49,9 +49,10 @@ def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
     features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))
     work = _chosen(tally.joint_work, mine)
     stance = _mean(_chosen(tally.toe_off, mine))
+    swings = np.array(tally.step_sides, int) == side  # steps that begin as this leg pushes off and the other one lands
     return {
         "strides": int(mine.sum()),
-        "step_length_m": _mean(_chosen(tally.step_length, np.array(tally.step_sides, int) == side)),
+        "step_length_m": _mean(_chosen(tally.step_length, swings)),
         "stance_percent": stance,
         "joint_range_deg": {
             joint: float(np.ptp(curves.mean(column))) if curves.count else None
@@ -65,6 +66,10 @@ def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
         "joint_work_J_kg": {
             joint: dict(zip(("positive", "negative"), _signs(work, index), strict=True))
             for index, joint in enumerate(JOINTS)
+        },
+        "com_work_J_kg": {
+            "push_off": _mean(_chosen(tally.push_off, swings)),
+            "collision": _mean(_chosen(tally.collision, ~swings)),
         },
         "toe_clearance_m": float(np.median(_chosen(tally.clearance, mine))) if mine.any() else None,
         "stiffness_Nm_rad": {

@@ -60,6 +60,9 @@ def test_the_legs_together_are_the_whole(recordings):
     steps = np.bincount(gait.tally.step_sides)
     mean = (steps * [left["step_length_m"], right["step_length_m"]]).sum() / steps.sum()
     assert mean == pytest.approx(gait.metrics["step_length_m"])
+    for name, of_leg in (("push_off", steps), ("collision", steps[::-1])):  # the other leg lands as one pushes off
+        mean = (of_leg * [leg["com_work_J_kg"][name] for leg in (left, right)]).sum() / steps.sum()
+        assert mean == pytest.approx(gait.metrics["com_work_J_kg"][name])
 
 
 def test_with_the_same_feet_there_are_no_legs_apart_and_they_are_alike(recordings):
