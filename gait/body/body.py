@@ -46,7 +46,8 @@ CARRIED_GYRATION = 0.15
 
 
 def gravity(slope: float) -> NDArray:
-    """Acceleration of gravity (2,) [m/s^2] in a frame that leans with a `slope` [rad], uphill positive."""
+    """Return the acceleration of gravity (forward, up) (2,) [m/s^2] in a frame that leans with a `slope` [rad], uphill
+    positive."""
     return -GRAVITY * np.array([sin(slope), cos(slope)])
 
 

@@ -118,7 +118,8 @@ def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArra
 
 
 def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion:
-    """Return a leg's motion from columns of four turns, hip x, hip z, and their time derivatives."""
+    """Return a leg's motion from columns (..., 6), four turns [rad], hip x and z [m], and their two time
+    derivatives."""
     return LegMotion(
         turn=value[..., :4],
         rate=rate[..., :4],
@@ -190,16 +191,16 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
         mass, inertia = _inertial(body)[index]
         com, acceleration = _com(body, motion, joints, index)
         # Newton and Euler about the segment's CoM, less the ground's push and the loads at the joint below.
-        below = force, turning
-        force = mass * (acceleration - gravity(slope)) + below[0]
-        turning = inertia * motion.acceleration[..., index] + below[1]
+        force_below = force
+        force = mass * (acceleration - gravity(slope)) + force_below
+        turning = inertia * motion.acceleration[..., index] + turning
         if index >= FOOT_SEGMENT:
             push = load.force[..., index - FOOT_SEGMENT, :]
             point = load.point[..., index - FOOT_SEGMENT, :]
             force = force - push
             turning = turning - _cross(point - com, push)
         if index < TOE_SEGMENT:
-            turning = turning + _cross(joints[index + 1] - com, below[0])
+            turning = turning + _cross(joints[index + 1] - com, force_below)
         turning = turning - _cross(joints[index] - com, force)
         moments[JOINTS[index]] = _MOMENT_SIGN[index] * turning
         forces[JOINTS[index]] = force
@@ -210,7 +211,7 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
 
 
 def _require_shapes(holder: object, last: Mapping[str, int], leading: tuple[int, ...]) -> None:
-    """Raise `SpringfootError` unless the arrays of `holder` have the shapes (*leading, last[name])."""
+    """Raise `SpringfootError` unless each array named in `last` has the shape (*leading, last[name]) in `holder`."""
     for name, size in last.items():
         shape = getattr(holder, name).shape
         if shape != (*leading, size):
@@ -223,7 +224,7 @@ def _cross(r: NDArray, force: NDArray) -> NDArray:
 
 
 def _far_ends(body: Body) -> tuple[tuple[float, float], ...]:
-    """Return the next joint (forward, up) [m] from the upper joint of thigh, shank, foot, at turn 0."""
+    """Return the vectors (forward, up) [m] from the upper to the lower joint of thigh, shank and foot, at turn 0."""
     drop = body.ankle_height - body.toe_joint_height
     return (0.0, -body.thigh_length), (0.0, -body.shank_length), (body.ankle_to_toe_joint, -drop)
 
@@ -239,15 +240,18 @@ def _inertial(body: Body) -> tuple[tuple[float, float], ...]:
 
 
 def _com(body: Body, motion: LegMotion, joints: list[NDArray], index: int) -> tuple[NDArray, NDArray]:
-    """Return the CoM (..., 2) [m] of a segment and its acceleration [m/s^2], along the chain from the hip."""
+    """Return the CoM (..., 2) [m] of segment `index` and its acceleration (..., 2) [m/s^2].
+
+    `joints` are the positions (..., 2) [m] of `JOINTS`.
+    """
     forward, below = body.foot_com
     com_from_joint = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
     com = joints[index] + np.stack(turned(motion.turn[..., index], *com_from_joint[index]), -1)
     # From the hip down, each segment adds its tangential and centripetal acceleration.
     acceleration = motion.hip_acceleration
     for segment, (start, end) in enumerate(zip(joints[: index + 1], [*joints[1 : index + 1], com], strict=True)):
-        across = end - start
-        spun = np.stack([-across[..., 1], across[..., 0]], -1)
-        acceleration = acceleration + motion.acceleration[..., segment, None] * spun
-        acceleration = acceleration - motion.rate[..., segment, None] ** 2 * across
+        offset = end - start
+        tangential_unit = np.stack([-offset[..., 1], offset[..., 0]], -1)
+        acceleration = acceleration + motion.acceleration[..., segment, None] * tangential_unit
+        acceleration = acceleration - motion.rate[..., segment, None] ** 2 * offset
     return com, acceleration

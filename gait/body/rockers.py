@@ -15,29 +15,30 @@ def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArra
 
 
 def rising(top: float, phase: ArrayLike, start: float, end: float, shape: float | tuple[float, float]) -> NDArray:
-    """Return (3, ...): 0 until `start`, then rising to `top` at `end`, with two phase derivatives.
+    """Return a pitch that is 0 until phase `start` and then rises to `top` at `end`, and its two phase derivatives.
 
-    The `shape` is a power; or, for a polynomial of 2nd to 4th order, the fraction of `top` half-way and the rate at the
-    end over the mean rate.
+    The result is (3, ...). The rise is a power of the time since `start`, `shape`; or, with a pair, a polynomial of 2nd
+    to 4th order with that fraction of `top` half-way and that rate at the end over the mean rate.
     """
     duration = end - start
-    done = np.maximum((np.asarray(phase) - start) / duration, 0.0)
+    progress = np.maximum((np.asarray(phase) - start) / duration, 0.0)
     if isinstance(shape, tuple):
-        half, fast = shape
+        half_way, end_rate = shape
         # a + b + c = 1, 4 a + 2 b + c = 16 half, 2 a + 3 b + 4 c = fast
-        a = 16 * half - 5 + fast
-        b = 14 - 32 * half - 3 * fast
+        a = 16 * half_way - 5 + end_rate
+        b = 14 - 32 * half_way - 3 * end_rate
         curve = Polynomial([0.0, 0.0, a, b, 1 - a - b])
-        return top * np.stack([curve.deriv(n)(done) / duration**n for n in range(3)])
+        return top * np.stack([curve.deriv(n)(progress) / duration**n for n in range(3)])
     power = shape
-    rate = top * power / duration * done ** (power - 1)
-    return np.stack([top * done**power, rate, top * power * (power - 1) / duration**2 * done ** (power - 2)])
+    rate = top * power / duration * progress ** (power - 1)
+    return np.stack([top * progress**power, rate, top * power * (power - 1) / duration**2 * progress ** (power - 2)])
 
 
 def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
-    """Return (3, 3, ...): x, z, pitch of the ankle while a foot turns about a fixed `pivot`, and two phase derivatives.
+    """Return the ankle's x, z [m] and pitch [rad] while a foot turns about a fixed `pivot`, and two phase derivatives.
 
-    `pitch` (3, ...) [rad] has two phase derivatives too; `pivot` (x, z) [m] is in the frame of the flat foot.
+    The result is (derivative, coordinate, ...), (3, 3, ...). `pitch` (3, ...) [rad] has two phase derivatives too;
+    `pivot` (x, z) [m] is in the frame of the flat foot.
     """
     ankle = turning(pitch, -pivot[0], body.ankle_height - pivot[1])
     ankle[0, 0] += pivot[0]
@@ -46,9 +47,9 @@ def rolling(pitch: NDArray, pivot: tuple[float, float], body: Body) -> NDArray:
 
 
 def turning(pitch: NDArray, forward: float, up: float) -> NDArray:
-    """Return (3, 2, ...): the vector (forward, up) of a flat foot and its two phase derivatives.
+    """Turn the vector (forward, up) of a flat foot by a pitch: return it, (x, z), and two phase derivatives.
 
-    `pitch` (3, ...) has the pitch and its two phase derivatives.
+    The result is (derivative, coordinate, ...), (3, 2, ...). `pitch` (3, ...) [rad] has two phase derivatives too.
     """
     angle, rate, curvature = pitch
     x, z = turned(angle, forward, up)

@@ -27,12 +27,15 @@ _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles
 
 
 def read_c3d(path: Path) -> Trial:
-    """Return the walk in a C3D file with Plug-in Gait output, read in this process (`c3d_process` reads it in another).
+    """Return the walk in a C3D file with Plug-in Gait output; `c3d_process` calls this in a child process.
 
-    It reads the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot
-    Model's `LHXFFA` (toe) [deg] and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg]; right with R;
-    the events Foot Strike and Foot Off; and the force plates, where the markers LHEE, LTOE, RHEE and RTOE tell the foot
-    on each plate and the forward direction.
+    It reads these, and for the right leg the same with R in place of L:
+    - the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot Model's
+      `LHXFFA` (toe) [deg], and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg];
+    - the events Foot Strike and Foot Off;
+    - the force plates; the markers `LHEE` and `LTOE` tell the foot on each plate, and the forward direction.
+
+    Raises `SpringfootError` for a file that ezc3d cannot read, or with gaps.
     """
     import ezc3d  # an extra: only C3D files need it
 
@@ -48,31 +51,31 @@ def read_c3d(path: Path) -> Trial:
     parameters = file["parameters"]
     rate = float(file["header"]["points"]["frame_rate"])
     labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
-    found = {label: points[:3, k] for k, label in enumerate(labels)}
+    markers = {label: points[:3, k] for k, label in enumerate(labels)}
     legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
     newton_metres = parameters["POINT"].get("MOMENT_UNITS", {}).get("value", ["Nmm"])[0].strip() == "Nm"
     for side, curves in legs.items():
         letter = side[0].upper()
         for curve, label in _PLUG_IN_GAIT.items():
-            if letter + label in found:
-                x = found[letter + label][0]
+            if letter + label in markers:
+                x = markers[letter + label][0]
                 curves[curve] = np.radians(x) if "moment" not in curve else x * (1.0 if newton_metres else 1e-3)
-        if "hip" in curves and f"{letter}PelvisAngles" in found:
-            curves["thigh"] = curves["hip"] - np.radians(found[f"{letter}PelvisAngles"][0])
-        if np.nanmean(curves.get("ankle_moment", [0.0])) < 0:
+        if "hip" in curves and f"{letter}PelvisAngles" in markers:
+            curves["thigh"] = curves["hip"] - np.radians(markers[f"{letter}PelvisAngles"][0])
+        if np.nanmean(curves.get("ankle_moment", [0.0])) < 0:  # external moments
             for name in ("hip_moment", "knee_moment", "ankle_moment"):
                 curves[name] = -curves[name]
     frames = points.shape[2]
-    feet = {side: (found.get(f"{side[0].upper()}HEE"), found.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
+    feet = {side: (markers.get(f"{side[0].upper()}HEE"), markers.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
     for side, (vertical, forward) in _plate_forces(file["data"].get("platform") or [], feet, frames).items():
         legs[side] |= {"grf_vertical": vertical, "grf_forward": forward}
     legs = not_empty(path.name, legs)
-    whole = _without_gaps(path.name, legs, frames)
+    complete = _without_gaps(path.name, legs, frames)
     first = int(file["header"]["points"]["first_frame"])
     return Trial(
         name=path.name,
-        time=(first + np.arange(frames)[whole]) / rate,
-        legs={side: {name: values[whole] for name, values in curves.items()} for side, curves in legs.items()},
+        time=(first + np.arange(frames)[complete]) / rate,
+        legs={side: {name: values[complete] for name, values in curves.items()} for side, curves in legs.items()},
         unscaled=FORCES,
         contacts=_events(parameters.get("EVENT", {})),
         speed=None,
@@ -80,9 +83,10 @@ def read_c3d(path: Path) -> Trial:
 
 
 def _refuse_broken(path: Path) -> None:
-    """Raise `SpringfootError` for a file that is not whole: ezc3d would hang, crash or make up frames.
+    """Raise `SpringfootError` for a damaged or shortened file: ezc3d would hang, crash or make up frames.
 
-    Layout as in the C3D User Guide (c3d.org): header, a chain of parameters, the data, in blocks of 512 bytes.
+    Layout as in the C3D User Guide (c3d.org): blocks of 512 bytes with the header, a chain of groups and parameters,
+    and the data. The checks walk the chain as ezc3d would, and compare the file's length with what its header says.
     """
     data = read_bytes(path)
     broken = SpringfootError(f"{path.name} is not a C3D file, or it is damaged")
@@ -91,35 +95,37 @@ def _refuse_broken(path: Path) -> None:
         order = {84: "little", 85: "little", 86: "big"}[data[start + 3]]  # Intel, DEC, MIPS
         sign_byte = {84: 15, 85: 13, 86: 12}[data[start + 3]]  # of the scale: negative for floating-point data
 
-        def word(at: int) -> int:
-            return int.from_bytes(data[at : at + 2], order)  # type: ignore[arg-type]
+        def word(position: int) -> int:  # 16 bits
+            return int.from_bytes(data[position : position + 2], order)  # type: ignore[arg-type]
 
         end = start + 512 * data[start + 2]
         if data[1] != 80 or start < 512 or not start < end <= len(data):
             raise broken
-        at = start + 4
-        while length := min(data[at], 256 - data[at]):  # negative for a locked one
-            link = at + 2 + length
+        # An entry: length of its name (negative if locked), its group's number, name, link to the next entry, content.
+        position = start + 4
+        while length := min(data[position], 256 - data[position]):
+            link = position + 2 + length
             content = link + 2
             following = link + word(link)
-            if data[at + 1] < 128:  # a parameter: type, dimensions, values; groups have negative numbers
+            if data[position + 1] < 128:  # a parameter: type, dimensions, values; groups have negative numbers
                 size = data[content]
                 dimensions = data[content + 2 : content + 2 + data[content + 1]]
                 content += 2 + len(dimensions) + min(size, 256 - size) * prod(dimensions)
             if following == link:
                 following = end
-            named = data[at + 1] != 0 and data[link - length : link].isascii()
-            if not named or content > following or following > end:
+            has_name = data[position + 1] != 0 and data[link - length : link].isascii()
+            if not has_name or content > following or following > end:
                 raise broken
-            at = following
-            if at == end:
+            position = following
+            if position == end:
                 break
+        # Words of the header: 2 3-D points, 4 analog samples a frame, 6 first and 8 last frame, 16 first block of data.
         frames = word(8) - word(6) + 1
-        whole = 512 * (word(16) - 1) + frames * (4 * word(2) + word(4)) * (4 if data[sign_byte] & 128 else 2)
+        expected = 512 * (word(16) - 1) + frames * (4 * word(2) + word(4)) * (4 if data[sign_byte] & 128 else 2)
     except (IndexError, KeyError):
         raise broken from None
-    if len(data) < whole and word(8) < 65535:  # the counter of frames ends there
-        raise SpringfootError(f"{path.name} is cut short: {len(data)} of {whole} bytes")
+    if len(data) < expected and word(8) < 65535:  # the largest 16-bit number: a longer recording's true end is unknown
+        raise SpringfootError(f"{path.name} is cut short: {len(data)} of {expected} bytes")
 
 
 def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
@@ -127,21 +133,25 @@ def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
     contexts, labels = (event.get(key, {}).get("value", []) for key in ("CONTEXTS", "LABELS"))
     times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")
     seconds = 60 * times[0] + times[1]
-    found: dict[tuple[str, str], list[float]] = {}
+    seconds_of: dict[tuple[str, str], list[float]] = {}
     for context, label, second in zip(contexts, labels, seconds, strict=False):
-        found.setdefault((context.strip().lower(), label.strip().lower()), []).append(float(second))
+        seconds_of.setdefault((context.strip().lower(), label.strip().lower()), []).append(float(second))
     return {
         side: Contacts(
-            heel_strikes=np.sort(found[side, "foot strike"]), toe_offs=np.sort(found.get((side, "foot off"), []))
+            heel_strikes=np.sort(seconds_of[side, "foot strike"]),
+            toe_offs=np.sort(seconds_of.get((side, "foot off"), [])),
         )
         for side in FILE_SIDES
-        if (side, "foot strike") in found
+        if (side, "foot strike") in seconds_of
     }
 
 
 def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int) -> dict[str, tuple[NDArray, NDArray]]:
-    """Return side -> force up and forward (T,) [N] of each foot, from the plates and the markers of heels and toes (3,
-    T)."""
+    """Return side -> force up and forward (T,) [N] of each foot.
+
+    `plates` are ezc3d's; `feet` is side -> markers of heel and toe (3, T), None if missing. Each contact on a plate
+    belongs to the foot whose markers are nearest to its centre of pressure.
+    """
     if any(marker is None for pair in feet.values() for marker in pair):
         return {}
     total = {side: np.zeros((3, frames)) for side in FILE_SIDES}
@@ -149,28 +159,30 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
         force, cop = (_per_frame(np.asarray(plate[key]), frames) for key in ("force", "center_of_pressure"))
         if plate["unit_force"] == "kN":
             force = 1000 * force
+        # Each run of loaded frames is a contact.
         loaded = np.abs(force).max(axis=0) > PLATE_LOAD
         edges = np.flatnonzero(np.diff(np.concatenate([[False], loaded, [False]]).astype(int)))
         for start, stop in edges.reshape(-1, 2):
-            at = slice(start, stop)
-            apart = {
-                side: np.nanmean(np.linalg.norm((heel + toe)[:, at] / 2 - cop[:, at], axis=0))
+            contact = slice(start, stop)
+            distances = {
+                side: np.nanmean(np.linalg.norm((heel + toe)[:, contact] / 2 - cop[:, contact], axis=0))
                 for side, (heel, toe) in feet.items()
-                if np.isfinite((heel + toe)[:, at]).all(axis=0).any()
+                if np.isfinite((heel + toe)[:, contact]).all(axis=0).any()
             }
-            if apart:
-                total[min(apart, key=lambda side: apart[side])][:, at] += force[:, at]
-    whole = np.concatenate(list(total.values()), axis=1)
-    if not whole.any():
+            if distances:
+                total[min(distances, key=lambda side: distances[side])][:, contact] += force[:, contact]
+    forces = np.concatenate(list(total.values()), axis=1)
+    if not forces.any():
         return {}
-    up = int(np.abs(whole.sum(axis=1)).argmax())
-    ahead = np.mean([np.nanmean(toe - heel, axis=1) for heel, toe in feet.values()], axis=0)
-    ahead[up] = 0.0
-    forward = int(np.abs(ahead).argmax())
-    # A plate reports the force of the foot on it, or its own force on the foot: the latter points up.
-    sign = np.sign(whole.sum(axis=1)[up])
+    # The laboratory's axes: up is the largest force's, forward that of heel to toe.
+    up = int(np.abs(forces.sum(axis=1)).argmax())
+    foot_direction = np.mean([np.nanmean(toe - heel, axis=1) for heel, toe in feet.values()], axis=0)
+    foot_direction[up] = 0.0
+    forward = int(np.abs(foot_direction).argmax())
+    # A plate reports the foot's force on the plate, or the plate's on the foot, which points up: make it that one.
+    sign = np.sign(forces.sum(axis=1)[up])
     return {
-        side: (sign * force[up], sign * np.sign(ahead[forward]) * force[forward])
+        side: (sign * force[up], sign * np.sign(foot_direction[forward]) * force[forward])
         for side, force in total.items()
         if force.any()
     }
@@ -187,15 +199,15 @@ def _per_frame(samples: NDArray, frames: int) -> NDArray:
 def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
     """Return the frames without the gaps at the record's beginning and end; raise `SpringfootError` for a gap in
     between."""
-    broken = {
+    missing = {
         f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()
     }
-    good = np.flatnonzero(~np.any(list(broken.values()), axis=0))
-    if not len(good):
-        raise SpringfootError(f"{name}: no frame has {', '.join(broken)}")
-    whole = slice(int(good[0]), int(good[-1]) + 1)
-    for curve, flags in broken.items():
-        if flags[whole].any():
-            frame = int(np.flatnonzero(flags[whole])[0]) + whole.start
+    complete = np.flatnonzero(~np.any(list(missing.values()), axis=0))
+    if not len(complete):
+        raise SpringfootError(f"{name}: no frame has {', '.join(missing)}")
+    kept = slice(int(complete[0]), int(complete[-1]) + 1)
+    for curve, flags in missing.items():
+        if flags[kept].any():
+            frame = int(np.flatnonzero(flags[kept])[0]) + kept.start
             raise SpringfootError(f"{name}, frame {frame + 1}, {curve}: a gap; fill it in the laboratory's software")
-    return whole
+    return kept

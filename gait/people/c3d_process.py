@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.errors import SpringfootError, quoted
-from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, in_process
+from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, output_in_process
 from springfoot.files.text_table import existing
 
 from .contacts import Contacts
@@ -25,26 +25,26 @@ def c3d_trial(path: Path) -> Trial:
     file."""
     if find_spec("ezc3d") is None:
         raise SpringfootError(f"{path.name}: reading C3D needs ezc3d; install springfoot[c3d]")
-    said = in_process(_CHILD, str(existing(path).absolute()))
-    if said is None:
+    output = output_in_process(_CHILD, str(existing(path).absolute()))
+    if output is None:
         raise SpringfootError(
             f"{path.name} is damaged: ezc3d crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"
         )
-    with np.load(io.BytesIO(said)) as file:
+    with np.load(io.BytesIO(output)) as file:
         arrays = dict(file)
     return _trial(json.loads(str(arrays.pop("header"))), arrays)
 
 
 def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
-    """Return the walk in the arrays and the JSON text of the child process."""
+    """Return the walk that the child process has written, as its header and arrays; raise the child's error."""
     if "error" in header:
         raise SpringfootError(header["error"])
     legs: dict[str, dict[str, np.ndarray]] = {}
     contacts: dict[str, dict[str, np.ndarray]] = {}
     for name, values in arrays.items():
-        kind, side, what = name.split("/")
+        kind, side, curve = name.split("/")
         if kind != "time":
-            {"leg": legs, "contacts": contacts}[kind].setdefault(side, {})[what] = values
+            {"leg": legs, "contacts": contacts}[kind].setdefault(side, {})[curve] = values
     return Trial(
         name=header["name"],
         time=arrays["time//"],
@@ -56,13 +56,13 @@ def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
 
 
 def main() -> None:
-    """Run the child: read the file that the command line names, write its numbers to standard output."""
+    """Run the child process: read the C3D file named on the command line, write its curves to standard output."""
     import ezc3d  # noqa: F401  # before the bounds
 
     from .c3d_file import read_c3d
 
     out = os.dup(1)
-    os.dup2(2, 1)  # what a library prints is not ours
+    os.dup2(2, 1)  # what libraries print goes to standard error
     bound_resources()
     arrays: dict[str, np.ndarray] = {}
     try:
@@ -77,8 +77,8 @@ def main() -> None:
         header = {"error": str(error)}
         arrays = {}
     except Exception as error:  # whatever a damaged file makes of ezc3d's answers
-        what = f"{Path(sys.argv[1]).name} is not a C3D file, or it is damaged"
-        header = {"error": f"{what}: {type(error).__name__}: {quoted(str(error))}"}
+        fault = f"{Path(sys.argv[1]).name} is not a C3D file, or it is damaged"
+        header = {"error": f"{fault}: {type(error).__name__}: {quoted(str(error))}"}
         arrays = {}
     with os.fdopen(out, "wb") as file:
         buffer = io.BytesIO()

@@ -111,7 +111,7 @@ AS_IT_IS = "if it is right, trust_units takes it as it is"
 
 
 def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | None = None) -> None:
-    """Raise `SpringfootError`, with the finding and a guess of its cause, for mean curves (101,) that no walk has.
+    """Raise `SpringfootError` for mean curves (101,) that no walk has, with the likeliest cause, such as a wrong unit.
 
     Args:
         name: of the file.
@@ -120,12 +120,13 @@ def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | N
         sd: spreads (101,) of some of the curves.
     """
     usual = {curve: people.mean(curve, PERCENT / 100) for curve in COLUMNS}
-    for seen in _doubts(mean, usual):
-        raise SpringfootError(f"{name}: {seen}; {AS_IT_IS}")
+    if doubt := next(_doubts(mean, usual), None):
+        raise SpringfootError(f"{name}: {doubt}; {AS_IT_IS}")
     for curve, spread in (sd or {}).items():
         if not 0 <= spread.min() <= spread.max() <= MOST_SPREAD * max(np.ptp(usual[curve]), np.ptp(mean[curve])):
             raise SpringfootError(
-                f"{name}: {COLUMNS[curve]}_sd must lie from 0 to twice the range of its curve; {AS_IT_IS}"
+                f"{name}: {COLUMNS[curve]}_sd must lie from 0 to {MOST_SPREAD:g} times the range of its curve, or of "
+                f"people's if that is larger; {AS_IT_IS}"
             )
 
 
@@ -159,40 +160,41 @@ def _bears_downward(force: NDArray) -> bool:
 
 
 def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Yield guesses of the fault, the surest first; `usual` has all of people's curves."""
+    """Yield texts that say why mean curves (101,) cannot be right, the surest first; `usual` are people's curves."""
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
             f"the knee is at {np.degrees(mean['knee']).mean():.0f} deg on the average: the angle between thigh and "
             "shank? flexion is 180 deg less that"
         )
     sizes = {curve: float(np.ptp(mean[curve]) / np.ptp(usual[curve])) for curve in mean}
-    yield from _rough(mean, usual)
+    yield from _noisy(mean, usual)
     yield from _wrong_size(mean, sizes)
-    told = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
-    late = {curve: _likeness(mean[curve], usual[curve]) for curve in told}
-    backward = {curve: _likeness(mean[curve][::-1], usual[curve]) for curve in told}
-    yield from _at_another_time(late, backward)
-    levers = [curve for curve in _LEVERS if curve in mean]
-    if len(levers) > 1 and all(curve in late and late[curve][0] < TURNED for curve in levers):
+    large_enough = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
+    likeness = {curve: _likeness(mean[curve], usual[curve]) for curve in large_enough}
+    backward = {curve: _likeness(mean[curve][::-1], usual[curve]) for curve in large_enough}
+    yield from _at_another_time(likeness, backward)
+    moments = [curve for curve in _LEVERS if curve in mean]
+    if len(moments) > 1 and all(curve in likeness and likeness[curve][0] < TURNED for curve in moments):
         yield "hip, knee and ankle moments are opposite to people's: external moments? internal ones are needed"
-    strange = [
+    unlike = [
         curve
-        for curve in told
-        if late[curve][0] < CURVE_LIMITS[curve].likeness
-        or (curve in SHAPED and late[curve][HALF_A_STRIDE].max() - late[curve][0] > HALF_GAIN)
+        for curve in large_enough
+        if likeness[curve][0] < CURVE_LIMITS[curve].likeness
+        or (curve in SHAPED and likeness[curve][HALF_A_STRIDE].max() - likeness[curve][0] > HALF_GAIN)
     ]
-    guesses = {curve: _guess(curve, mean[curve], usual, late[curve], backward[curve][0]) for curve in strange}
-    for curve in strange:
+    # A curve unlike people's gets a guess of the cause. Those of the wrong sign are surer than the next two checks.
+    guesses = {curve: _guess(curve, mean[curve], usual, likeness[curve], backward[curve][0]) for curve in unlike}
+    for curve in unlike:
         if guesses[curve] == _OPPOSITE:
-            yield f"{COLUMNS[curve]} is opposite to people's (r = {late[curve][0]:.2f}): {_sign(curve)}"
-    yield from _moved(mean, usual)
-    yield from _unborne(mean)
+            yield f"{COLUMNS[curve]} is opposite to people's (r = {likeness[curve][0]:.2f}): {_sign(curve)}"
+    yield from _other_zero(mean, usual)
+    yield from _misfit_forces(mean)
     for curve, guess in guesses.items():
-        yield f"{COLUMNS[curve]} is not like people's (r = {late[curve][0]:.2f}){guess}?"
+        yield f"{COLUMNS[curve]} is not like people's (r = {likeness[curve][0]:.2f}){guess}?"
 
 
-def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Yield curves with more noise than `ROUGHNESS`."""
+def _noisy(mean: Curves, usual: Curves) -> Iterator[str]:
+    """Yield a text for each curve with more noise than `ROUGHNESS`."""
     for curve, values in mean.items():
         jump = float(np.median(np.abs(np.diff(values, 2))))
         if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
@@ -200,7 +202,10 @@ def _rough(mean: Curves, usual: Curves) -> Iterator[str]:
 
 
 def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
-    """Yield curves that are too large or too small, with the mistaken unit if there is one."""
+    """Yield a text for each curve that is too large or too small, with the mistaken unit if there is one.
+
+    `sizes` are excursions over people's.
+    """
     for curve, size in sizes.items():
         kind = _kind(curve)
         low, high, _ = CURVE_LIMITS[curve]
@@ -218,29 +223,32 @@ def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
 
 
 def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
-    """Tell whether the curve hardly moves in some walks; not if all curves of its kind do so, as in a wrong unit."""
+    """Tell whether a curve may be this small because some walks hardly have it, and not by a wrong unit.
+
+    In a wrong unit all curves of its kind would be small.
+    """
     rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < CURVE_LIMITS["ankle"].least
-    others = [size >= CURVE_LIMITS[each].least for each, size in sizes.items() if _kind(each) == _kind(curve)]
+    others = [size >= CURVE_LIMITS[name].least for name, size in sizes.items() if _kind(name) == _kind(curve)]
     return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
 
 
 def _unit(kind: str, size: float) -> str:
-    """Return the unit that makes a curve that many times as large, if there is one."""
+    """Return the mistaken unit that makes a curve about `size` times as large as people's, or a vaguer cause."""
     factors = MISTAKEN_UNITS[kind]
-    unit = min(factors, key=lambda each: abs(np.log(size / factors[each])))
-    near = abs(np.log(size / factors[unit])) < np.log(NEAR_UNIT)
-    return unit if near else "another scale, or another joint's"
+    nearest = min(factors, key=lambda unit: abs(np.log(size / factors[unit])))
+    near = abs(np.log(size / factors[nearest])) < np.log(NEAR_UNIT)
+    return nearest if near else "another scale, or another joint's"
 
 
-def _moved(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Yield angles with another zero than ours."""
-    for curve in (each for each in mean if each in _ALL_ANGLES):
-        off = float(mean[curve].mean() - usual[curve].mean())
-        if abs(off) > LARGEST_OFFSET:
+def _other_zero(mean: Curves, usual: Curves) -> Iterator[str]:
+    """Yield a text for each angle whose mean is far from people's, as if counted from another zero."""
+    for curve in (name for name in mean if name in _ALL_ANGLES):
+        offset = float(mean[curve].mean() - usual[curve].mean())
+        if abs(offset) > LARGEST_OFFSET:
             yield (
                 f"{COLUMNS[curve]} is {np.degrees(mean[curve].mean()):.0f} deg on the average, "
-                f"{np.degrees(abs(off)):.0f} deg {'more' if off > 0 else 'less'} than people's: from another zero? "
-                f"0 is {_ZEROS.get(curve, 'a straight leg')}"
+                f"{np.degrees(abs(offset)):.0f} deg {'more' if offset > 0 else 'less'} than people's: from another "
+                f"zero? 0 is {_ZEROS.get(curve, 'a straight leg')}"
             )
 
 
@@ -257,23 +265,26 @@ def _as_written(curve: str, values: NDArray) -> tuple[float, float]:
     return float(values.min()) * unit, float(values.max()) * unit
 
 
-def _at_another_time(late: Curves, backward: Curves) -> Iterator[str]:
-    """Yield the shift, or the reversal, by which every curve comes nearer to people's."""
-    if len(late) < 2:
+def _at_another_time(likeness: Curves, backward: Curves) -> Iterator[str]:
+    """Yield a text if one shift of all curves, or their reversal in time, brings each nearer to people's.
+
+    `likeness` and `backward` are curve -> correlations (100,) of the curve and of the reversed curve (`_likeness`).
+    """
+    if len(likeness) < 2:
         return
-    present = np.array([[each[0]] for each in late.values()])
-    shifted = np.array([*late.values()]) - present
-    reversed_ = np.array([*backward.values()]) - present
-    best = LEAST_SHIFT + int(shifted.sum(axis=0)[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
-    forward = shifted[:, best].min() > SHIFT_GAIN
-    turn = int(reversed_.sum(axis=0).argmax())
-    if reversed_[:, turn].min() > 0 and reversed_[:, turn].mean() > max(
-        REVERSED_GAIN, shifted[:, best].mean() if forward else 0.0
+    unshifted = np.array([[correlations[0]] for correlations in likeness.values()])
+    shift_gain = np.array([*likeness.values()]) - unshifted
+    reversed_gain = np.array([*backward.values()]) - unshifted
+    shift = LEAST_SHIFT + int(shift_gain.sum(axis=0)[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
+    is_shifted = shift_gain[:, shift].min() > SHIFT_GAIN
+    reversed_shift = int(reversed_gain.sum(axis=0).argmax())
+    if reversed_gain[:, reversed_shift].min() > 0 and reversed_gain[:, reversed_shift].mean() > max(
+        REVERSED_GAIN, shift_gain[:, shift].mean() if is_shifted else 0.0
     ):
         yield "its curves are people's backward in time: were the samples reversed?"
-    elif forward:
+    elif is_shifted:
         yield (
-            f"its curves are people's {best} % of the stride late: does it begin at the other foot's heel strike? "
+            f"its curves are people's {shift} % of the stride late: does it begin at the other foot's heel strike? "
             "0 % must be that of the same foot"
         )
 
@@ -281,23 +292,26 @@ def _at_another_time(late: Curves, backward: Curves) -> Iterator[str]:
 _OPPOSITE = ": opposite"
 
 
-def _guess(curve: str, values: NDArray, usual: Curves, late: NDArray, backward: float) -> str:
-    """Return the change that makes a curve most like people's."""
-    at = LEAST_SHIFT + int(late[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
-    others = [each for each in usual if each != curve and _kind(each) == _kind(curve)]
-    like = {each: _likeness(values, usual[each])[0] for each in others}
-    other = max(like, key=lambda each: like[each])
+def _guess(curve: str, values: NDArray, usual: Curves, likeness: NDArray, backward: float) -> str:
+    """Return words for the change that makes a curve most like people's: turned, reversed, shifted, or another's name.
+
+    `likeness` (100,) is its `_likeness`, `backward` the correlation of the reversed curve.
+    """
+    shift = LEAST_SHIFT + int(likeness[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
+    others = [other for other in usual if other != curve and _kind(other) == _kind(curve)]
+    likeness_of_others = {other: _likeness(values, usual[other])[0] for other in others}
+    likest = max(likeness_of_others, key=lambda other: likeness_of_others[other])
     gains = {
-        _OPPOSITE: -late[0],
+        _OPPOSITE: -likeness[0],
         ": backward in time": backward,
-        f", but so {at} % of the stride late: of the other foot": late[at],
-        f", but like {COLUMNS[other]}: were columns interchanged": like[other],
+        f", but so {shift} % of the stride late: of the other foot": likeness[shift],
+        f", but like {COLUMNS[likest]}: were columns interchanged": likeness_of_others[likest],
     }
-    return max(gains, key=lambda each: gains[each])
+    return max(gains, key=lambda other: gains[other])
 
 
-def _unborne(mean: Curves) -> Iterator[str]:
-    """Yield forces that bear no body, and an ankle moment that does not fit the forces and a foot's lever."""
+def _misfit_forces(mean: Curves) -> Iterator[str]:
+    """Yield a text if the vertical force does not bear half a body, or does not fit the ankle's moment."""
     if "grf_vertical" not in mean:
         return
     force = mean["grf_vertical"]
@@ -311,6 +325,7 @@ def _unborne(mean: Curves) -> Iterator[str]:
         return
     peak = int(mean["ankle_moment"].argmax())
     column = COLUMNS["ankle_moment"]
+    # [N m/kg] over [body weights] x g is the distance [m] of the force from the ankle.
     lever = float(mean["ankle_moment"][peak] / (GRAVITY * max(force[peak], LEAST_LOAD)))
     if force[peak] < LEAST_LOAD:
         yield (
@@ -318,25 +333,25 @@ def _unborne(mean: Curves) -> Iterator[str]:
             "moment and force of one foot?"
         )
     elif not nearest <= lever <= farthest:
-        than = "longer" if lever > farthest else "shorter"
+        comparison = "longer" if lever > farthest else "shorter"
         yield (
-            f"{column} at its peak is the force at a lever of {lever:.2g} m, {than} than a foot's: N m/kg and body "
-            "weights?"
+            f"{column} at its peak is the force at a lever of {lever:.2g} m, {comparison} than a foot's: N m/kg and "
+            "body weights?"
         )
 
 
 def _likeness(values: NDArray, usual: NDArray) -> NDArray:
-    """Return (100,) correlations with `usual` of the curve moved earlier by 0 to 99 % of the stride.
+    """Return (100,) correlations of a curve (101,) with people's, `usual`, after shifts of 0 to 99 % of the stride.
 
-    A circular cross-correlation, by Fourier transform.
+    Shifts are towards earlier. It is a circular cross-correlation, by Fourier transform.
     """
-    one, other = (each[:-1] - each[:-1].mean() for each in (values, usual))
-    scale = float(np.sqrt((one @ one) * (other @ other))) or 1.0
-    return np.fft.irfft(np.fft.rfft(one) * np.conj(np.fft.rfft(other)), len(one)) / scale
+    centred, usual_centred = (curve[:-1] - curve[:-1].mean() for curve in (values, usual))
+    scale = float(np.sqrt((centred @ centred) * (usual_centred @ usual_centred))) or 1.0
+    return np.fft.irfft(np.fft.rfft(centred) * np.conj(np.fft.rfft(usual_centred)), len(centred)) / scale
 
 
 def _sign(curve: str) -> str:
-    """Return the names of the numbers that must be positive."""
+    """Return a text that says which direction of a curve must be positive."""
     positive = {"knee_moment": "extension", "hip_moment": "extension", "ankle_moment": "plantarflexion"}
     positive |= {"ankle": "dorsiflexion", "toe": "toe-up", "grf_vertical": "up", "grf_forward": "forward"}
     default = "generation" if curve.endswith("power") else "flexion"

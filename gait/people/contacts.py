@@ -54,8 +54,8 @@ def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first:
     falls = np.flatnonzero(loaded[:-1] & ~loaded[1:])
 
     def crossing(before: NDArray) -> NDArray:
-        share = (threshold - force[before]) / (force[before + 1] - force[before])
-        return first + tick * (before + share)
+        fraction = (threshold - force[before]) / (force[before + 1] - force[before])
+        return first + tick * (before + fraction)
 
     return Contacts(heel_strikes=crossing(rises), toe_offs=crossing(falls))
 
@@ -87,9 +87,9 @@ def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> 
     """
     position = np.clip((np.asarray(times) - first) / tick, 0, len(series) - 1)
     before = np.minimum(position.astype(int), max(len(series) - 2, 0))
-    share = (position - before).reshape(position.shape + (1,) * (series.ndim - 1))
+    fraction = (position - before).reshape(position.shape + (1,) * (series.ndim - 1))
     after = np.minimum(before + 1, len(series) - 1)
-    return series[before] * (1 - share) + series[after] * share
+    return series[before] * (1 - fraction) + series[after] * fraction
 
 
 def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0) -> NDArray:

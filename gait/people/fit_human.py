@@ -57,24 +57,28 @@ def fit(reference: Path) -> dict:
     """
     rows = _read(reference / CURVES_TABLE)
     toe_rows = _read(reference / TOE_TABLE)
-    names = sorted({_text(row, "condition") for row in rows}, key=lambda name: _number(_of(rows, name)[0], "speed_m_s"))
+
+    def speed_of(condition: str) -> float:
+        return _number(_rows_of(rows, condition)[0], "speed_m_s")
+
+    names = sorted({_text(row, "condition") for row in rows}, key=speed_of)
     conditions = []
     table = {"mean": {}, "sd": {}}
     for condition in names:
-        own = _of(rows, condition)
+        selected = _rows_of(rows, condition)
         keys = ("speed_m_s", "stride_time_s", "step_length_m", "toe_off_percent")
-        conditions.append({"name": condition} | {key: _number(own[0], key) for key in keys})
-        stance = _number(own[0], "toe_off_percent") / 100
+        conditions.append({"name": condition} | {key: _number(selected[0], key) for key in keys})
+        stance = _number(selected[0], "toe_off_percent") / 100
         for kind, suffix in (("mean", ""), ("sd", "_sd")):
             series = table[kind]
             for name, column in ANGLES.items():
-                series.setdefault(name, []).append(fourier_series(np.radians(_column(own, column + suffix))))
+                series.setdefault(name, []).append(fourier_series(np.radians(_column(selected, column + suffix))))
             toe = np.radians(_column(toe_rows, COLUMNS["toe"] + suffix))
             series.setdefault("toe", []).append(fourier_series(toe))
             for name, column in KINETICS.items():
-                series.setdefault(name, []).append(fourier_series(_column(own, column + suffix)))
+                series.setdefault(name, []).append(fourier_series(_column(selected, column + suffix)))
             for name, column in FORCES.items():
-                series.setdefault(name, []).append(stance_series(_column(own, column + suffix), stance))
+                series.setdefault(name, []).append(stance_series(_column(selected, column + suffix), stance))
     return {
         "source": SOURCE,
         "command": "python -m springfoot.gait.people.fit_human /path/to/reference",
@@ -93,7 +97,11 @@ def fit(reference: Path) -> dict:
 
 
 def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
-    """Fit a polynomial over stance, which ends at the first row without a centre of pressure, by least squares."""
+    """Fit a polynomial to the centre of pressure over stance by least squares; return its coefficients.
+
+    Position is a fraction of the whole travel, time a fraction of stance, which ends at the first row without a centre
+    of pressure.
+    """
     column = "cop_forward_from_ankle_m"
     stance = [row for row in rows if _text(row, column)]
     swing = [row for row in rows if not _text(row, column)]
@@ -106,6 +114,7 @@ def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
 
 
 def _read(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file, column -> text; raise `SpringfootError` for a missing or unreadable file."""
     if not path.is_file():
         raise SpringfootError(
             f"no {path.name} in {path.parent}: give the folder that holds {CURVES_TABLE}, {TOE_TABLE} and {COP_TABLE}"
@@ -116,15 +125,17 @@ def _read(path: Path) -> list[dict[str, str]]:
         raise SpringfootError(f"{path.name} is not a CSV file: {error}") from None
 
 
-def _of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
+def _rows_of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
     return [row for row in rows if row["condition"] == condition]
 
 
 def _column(rows: list[dict[str, str]], name: str) -> NDArray:
+    """Return the numbers of a column, one a row."""
     return np.array([_number(row, name) for row in rows])
 
 
 def _number(row: dict[str, str], name: str) -> float:
+    """Return the number in column `name` of a row; raise `SpringfootError` unless it is finite."""
     text = _text(row, name)
     try:
         return require_within(name, float(text), (-LARGEST_VALUE, LARGEST_VALUE))
@@ -133,6 +144,7 @@ def _number(row: dict[str, str], name: str) -> float:
 
 
 def _text(row: dict[str, str], name: str) -> str:
+    """Return the text in column `name` of a row; raise `SpringfootError` if the row is too short."""
     text = row.get(name)
     if text is None:
         raise SpringfootError(f"each row must have a cell of column {name}")

@@ -10,8 +10,10 @@ rms). The rate of its toe jumps at heel strike and toe-off: an infinite accelera
 
 
 def fourier_jet(samples: NDArray, harmonics: int, phase: NDArray, period: float) -> list[NDArray]:
-    """Return the value (..., columns) at `phase`, and two time derivatives, of the Fourier series of one period's
-    samples."""
+    """Return a periodic curve's value (..., columns) at `phase` (...) [0..1], and two time derivatives.
+
+    `samples` (n, columns) are evenly spaced over one `period` [s]. The curve is their Fourier series up to `harmonics`.
+    """
     count = len(samples)
     weight = np.fft.rfft(samples, axis=0)[: harmonics + 1] / count
     weight[1:] *= 2

@@ -142,10 +142,11 @@ class HumanGait:
             raise SpringfootError(f"no human curve named {name!r}; there are {', '.join(series)}")
         coefficients = series[name]
         phase = np.mod(np.asarray(phase, float), 1.0)
-        if np.iscomplexobj(coefficients):
+        if np.iscomplexobj(coefficients):  # Re sum c_k exp(2 pi i k phase), k from 0
             turn = 2j * np.pi * np.arange(len(coefficients))
             terms = turn * coefficients if derivative else coefficients
             return np.real(np.exp(phase[..., None] * turn) @ terms)
+        # sum b_k sin(k pi phase / toe_off), k from 1, in stance; 0 in swing
         wave = np.pi / self.toe_off * np.arange(1, len(coefficients) + 1)
         angle = phase[..., None] * wave
         value = np.cos(angle) @ (wave * coefficients) if derivative else np.sin(angle) @ coefficients
@@ -218,7 +219,7 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Pat
 
 @cache
 def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
-    """Return the numbers of `people` for the foot's springs."""
+    """Return the phases and stiffnesses for the foot's springs in the file `people`."""
     foot = harmonics(people)["foot"]
     phases = {name: tuple(foot[name]) for name in ("plateaus", "ankle_quasi_stiffness", "toe_flat", "toe_off")}
     return FootHabits(**phases, toe_swing_deg=foot["toe_swing_deg"])
@@ -231,14 +232,17 @@ def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDAr
     Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. The ends of that foot
     were not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
-    share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
+    fraction = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
     coefficients = np.array(harmonics(people)["cop"]["coefficients"])
-    return share[..., None] ** np.arange(len(coefficients)) @ coefficients
+    return fraction[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
 @cache
 def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
-    """Return a file's series as arrays of shape (conditions, coefficients); Fourier ones are complex."""
+    """Read a file of people's data, with its series as arrays (conditions, coefficients), Fourier ones complex.
+
+    The names are those of `human_harmonics.json`. Raises `SpringfootError` for another file.
+    """
     try:
         table = json.loads(read_bytes(Path(people), MOST_JSON_BYTES))
         require_within("height_m", table["height_m"], HEIGHT_RANGE, "m")
@@ -263,12 +267,12 @@ def _require_conditions(conditions: Any) -> None:
             raise SpringfootError(f"the name of a condition must be text, got {quoted(condition['name'])}")
         for key, (low, high, unit) in CONDITION.items():
             require_within(f"{condition['name']:.40}: {key}", condition[key], (low, high), unit)
-    if any(one["speed_m_s"] >= other["speed_m_s"] for one, other in pairwise(conditions)):
+    if any(slower["speed_m_s"] >= faster["speed_m_s"] for slower, faster in pairwise(conditions)):
         raise SpringfootError("the speeds of the conditions must ascend")
 
 
 def _series(name: str, rows: Any, conditions: int) -> NDArray:
-    """Return the series of a curve, (conditions, coefficients), checked."""
+    """Return the series of a curve as an array (conditions, coefficients); raise `SpringfootError` for bad rows."""
     _require_numbers(name, list(_flat(rows)), (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
     series = np.array(rows, float)
     shape = (conditions, STANCE_TERMS) if name in FORCES else (conditions, HARMONICS + 1, 2)

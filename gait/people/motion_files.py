@@ -1,7 +1,7 @@
 """Read text files of measured walks, CSV and OpenSim .mot and .sto, in the names, signs and units of `HumanGait`.
 
 OpenSim: hip_flexion, ankle_angle and mtp_angle have our signs. knee_angle is negative in flexion in some models
-(gait2392) and positive in others (Rajagopal): `strides.together` turns it and its moment if its mean is negative.
+(gait2392) and positive in others (Rajagopal): `strides.merge_trials` turns it and its moment if its mean is negative.
 pelvis_tilt is positive backward, so thigh = hip_flexion + pelvis_tilt. A coordinate's moment (`hip_flexion_r_moment`,
 of inverse dynamics) is positive as the coordinate, ours opposite.
 """
@@ -66,8 +66,10 @@ def csv_trial(table: Table) -> Trial:
 
 
 def our_columns(table: Table, suffix: str = "") -> Series:
-    """Return a table's curves of our columns, with `suffix` (as `_sd`) behind the names, in SI; thigh from hip and
-    pelvis."""
+    """Return the curves of a table's columns named as in `COLUMNS` with `suffix` behind (as `_sd`), in SI units.
+
+    A missing thigh is computed from hip and pelvis.
+    """
     curves = {}
     for name, column in COLUMNS.items():
         if table.has(column + suffix):

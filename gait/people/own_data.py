@@ -21,7 +21,7 @@ from .checks import AS_IT_IS, require_plausible, require_plausible_legs
 from .contacts import CONTACT_THRESHOLD_BW, PERCENT
 from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
 from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
-from .strides import MeasuredWalk, cut_strides, together
+from .strides import MeasuredWalk, cut_strides, merge_trials
 
 ACCEPTED = {
     "speed": (0.1, 4.0, "m/s"),
@@ -70,25 +70,25 @@ class OwnGait:
         The curves do not change with `height` and `speed`. An unknown step length follows from the stride time and the
         file's speed, or else `speed`. `HumanGait.borrowed` names the parts taken from people.
         """
-        others = human_gait(speed, height, people)
-        own: dict[str, float] = {}
+        people_gait = human_gait(speed, height, people)
+        known: dict[str, float] = {}
         for name in ("stride_time", "step_length", "toe_off"):
             if (value := getattr(self, name)) is not None:
-                own[name] = value
-        if "stride_time" in own:
-            own.setdefault("step_length", (self.speed or speed) * own["stride_time"] / 2)
-        borrowed = [name for name in ("stride_time", "step_length", "toe_off") if name not in own]
-        borrowed += [name for name in others.mean_series if name not in self.mean]
-        borrowed += [f"{name} sd" for name in others.sd_series if name not in self.sd]
+                known[name] = value
+        if "stride_time" in known:
+            known.setdefault("step_length", (self.speed or speed) * known["stride_time"] / 2)
+        borrowed = [name for name in ("stride_time", "step_length", "toe_off") if name not in known]
+        borrowed += [name for name in people_gait.mean_series if name not in self.mean]
+        borrowed += [f"{name} sd" for name in people_gait.sd_series if name not in self.sd]
         return replace(
-            others,
+            people_gait,
             speed=self.speed or speed,
             condition=self.name,
             clamped=False,
-            mean_series={**others.mean_series, **self.mean},
-            sd_series={**others.sd_series, **self.sd},
+            mean_series={**people_gait.mean_series, **self.mean},
+            sd_series={**people_gait.sd_series, **self.sd},
             borrowed=tuple(borrowed),
-            **own,  # type: ignore[arg-type]
+            **known,  # type: ignore[arg-type]
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -97,15 +97,15 @@ class OwnGait:
 
     @classmethod
     def from_json(cls, values: object) -> "OwnGait":
-        """Return the gait of a `to_json`; raise `SpringfootError` for any other value."""
+        """Return the gait from the values that `to_json` returned; raise `SpringfootError` for any other value."""
         names = set(cls.__dataclass_fields__)
         if not isinstance(values, Mapping) or set(values) != names or not isinstance(values["name"], str):
             raise SpringfootError(
                 f"human must be what springfoot.gait.read_gait(FILE).to_json() gives ({', '.join(sorted(names))}), "
                 f"got {values!r:.80}"
             )
-        own = cls(**{**values, "mean": _series("mean", values["mean"]), "sd": _series("sd", values["sd"])})
-        return _checked(own)
+        gait = cls(**{**values, "mean": _series("mean", values["mean"]), "sd": _series("sd", values["sd"])})
+        return _checked(gait)
 
 
 def read_gait(
@@ -117,13 +117,19 @@ def read_gait(
 ) -> OwnGait:
     """Return the mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
 
-    CSV: `percent` 0, 1, ..., 100 and mean curves in our columns (`_sd` behind for the spread; as evaluate.py writes
-    gait_cycle.csv; `condition` picks one of several below each other), or `time_s` and curves over time, with `_left`
-    or `_right` behind for two legs. OpenSim: .mot, .sto. C3D: needs ezc3d. Strides of both feet are pooled, or those of
-    one `side`. Forces and moments in N and N m are divided by the body weight that the forces bear over whole strides,
-    or by `mass` [kg]; without either, moments are left out. Raises `SpringfootError`, naming file, line and column, for
-    an unreadable file; and, unless you `trust_units`, for curves that no walk has in these units and with these signs
-    (`springfoot.gait.people.checks`), with the finding and a guess of its cause.
+    Args:
+        paths: CSV files, OpenSim's .mot and .sto, or C3D (needs ezc3d). A CSV file has the column `percent` 0, 1, ...,
+            100 and mean curves in our columns, their spread with `_sd` behind, as evaluate.py writes gait_cycle.csv; or
+            `time_s` and curves over time, with `_left` or `_right` behind for two legs.
+        condition: picks one of several gaits that stand below each other in a CSV file over `percent`.
+        side: "both" pools the strides of both feet; or "left" or "right".
+        mass: body mass [kg] by which forces and moments in N and N m are divided. By default it is the one that the
+            forces bear over whole strides; without forces, moments in N m are left out.
+        trust_units: accept curves that no walk has in these units and with these signs
+            (`springfoot.gait.people.checks`).
+
+    Raises `SpringfootError` for an unreadable file, naming file, line and column, and for implausible curves, with the
+    likeliest cause.
     """
     if side not in ("both", "left", "right"):
         raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
@@ -145,11 +151,11 @@ def read_gait(
                 raise SpringfootError(f"{path.name} must be a .csv, .mot, .sto or .c3d file")
     if not trials:
         raise SpringfootError("read_gait needs a file")
-    return _from_walk(together(trials), side, mass, trust_units)
+    return _from_walk(merge_trials(trials), side, mass, trust_units)
 
 
 def _from_percent(table: Table, condition: str | None, trust_units: bool) -> OwnGait:
-    """Return mean curves over percent, as in the file."""
+    """Return the gait in a table of mean curves over percent 0 to 100 of the stride."""
     table = _one_condition(table, condition)
     mean = our_columns(table)
     sd = our_columns(table, "_sd")
@@ -165,7 +171,7 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
     strides = parameter("n")
     if strides is not None and strides % 1:
         raise SpringfootError(f"{table.name}: n must be a whole number of strides, got {strides:g}")
-    own = OwnGait(
+    gait = OwnGait(
         name=table.name,
         strides=None if strides is None else round(strides),
         toe_off=None if toe_off is None else toe_off / 100,
@@ -173,11 +179,14 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
         sd={},
         **{name: parameter(column) for name, column in _PARAMETERS.items()},
     )
-    return _fitted(own, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
+    return _fitted(gait, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
 
 
 def _one_condition(table: Table, condition: str | None) -> Table:
-    """Return the rows of one gait, percent 0 to 100."""
+    """Return a table with the rows of one gait, percent 0 to 100; `condition` picks it from several.
+
+    Raises `SpringfootError` for other percents, or if the condition is unknown or missing.
+    """
     percent = table.numbers("percent")
     size = len(PERCENT)
     for k, ((line, _), value) in enumerate(zip(table.rows, percent, strict=True)):
@@ -201,7 +210,7 @@ def _one_condition(table: Table, condition: str | None) -> Table:
 
 
 def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
-    """Return the mean of the strides of a walk."""
+    """Return the mean gait of a walk's strides, or raise `SpringfootError` for curves that no walk has."""
     strides, curves = cut_strides(walk, side, mass)
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
     for name in ("thigh", "hip"):
@@ -213,7 +222,7 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: b
         require_plausible_legs(walk, side, mass, _people_at(walk.speed))
     duration = strides[:, 2] - strides[:, 0]
     stride_time = float(np.mean(duration))
-    own = OwnGait(
+    gait = OwnGait(
         name=walk.name,
         strides=len(strides),
         speed=walk.speed,
@@ -223,57 +232,57 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: b
         mean={},
         sd={},
     )
-    return _fitted(own, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
+    return _fitted(gait, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
 
 
-def _require_one_speed(own: OwnGait) -> None:
-    """Refuse a speed that contradicts stride time and step length."""
-    if own.speed and own.stride_time and own.step_length:
-        covered = 2 * own.step_length / own.stride_time
-        if not 1 / SPEEDS_APART < own.speed / covered < SPEEDS_APART:
+def _require_one_speed(gait: OwnGait) -> None:
+    """Raise `SpringfootError` for a speed that contradicts stride time and step length."""
+    if gait.speed and gait.stride_time and gait.step_length:
+        covered = 2 * gait.step_length / gait.stride_time
+        if not 1 / SPEEDS_APART < gait.speed / covered < SPEEDS_APART:
             raise SpringfootError(
-                f"{own.name}: two steps of {own.step_length:g} m in {own.stride_time:g} s are {covered:.2f} m/s, and "
-                f"the speed is {own.speed:g}: a stride's length, or a step's time? {AS_IT_IS}"
+                f"{gait.name}: two steps of {gait.step_length:g} m in {gait.stride_time:g} s are {covered:.2f} m/s, "
+                f"and the speed is {gait.speed:g}: a stride's length, or a step's time? {AS_IT_IS}"
             )
 
 
 def _people_at(speed: float | None) -> HumanGait:
-    """Return people at a speed; at a comfortable one if it is unknown or outside the accepted range."""
+    """Return people's gait at a speed [m/s]; at a comfortable one if it is unknown or outside the accepted range."""
     low, high, _ = ACCEPTED["speed"]
     return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
 
 
-def _fitted(own: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
-    """Return `own` with series fitted to curves (101,)."""
+def _fitted(gait: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
+    """Return `gait` with series fitted to mean curves and spreads (101,), all checked."""
 
     def fit(curves: Series) -> dict[str, list]:
         rows = {}
         for name, curve in curves.items():
-            rows[name] = stance_series(curve, own.toe_off or 1.0) if name in FORCES else fourier_series(curve)
+            rows[name] = stance_series(curve, gait.toe_off or 1.0) if name in FORCES else fourier_series(curve)
         return rows
 
-    refuse_absurd(own.name, mean)
+    refuse_absurd(gait.name, mean)
     if not trust_units:
-        require_plausible(own.name, mean, _people_at(own.speed), sd)
-        _require_one_speed(own)
-    own = _checked(own)
-    return _checked(replace(own, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
+        require_plausible(gait.name, mean, _people_at(gait.speed), sd)
+        _require_one_speed(gait)
+    gait = _checked(gait)
+    return _checked(replace(gait, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
 
 
-def _checked(own: OwnGait) -> OwnGait:
-    """Return `own`; raise `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a toe-off."""
+def _checked(gait: OwnGait) -> OwnGait:
+    """Return `gait`; raise `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a toe-off."""
     for name, (low, high, unit) in ACCEPTED.items():
-        if getattr(own, name) is not None:
-            require_within(f"{own.name}: {name}", getattr(own, name), (low, high), unit)
-    if own.strides is not None:
-        require_count(f"{own.name}: strides", own.strides)
-    if own.toe_off is None and any(name in FORCES for name in (*own.mean, *own.sd)):
-        raise SpringfootError(f"{own.name}: forces need a toe_off")
-    return own
+        if getattr(gait, name) is not None:
+            require_within(f"{gait.name}: {name}", getattr(gait, name), (low, high), unit)
+    if gait.strides is not None:
+        require_count(f"{gait.name}: strides", gait.strides)
+    if gait.toe_off is None and any(name in FORCES for name in (*gait.mean, *gait.sd)):
+        raise SpringfootError(f"{gait.name}: forces need a toe_off")
+    return gait
 
 
 def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
-    """Return coefficients as plain numbers, complex ones as [real, imaginary]."""
+    """Return curve -> coefficients as plain lists, complex ones as [real, imaginary]."""
     return {
         name: (np.stack([np.real(c), np.imag(c)], -1) if np.iscomplexobj(c) else c).tolist()
         for name, c in series.items()
@@ -281,7 +290,10 @@ def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
 
 
 def _series(kind: str, rows: object) -> dict[str, NDArray]:
-    """Return the inverse of `_rows`; raise `SpringfootError` for any other value."""
+    """Return curve -> coefficients from the lists that `_rows` returned; raise `SpringfootError` for any other value.
+
+    `kind`, mean or sd, stands in the error's text.
+    """
     if not isinstance(rows, Mapping):
         raise SpringfootError(f"human {kind} must map curves to coefficients, got {rows!r:.60}")
     series = {}

@@ -106,7 +106,7 @@ def cost_of_transport(work: float, mass: float, distance: float) -> float | None
 
 
 def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | None]:
-    """Return means of a curve in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
+    """Return a curve's means in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
 
     A percent belongs to the phase that it begins; percent 100 is percent 0 of the next stride and left out.
     """
@@ -128,9 +128,9 @@ def travel(position: NDArray, force: NDArray, least: float) -> float:
     both.
     """
     between = force[1:] + force[:-1]
-    share = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
+    fraction = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
     loaded = force.sum(axis=1) > least
-    return float(np.sum((np.abs(np.diff(position, axis=0)) * share)[loaded[1:] & loaded[:-1]]))
+    return float(np.sum((np.abs(np.diff(position, axis=0)) * fraction)[loaded[1:] & loaded[:-1]]))
 
 
 def at_rest(*points: NDArray, tick: float) -> bool:

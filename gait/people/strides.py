@@ -60,8 +60,10 @@ class MeasuredWalk:
         return self.first + self.tick * (min(len(c) for leg in self.legs.values() for c in leg.values()) - 1)
 
 
-def together(trials: Sequence[Trial]) -> MeasuredWalk:
-    """Merge trials of the same walk: each curve from the first trial with it, and joint powers if they can be computed.
+def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
+    """Merge trials of the same walk on common samples: each curve comes from the first trial that has it.
+
+    Joint powers are computed where angle and moment are there, and knees bent backward are turned if the trial says so.
 
     Raises `SpringfootError` for sampling too coarse, a gap, or no time in common.
     """
@@ -69,11 +71,13 @@ def together(trials: Sequence[Trial]) -> MeasuredWalk:
     for trial in trials:
         gaps = np.diff(trial.time)
         if not len(gaps) or (tick := float(np.median(gaps))) > LONGEST_TICK * 1.001:
-            found = f"one every {tick:.3g} s" if len(gaps) else "a single one"
-            raise SpringfootError(f"{trial.name} must have at least 30 samples a second, has {found}")
+            sampling = f"one every {tick:.3g} s" if len(gaps) else "a single one"
+            raise SpringfootError(f"{trial.name} must have at least 30 samples a second, has {sampling}")
         if gaps.max() > LONGEST_GAP:
-            at = int(gaps.argmax())
-            raise SpringfootError(f"{trial.name} has no samples for {gaps[at]:.2f} s after {trial.time[at]:.2f} s")
+            longest = int(gaps.argmax())
+            raise SpringfootError(
+                f"{trial.name} has no samples for {gaps[longest]:.2f} s after {trial.time[longest]:.2f} s"
+            )
     tick = max(min(float(np.median(np.diff(trial.time))) for trial in trials), SHORTEST_TICK)
     first = max(trial.time[0] for trial in trials)
     last = min(trial.time[-1] for trial in trials)
@@ -82,18 +86,18 @@ def together(trials: Sequence[Trial]) -> MeasuredWalk:
     time = first + tick * np.arange(int((last - first) / tick * (1 + 1e-12)) + 1)
     legs: dict[str, Series] = {}
     unscaled = set()
-    as_read = {}
+    unsigned = {}
     for trial in trials:
         for side, curves in trial.legs.items():
             for curve in curves.keys() - legs.get(side, {}).keys():
                 legs.setdefault(side, {})[curve] = np.interp(time, trial.time, curves[curve])
                 if trial.knee_as_read and curve in ("knee", "knee_moment"):
-                    as_read.setdefault(side, set()).add(curve)
+                    unsigned.setdefault(side, set()).add(curve)
                 if curve in trial.unscaled:
                     unscaled.add((side, curve))
     for side, leg in legs.items():
-        if side in as_read and "knee" in leg and leg["knee"].mean() < 0:
-            leg |= {curve: -leg[curve] for curve in as_read[side] if curve in leg}
+        if side in unsigned and "knee" in leg and leg["knee"].mean() < 0:
+            leg |= {curve: -leg[curve] for curve in unsigned[side] if curve in leg}
         refuse_absurd(name, leg)
         for joint in ("hip", "knee", "ankle"):
             moment = f"{joint}_moment"
@@ -108,16 +112,18 @@ def together(trials: Sequence[Trial]) -> MeasuredWalk:
 
 
 def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Series]:
-    """Return times (S, 3) of heel strike, toe-off, next heel strike [s] and curve -> (strides with it, 101), scaled.
+    """Cut a walk into strides: return their events, and each curve over percent of the strides.
 
-    `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises `SpringfootError` for too few strides.
+    Events are times (S, 3) of heel strike, toe-off and next heel strike [s]. Curves are (strides that have it, 101), in
+    the units of `HumanGait`. `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises
+    `SpringfootError` for too few strides.
     """
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
     strides = {name: _strides(walk, name) for name in chosen}
-    found = np.concatenate([*strides.values(), np.empty((0, 3))])
-    if len(found) < FEWEST_STRIDES:
+    times = np.concatenate([*strides.values(), np.empty((0, 3))])
+    if len(times) < FEWEST_STRIDES:
         raise SpringfootError(
-            f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {len(found)} "
+            f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {len(times)} "
             "(they are found in grf_vertical, events, or thigh or hip with knee)"
         )
     cut: dict[tuple[str, str], NDArray] = {}
@@ -132,24 +138,26 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
         for curve in COLUMNS
         if any(name == curve for _, name in cut)
     }
-    return found, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
+    return times, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
 
 
 def _strides(walk: MeasuredWalk, side: str) -> NDArray:
-    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough
-    strides."""
+    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough.
+
+    Methods: the vertical force, the events in the file, the leg's motion.
+    """
     leg = walk.legs[side]
-    found = []
+    candidates = []
     if "grf_vertical" in leg:
         threshold = CONTACT_THRESHOLD_BW * _bearing(leg["grf_vertical"])
-        found.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
+        candidates.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
     if side in walk.contacts:
-        found.append(walk.contacts[side])
+        candidates.append(walk.contacts[side])
     thigh = leg.get("thigh", leg.get("hip"))
     if thigh is not None and "knee" in leg:
-        found.append(_contacts_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first))
+        candidates.append(_contacts_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first))
     best = np.empty((0, 3))
-    for contacts in found:
+    for contacts in candidates:
         strides = contacts.strides(after=walk.first)
         strides = strides[strides[:, 2] <= walk.last]
         duration = strides[:, 2] - strides[:, 0]
@@ -176,12 +184,13 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
     toe = x + turned(turn[:, FOOT_SEGMENT], body.ankle_to_toe_joint + body.toe_length, -body.ankle_height)[0]
 
     def peaks(values: NDArray) -> NDArray:
+        """Return the times [s] of the maxima, by the parabola through each and its neighbours."""
         # Half of the excursion stands out once a stride, whatever the cadence.
-        at = find_peaks(values, prominence=0.5 * np.ptp(values))[0]
-        before = values[at - 1]
-        top = values[at]
-        after = values[at + 1]
-        return first + tick * (at + 0.5 * (before - after) / (before - 2 * top + after))
+        index = find_peaks(values, prominence=0.5 * np.ptp(values))[0]
+        before = values[index - 1]
+        top = values[index]
+        after = values[index + 1]
+        return first + tick * (index + 0.5 * (before - after) / (before - 2 * top + after))
 
     strikes = peaks(heel)
     offs = peaks(-toe)
@@ -199,12 +208,15 @@ def _smooth(angle: NDArray, tick: float) -> NDArray:
 
 
 def _bearing(force: NDArray) -> float:
-    """Return about the body weight: the median of the forces beyond half of the largest."""
+    """Return about the body weight, in the unit of `force`: the median of all samples beyond half of the largest."""
     return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
 
 
 def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> None:
-    """Keep the forces of a leg only in strides with that foot on a plate."""
+    """Drop, in place, a leg's forces in strides whose stance was not on a force plate.
+
+    `cut` is (side, curve) -> (strides, 101).
+    """
     vertical = cut.get((side, "grf_vertical"))
     if vertical is not None:
         low, high = WEIGHT_BEARING
@@ -215,7 +227,10 @@ def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> N
 
 
 def _scale(cut: dict[tuple[str, str], NDArray], unscaled: set[tuple[str, str]], mass: float | None) -> None:
-    """Divide forces by the body weight, moments and powers by the body mass, in place."""
+    """Divide the `unscaled` curves in place: forces by body weight, moments and powers by body mass.
+
+    The mass is `mass` [kg], or the one that the vertical forces bear; without either these curves are dropped.
+    """
     weight = None if mass is None else mass * GRAVITY
     borne = [cut[key][:, :-1].mean(axis=1) for key in unscaled if key[1] == "grf_vertical" and key in cut]
     if weight is None and sum(map(len, borne)):

@@ -80,12 +80,12 @@ class Bob:
         # Each derivative of a cosine is a quarter turn ahead.
         angle = turn * (np.asarray(time) - self.lowest_at)
         ahead = derivative * pi / 2
-        one = -self.amplitude * turn**derivative * np.cos(angle + ahead)
+        first_harmonic = -self.amplitude * turn**derivative * np.cos(angle + ahead)
         if self.second == (0.0, 0.0):
-            return one
+            return first_harmonic
         c, s = self.second
         scale = -self.amplitude * (2 * turn) ** derivative
-        return one + scale * (c * np.cos(2 * angle + ahead) + s * np.sin(2 * angle + ahead))
+        return first_harmonic + scale * (c * np.cos(2 * angle + ahead) + s * np.sin(2 * angle + ahead))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,11 +206,15 @@ def _integrated(
     bob: Bob,
     slope: float,
 ) -> PPoly:
-    """Return the path of `periodic_com`: the periodic sum of one particular and two homogeneous solutions."""
+    """Return the path of `periodic_com` without a pivot, by numerical integration.
+
+    The equation is linear: the path is the sum of one particular and two homogeneous solutions that is periodic.
+    """
     step_time = zmp_times[-1]
     back, down = -gravity(slope)
 
-    def pull(t: ArrayLike) -> NDArray:
+    def squared_rate(t: ArrayLike) -> NDArray:
+        # (g cos a + z'') / z
         z = height + bob(t)
         return (down + bob(t, 2)) / z
 
@@ -219,7 +223,7 @@ def _integrated(
     def motion(t: float, state: NDArray) -> NDArray:
         x = state[:3]
         v = state[3:]
-        return np.concatenate([v, pull(t) * (x - driven * np.interp(t, zmp_times, zmp_points)) - driven * back])
+        return np.concatenate([v, squared_rate(t) * (x - driven * np.interp(t, zmp_times, zmp_points)) - driven * back])
 
     state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
     times = []
@@ -240,7 +244,7 @@ def _integrated(
     weights = np.array([1.0, *start_state])
     position = weights @ x
     velocity = weights @ v
-    acceleration = pull(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
+    acceleration = squared_rate(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
     quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
     return PPoly.from_bernstein_basis(quintics)
 
@@ -268,35 +272,37 @@ def _stepped(
     t = np.append(np.concatenate(pieces), step_time)
 
     def equation(time: NDArray) -> NDArray:
-        # rate of change of (x, x', 1) as a matrix, (times, 3, 3)
+        """Return the rate of change of (x, x', 1) as matrices (times, 3, 3)."""
         z = height + bob(time)
-        pull = (down + bob(time, 2)) / z
+        squared_rate = (down + bob(time, 2)) / z
         matrix = np.zeros((len(time), 3, 3))
         matrix[:, 0, 1] = 1.0
-        matrix[:, 1, 0] = pull
-        matrix[:, 1, 2] = pull * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
+        matrix[:, 1, 0] = squared_rate
+        matrix[:, 1, 2] = squared_rate * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
         return matrix
 
-    at = equation(t)
+    matrices = equation(t)
     tick = np.diff(t)[:, None, None]
     unit = np.eye(3)
     middle = equation(0.5 * (t[1:] + t[:-1]))
-    first = at[:-1]
-    second = middle @ (unit + tick / 2 * first)
-    third = middle @ (unit + tick / 2 * second)
-    fourth = at[1:] @ (unit + tick * third)
-    steps = unit + tick / 6 * (first + 2 * second + 2 * third + fourth)
-    through = [unit]
-    for step in steps:
-        through.append(step @ through[-1])
-    whole = through[-1][:2]
-    start = np.linalg.solve(whole[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole[:, 2])
-    state = np.stack(through) @ np.append(start, 1.0)
+    # The classical Runge-Kutta method, for all steps at once.
+    slope_start = matrices[:-1]
+    slope_middle = middle @ (unit + tick / 2 * slope_start)
+    slope_middle_again = middle @ (unit + tick / 2 * slope_middle)
+    slope_end = matrices[1:] @ (unit + tick * slope_middle_again)
+    step_matrices = unit + tick / 6 * (slope_start + 2 * slope_middle + 2 * slope_middle_again + slope_end)
+    products = [unit]
+    for step in step_matrices:
+        products.append(step @ products[-1])
+    whole_step = products[-1][:2]
+    # Solve x(T) = x(0) + step_length, x'(T) = x'(0) for the start (x, x').
+    start = np.linalg.solve(whole_step[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole_step[:, 2])
+    state = np.stack(products) @ np.append(start, 1.0)
     x = state[:, 0]
     v = state[:, 1]
-    a = (at @ state[..., None])[:, 1, 0]
-    h = np.diff(t)
+    a = (matrices @ state[..., None])[:, 1, 0]
+    duration = np.diff(t)
     # Quintics by position, velocity and acceleration at their ends, as Bernstein coefficients.
-    bernstein = [x[:-1], x[:-1] + h * v[:-1] / 5, x[:-1] + 2 * h * v[:-1] / 5 + h**2 * a[:-1] / 20]
-    bernstein += [x[1:] - 2 * h * v[1:] / 5 + h**2 * a[1:] / 20, x[1:] - h * v[1:] / 5, x[1:]]
+    bernstein = [x[:-1], x[:-1] + duration * v[:-1] / 5, x[:-1] + 2 * duration * v[:-1] / 5 + duration**2 * a[:-1] / 20]
+    bernstein += [x[1:] - 2 * duration * v[1:] / 5 + duration**2 * a[1:] / 20, x[1:] - duration * v[1:] / 5, x[1:]]
     return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))

@@ -37,9 +37,13 @@ class Case:
     """Walk at one speed for the fit; the CoM follows the plan, except for the height."""
 
     plan: WalkPlan
+    """Plan with the constants before the fit."""
     zmp_times: NDArray
+    """(3,) times of the ZMP's corners over a step [s]."""
     zmp_points: NDArray
+    """(3,) ZMP at its corners [m from the stance ankle]."""
     people: dict[str, NDArray]
+    """Joint of `JOINT_WEIGHTS` -> people's curve (POSTURE_SAMPLES,) [rad]."""
 
     def errors(self) -> NDArray:
         """Return the weighted errors of the joints [deg] with the present constants, and the cost of the floor."""
@@ -50,6 +54,7 @@ class Case:
             legs = legs_under_com(STANDARD, motion, path, self.plan.human)
             lacking = float(legs.reach.max()) - full_reach(STANDARD, STRAIGHTEST_KNEE)
             motion = replace(motion, height=motion.height - lacking)
+        # Every sixth of the samples: hundredths of the stride.
         joints = [
             weight * np.degrees(getattr(legs, name) - self.people[name])[::6] for name, weight in JOINT_WEIGHTS.items()
         ]
@@ -58,10 +63,10 @@ class Case:
 
 
 def case(speed: float) -> Case:
-    """Return the walk at a `speed` [m/s]."""
+    """Plan the walk at a `speed` [m/s], with the shortest double support that has the whole roll."""
     people = human_gait(speed, STANDARD.height)
-    share = max(PEOPLES_SHARE * (2 * people.toe_off - 1), LEAST_FULL_ROLL)
-    plan = plan_walk(STANDARD, speed, double_support=share * people.stride_time / 2)
+    support_ratio = max(PEOPLES_SHARE * (2 * people.toe_off - 1), LEAST_FULL_ROLL)
+    plan = plan_walk(STANDARD, speed, double_support=support_ratio * people.stride_time / 2)
     times = np.array([0.0, plan.double_support, plan.step_time])
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     return Case(
@@ -73,7 +78,7 @@ def case(speed: float) -> Case:
 
 
 def constants() -> NDArray:
-    """Return the constants at a roll of 1, as an array in the order of `use`."""
+    """Return the present constants of `foot_style` at a roll of 1 as one array, where the fit starts."""
     return np.array(
         [
             *(foot_style.TOE_ROCKER_POWER[1], foot_style.ROLL_POWER),
@@ -92,7 +97,7 @@ def use(values: NDArray) -> None:
 
 
 def main() -> None:
-    """Fit, and print the constants."""
+    """Fit the constants at a roll of 1 to people's curves, and print them with the error before and after."""
     cases = [case(speed) for speed in SPEEDS]
 
     def errors(values: NDArray) -> NDArray:

@@ -125,8 +125,10 @@ class FootPath:
         return float(self.swing_heights(MID_SWING).min())
 
     def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Return the rear and front end (x, x) [m] of the foot's part on the ground in stance: heel, sole, toe joint to
-        tip, tip."""
+        """Return the x [m] of the rear and of the front end of the foot's part on the ground in stance.
+
+        The part is in turn the heel, the sole, the toe from joint to tip, and the tip.
+        """
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         joint = self.body.ankle_to_toe_joint
         heel = self.flat_heel - self._heel_radius * self._heel_rocker(np.minimum(phase, self.foot_flat))[0, 2]
@@ -145,7 +147,7 @@ class FootPath:
         return self.body.ankle_height - self.body.toe_joint_height
 
     def _jet(self, stride_phase: ArrayLike) -> NDArray:
-        """Return (3, ...): x, z [m] and pitch [rad] of the ankle at any phases of the stride."""
+        """Return x, z [m] of the ankle and pitch [rad] of the foot at any phases of the stride, (3, ...)."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         heel = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]
         toe = self._toe_rocker(np.clip(phase, self.heel_off, self.toe_off))[0]
@@ -153,8 +155,10 @@ class FootPath:
         return np.where(phase < self.foot_flat, heel, np.where(phase <= self.toe_off, toe, swing))
 
     def _heel_rocker(self, phase: ArrayLike) -> NDArray:
-        """Return (3, 3, ...): ankle (x, z) and pitch while the foot turns about its heel, with two phase
-        derivatives."""
+        """Return ankle x, z [m] and pitch [rad] while the foot turns about its heel, and two phase derivatives.
+
+        The result is (derivative, coordinate, ...), (3, 3, ...).
+        """
         left = 1 - np.asarray(phase) / self.foot_flat
         power = HEEL_ROCKER_POWER
         pitch = self.heel_strike_pitch * left**power
@@ -166,8 +170,10 @@ class FootPath:
         return jet
 
     def _toe_rocker(self, phase: ArrayLike) -> NDArray:
-        """Return (3, 3, ...): ankle (x, z) and pitch while the foot turns about its toe joint, with two phase
-        derivatives."""
+        """Return ankle x, z [m] and pitch [rad] while the foot turns about its toe joint, and two phase derivatives.
+
+        The result is (derivative, coordinate, ...), (3, 3, ...).
+        """
         body = self.body
         shape = self.style.heel_rise or self.style.toe_rocker_power
         pitch = rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)
@@ -180,15 +186,17 @@ class FootPath:
         return jet
 
     def _roll(self, phase: ArrayLike) -> NDArray:
-        """Return (3, ...): pitch of the toe as it rolls over its tip [rad], negative, and two phase derivatives."""
+        """Return the pitch of the toe as it rolls over its tip [rad], negative, and two phase derivatives, (3, ...)."""
         if self.roll_pitch == 0:
             return np.zeros((3, *np.shape(phase)))
         return rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
 
     @cached_property
     def _swing(self) -> BSpline:
-        """Return (x, z, pitch) of the ankle over swing phases: a quintic spline, four times continuously
-        differentiable."""
+        """Return the path of the swing over stride phase: ankle x, z [m] and pitch [rad].
+
+        It is a quintic spline, four times continuously differentiable, through the style's via points.
+        """
         start = self._toe_rocker(self.toe_off)
         end = self._heel_rocker(0.0)
         end[0, 0] += 2 * self.step_length
@@ -212,9 +220,17 @@ def feet_under_zmp(
 ) -> FootPath:
     """Plan feet with rockers that follow the ZMP, so that the ZMP stays within the feet's parts on the ground.
 
-    The ZMP runs straight between points [m from the stance ankle] at times [s]: heel strike, the other foot's toe-off,
-    perhaps more, the next heel strike. `roll`: see `FootPath`. `clearance` [m]: see `plan_walk`. `style` replaces
-    people's style. Raises `SpringfootError` for a ZMP off the feet, or a step shorter than the ZMP's travel.
+    Args:
+        body: whose feet they are.
+        step_length: [m].
+        zmp_times: corners of the ZMP's course over a step [s]: heel strike, the other foot's toe-off, perhaps more, the
+            next heel strike.
+        zmp_points: ZMP at these times [m from the stance ankle]; straight in between.
+        roll: of the toe over its tip late in stance: 0 for none, 1 for people's.
+        clearance: least height of the swing foot in mid-swing [m]; None: as the style gives it.
+        style: in place of people's.
+
+    Raises `SpringfootError` for a ZMP off the feet, or a step shorter than the ZMP's travel.
     """
     margin = ROCKER_MARGIN * body.length_scale
     heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)

@@ -75,18 +75,20 @@ class FootStyle:
     """Angle of the toe joint in swing [rad]; None: people's curve."""
 
 
-def peoples_style(stride: float, roll: float, heel_rocker: float, tip_rocker: float) -> FootStyle:
-    """Return the style with which the legs come near people's curves.
+def peoples_style(step_ratio: float, roll: float, heel_rocker: float, tip_rocker: float) -> FootStyle:
+    """Return the style fitted so that the legs' joint angles follow people's.
+
+    A short heel rocker or roll limits the pitch that it must turn through (`HEEL_ROCKER_RATE`, `QUICKEST_ROLL`).
 
     Args:
-        stride: step length over leg length.
+        step_ratio: step length over leg length.
         roll: roll of the toe over its tip late in stance: 0 for none, 1 for people's.
         heel_rocker, tip_rocker: durations [strides] of the foot's turn about the heel and the toe's roll over the tip.
     """
     return FootStyle(
-        heel_strike_pitch=min(pitch_at(HEEL_STRIKE_PITCH, stride, roll), HEEL_ROCKER_RATE * heel_rocker),
-        toe_off_pitch=pitch_at(TOE_OFF_PITCH, stride, roll),
-        roll_pitch=min(pitch_at(ROLL_PITCH, stride, roll), QUICKEST_ROLL * tip_rocker),
+        heel_strike_pitch=min(pitch_at(HEEL_STRIKE_PITCH, step_ratio, roll), HEEL_ROCKER_RATE * heel_rocker),
+        toe_off_pitch=pitch_at(TOE_OFF_PITCH, step_ratio, roll),
+        roll_pitch=min(pitch_at(ROLL_PITCH, step_ratio, roll), QUICKEST_ROLL * tip_rocker),
         toe_rocker_power=float(between(TOE_ROCKER_POWER, roll)),
         roll_power=ROLL_POWER,
         via_forward=_pair(VIA_FORWARD, roll),
@@ -100,9 +102,10 @@ def between(pair: tuple, roll: float) -> NDArray:
     return (1 - roll) * np.array(pair[0]) + roll * np.array(pair[1])
 
 
-def pitch_at(pair: tuple, stride: float, roll: float) -> float:
-    """Return a pitch at an event [rad], positive: a stride^n, with `stride` the step length over leg length."""
-    return float(between(tuple(a * stride**n for a, n in pair), roll))
+def pitch_at(pair: tuple, step_ratio: float, roll: float) -> float:
+    """Return a pitch at an event [rad], positive: a (step length / leg length)^n, of the `pair` of a, n for a roll of 0
+    and of 1."""
+    return float(between(tuple(a * step_ratio**n for a, n in pair), roll))
 
 
 def _pair(pair: tuple, roll: float) -> tuple[float, float]:

@@ -75,8 +75,8 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
         raise SpringfootError(
             f"ZMP must lie between the centres of pressure of the feet, is outside by {outside:.4f} m"
         )
-    apart = np.where(front == rear, ZMP_TOLERANCE, front - rear)
-    on_front = np.clip((zmp - rear) / apart, 0.0, 1.0) * force[..., 1]
+    cop_distance = np.where(front == rear, ZMP_TOLERANCE, front - rear)
+    on_front = np.clip((zmp - rear) / cop_distance, 0.0, 1.0) * force[..., 1]
 
     def towards_com(up: NDArray, cop: NDArray) -> NDArray:
         return np.stack([up * (com[..., 0] - cop) / com[..., 1], up], -1)
@@ -158,8 +158,8 @@ def planned_moments(plan: WalkPlan, stride_phase: ArrayLike) -> dict[str, NDArra
 def projection_table(body: Body, motion: LegMotion, load: FootLoad, slope: float = 0.0) -> list[ProjectionError]:
     """Compare the GRF projection (Wells 1981) with inverse dynamics: per joint, in stance and in swing.
 
-    Stance is where the ground bears on the foot. For a plan take `planned_leg(plan, phase)` and its slope.
-    Samples weigh alike, so take phases evenly. Parts that do not occur are left out.
+    Stance is where the ground bears on the foot. Give the leg of a plan as `planned_leg(plan, phase)`, and the plan's
+    slope. Samples weigh alike, so take evenly spaced phases. A part without samples is left out.
     """
     projection = projection_moments(body, motion, load)
     dynamics = inverse_dynamics(body, motion, load, slope).moment

@@ -50,8 +50,8 @@ def spinning_legs(
         lacking = float(legs.reach.max()) - reach if fixed_height is None else 0.0
         before = ahead
         ahead = pivot_ahead(body, motion, legs, step_length, lean)
-        moved = float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
-        if abs(lacking) < PLAN_SETTLED and moved < PLAN_SETTLED:
+        pivot_change = float(np.abs(ahead(ahead.x) - before(ahead.x)).max())
+        if abs(lacking) < PLAN_SETTLED and pivot_change < PLAN_SETTLED:
             return motion, legs
         height -= lacking
         if height < LOWEST_COM * body.leg_length:
@@ -60,8 +60,10 @@ def spinning_legs(
 
 
 def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0) -> CubicSpline:
-    """Return the distance of the pivot ahead of the CoM [m] over the time of a step, trunk upright or at a `lean`
-    [rad]."""
+    """Return the pivot's distance ahead of the CoM [m] over the time of a step [s], as the module's head defines it.
+
+    `legs` are one leg's postures over a stride; the trunk is upright or leans by `lean` [rad].
+    """
     stride_time = 2 * motion.step_time
     half = POSTURE_SAMPLES // 2
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
@@ -71,17 +73,16 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     samples = np.concatenate([segment_turns(angles, motion.slope), hip], -1)
     leg = motion_of(*fourier_jet(samples, PLAN_HARMONICS, phase, stride_time))
     com = np.stack(motion.position(np.mod(2 * phase, 1.0) * motion.step_time), -1)
-    com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)
+    com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)  # without its mean progress too
     # Rate of change of angular momentum about the CoM [N m]: both legs, half a stride apart, and then the trunk.
     one_leg = spin_rate(body, leg, com)
     upright = motion.slope + lean
-    upper = hypot(*body.upper_moment) * np.array([sin(upright), cos(upright)])
+    moment_about_hip = hypot(*body.upper_moment) * np.array([sin(upright), cos(upright)])
     turning = one_leg + np.roll(one_leg, -half)
     mass = body.trunk_mass + body.carried_mass
-    lever = mass * (leg.hip - com) + upper
-    turning += lever[:, 0] * leg.hip_acceleration[:, 1] - lever[:, 1] * leg.hip_acceleration[:, 0]
-    step = turning[:half]
+    moment = mass * (leg.hip - com) + moment_about_hip  # first mass moment of trunk and load about the CoM [kg m]
+    turning += moment[:, 0] * leg.hip_acceleration[:, 1] - moment[:, 1] * leg.hip_acceleration[:, 0]
     time = np.arange(half + 1) / half * motion.step_time
-    force = body.total_mass * (-gravity(motion.slope)[1] + motion.acceleration(time[:-1])[1])
-    ahead = step / force
+    force = body.total_mass * (-gravity(motion.slope)[1] + motion.acceleration(time[:-1])[1])  # upward [N]
+    ahead = turning[:half] / force
     return CubicSpline(time, np.append(ahead, ahead[0]), bc_type="periodic")

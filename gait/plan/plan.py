@@ -196,12 +196,15 @@ def plan_walk(
         second=(0.0, 0.0) if style is None else style.rise_again,
     )
     # Each search with a pivot starts from the postures of the search before.
-    last: list[LegPostures] = []
+    last_legs: list[LegPostures] = []
 
     def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
+        """Plan CoM and legs at a mean CoM height [m], with a pivot `ahead` of the CoM [m] if given."""
         motion = periodic_com(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
-        legs = legs_under_com(body, motion, feet, human, last[0] if last and ahead is not None else None, lean)
-        last[:] = [legs]
+        legs = legs_under_com(
+            body, motion, feet, human, last_legs[0] if last_legs and ahead is not None else None, lean
+        )
+        last_legs[:] = [legs]
         return motion, legs
 
     if style is not None:

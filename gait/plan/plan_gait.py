@@ -93,7 +93,8 @@ def _series(values: NDArray) -> NDArray:
 
 
 def _stance(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
-    """Return (STANCE_TERMS,) least-squares sine series over stance."""
+    """Fit a sine series over stance to samples over `phase` by least squares: return its (STANCE_TERMS,)
+    coefficients."""
     inside = phase < toe_off
     basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
     return np.linalg.lstsq(basis, values[inside], rcond=None)[0]

@@ -95,8 +95,10 @@ def legs_under_com(
 
 @lru_cache(maxsize=2)
 def _feet_over_stride(feet: FootPath, human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
-    """Return ankle (2, samples), foot pitch and toe angle (samples,); cached: one plan needs the same arrays a
-    dozen times."""
+    """Return ankle (x, z) (2, samples) [m], foot pitch and toe angle (samples,) [rad] over the stride.
+
+    Cached: one plan needs the same arrays a dozen times.
+    """
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     return np.stack(feet.ankle(phase)), feet.pitch(phase), toe_angle(feet, human, phase)
 
@@ -107,7 +109,7 @@ def legs_under(
     ankle: NDArray,
     pitch: NDArray,
     toe: NDArray,
-    both: Callable[[NDArray], NDArray],
+    sum_over_legs: Callable[[NDArray], NDArray],
     slope: float = 0.0,
     near: NDArray | None = None,
     lean: float = 0.0,
@@ -120,9 +122,9 @@ def legs_under(
         ankle: (2, ...) ankle (x, z) [m]. `ankle`, `pitch` and `toe` may have an axis of legs where `com` has length 1.
         pitch: (...) pitch of the foot [rad].
         toe: (...) angle of the toe [rad].
-        both: function that sums a leg's values over both legs, in the shape of `com`.
+        sum_over_legs: adds up a leg's values (2, ...) over both legs, in the shape of `com`.
         slope: of the ground [rad].
-        near: (2, ...) hip at which the search starts [m].
+        near: (2, ...) hip (x, z) at which the search starts [m].
         lean: pitch of the trunk off the posture with its CoM, and that of a load, upright over the hip [rad].
 
     The hip of the result is (..., 2).
@@ -145,12 +147,12 @@ def legs_under(
             + (body.foot_mass + body.toe_mass) * np.stack([forward, -down])
             + foot_and_toe
         )
-        com_from_hip = both(leg) / body.total_mass
+        com_from_hip = sum_over_legs(leg) / body.total_mass
         com_from_hip[0] += trunk * sin(slope + lean)
         com_from_hip[1] += trunk * cos(slope + lean)
-        moved = np.abs(com - com_from_hip - hip).max()
+        hip_change = np.abs(com - com_from_hip - hip).max()
         hip = com - com_from_hip
-        if moved < 1e-12:
+        if hip_change < 1e-12:
             break
     return LegPostures(
         hip=np.moveaxis(hip, 0, -1),
@@ -183,7 +185,8 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     landing = in_air * feet.pitch(phase) / feet.heel_strike_pitch
     rolling = feet.toe_pitch(phase) - feet.pitch(phase)
     # The bend at toe-off fades within the first third of swing.
-    remaining = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
+    swing_phase = (phase - feet.toe_off) / (1 - feet.toe_off)
+    remaining = np.clip(1 - 3 * swing_phase, 0.0, 1.0)
     swinging = in_air + remaining**2 * (feet.toe_off_pitch - feet.roll_pitch - at_toe_off)
     # Early in swing people's angle would take the tip into the floor: bend the toe up until its tip is at floor level.
     lifted = feet.ball_clearance(phase) + feet.body.toe_joint_height * (1 - cos(feet.roll_pitch))
@@ -195,7 +198,7 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
 
 
 def full_reach(body: Body, knee: float) -> float:
-    """Return the distance from hip to ankle [m] at a knee flexion [rad]."""
+    """Return the distance from hip to ankle [m] at the flexion `knee` [rad], by the law of cosines."""
     a = body.thigh_length
     b = body.shank_length
     return sqrt(a**2 + b**2 + 2 * a * b * cos(knee))

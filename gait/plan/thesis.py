@@ -113,13 +113,13 @@ class ThesisWalk:
 
     @property
     def knot_times(self) -> NDArray:
-        """t_CoM, t_foot, t_toe (6,) [s]."""
+        """Times of all knots (6,) [s]: the thesis's t_CoM, t_foot, t_toe."""
         within = np.array([0.0, self.double_support, self.highest_ankle_time])
         return np.concatenate([self.k * self.step_time + within, (self.k + 1) * self.step_time + within])
 
     @property
     def com_knots(self) -> tuple[NDArray, NDArray]:
-        """x_CoM, z_CoM (6,) [m]. Fault: mean speeds of 1.67, 0.66 and 1.50 m/s between them."""
+        """Knots of the CoM's path, x_CoM and z_CoM (6,) [m]; fault: mean speeds of 1.67, 0.66, 1.50 m/s between."""
         ahead = self.com_ahead_at_end
         behind = self.com_behind_at_start
         steps = self.step_length * (self.k + np.array([0, 1, 1, 1, 2, 2]))
@@ -127,7 +127,7 @@ class ThesisWalk:
 
     @property
     def ankle_knots(self) -> tuple[NDArray, NDArray]:
-        """x_foot_mod, z_foot_mod (6,) [m]."""
+        """Knots of the ankle's path, x_foot_mod and z_foot_mod (6,) [m]; local names are the thesis's."""
         l_an = self.body.ankle_height
         l_bf = self.body.heel_to_ankle
         l_ft = self.body.ankle_to_toe_joint
@@ -152,7 +152,10 @@ class ThesisWalk:
 
     @property
     def toe_joint_knots(self) -> tuple[NDArray, NDArray]:
-        """x_toe_mod, z_toe_mod (6,) [m]. Fault: at heel strike l_an sin q_f is the ankle's alone: 8 mm short."""
+        """Knots of the toe joint's path, x_toe_mod and z_toe_mod (6,) [m].
+
+        Fault: l_an sin q_f belongs in the ankle's x at heel strike alone; the toe joint's is 8 mm short by it.
+        """
         l_an = self.body.ankle_height
         l_bf = self.body.heel_to_ankle
         l_ft = self.body.ankle_to_toe_joint
@@ -167,7 +170,7 @@ class ThesisWalk:
     # Figures 6 to 10 -----------------------------------------------------------------------------------------
 
     def normalised_time(self, time: ArrayLike) -> NDArray:
-        """t_nor_cyc, the figures' axis. Fault: its 1 is 0.75 s at k = 1, a step and a half, and not a stride."""
+        """Return t_nor_cyc, the figures' time axis. Fault: 1 is 0.75 s at k = 1, a step and a half, not a stride."""
         return (self._within(time) - self.step_time) / (self.k * self.step_time + self.highest_ankle_time)
 
     def com_height(self, time: ArrayLike, derivative: int = 0) -> NDArray:
@@ -183,7 +186,10 @@ class ThesisWalk:
         return self._com_x[0](time), self.com_height(time)
 
     def com_acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """xtt, ztt [m/s^2]. Fault: the thesis calls z too small to matter in 2.2, and uses it in the appendix."""
+        """Acceleration of the CoM, xtt and ztt [m/s^2].
+
+        Fault: the thesis calls the vertical one too small to matter in 2.2, and uses it in the appendix.
+        """
         time = self._within(time)
         return self._com_x[1](time), self.com_height(time, 2)
 
@@ -209,9 +215,9 @@ class ThesisWalk:
         b = z'' + g. The ZMP is then the CoM shifted, which is why the thesis saw it follow the CoM.
         """
         x, _ = self.com(time)
-        at = self.knot_times if self.division == "matrix" else time
-        forward, up = self.com_acceleration(at)
-        height = self.com_height(at)
+        quotient_times = self.knot_times if self.division == "matrix" else time
+        forward, up = self.com_acceleration(quotient_times)
+        height = self.com_height(quotient_times)
         if self.division == "matrix":
             return x - (height * forward) @ (up + GRAVITY) / np.sum((up + GRAVITY) ** 2)
         return x - height * forward / (up + GRAVITY)
@@ -219,11 +225,11 @@ class ThesisWalk:
     # Joint torque --------------------------------------------------------------------------------------------
 
     def joint_torque(self, joint: Joint, time: ArrayLike) -> NDArray:
-        """torque_ankle_mod, torque_toe_mod [N m], the sagittal part of the cross product; plantarflexion positive.
+        """Joint torque as printed [N m], torque_ankle_mod or torque_toe_mod; plantarflexion positive.
 
-        Faults: r is multiplied by the sine of the sum of its and the force's direction, though r x F holds the sine
-        (of their difference) already; its z part by sin(1), as the sine is taken of a row of ones too; and the whole
-        force turns this foot's joints even while it is in the air.
+        Faults: r x F is multiplied by the sine of the sum of the directions of r and F, though it holds the sine of
+        their difference already. Its term with z is multiplied by sin(1), as the sine is taken of a row of ones too.
+        The whole force turns this foot's joints even while the foot is in the air.
         """
         x, z = self._arm(joint, time)
         forward, up = self.ground_reaction(time)
@@ -265,7 +271,7 @@ class ThesisWalk:
 
     @cached_property
     def _com_x(self):
-        """Forward position and acceleration as functions of time."""
+        """Functions of time [s] for the CoM's forward position [m] and acceleration [m/s^2], by `interpolation`."""
         t = self.knot_times
         x, _ = self.com_knots
         if self.interpolation == "not-a-knot":

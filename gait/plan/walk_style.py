@@ -68,9 +68,9 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
     for part in (style, style.foot):
         for name, hint in get_type_hints(type(part)).items():
             value = getattr(part, name)
-            kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
-            if not any(_is_a(kind, value) for kind in kinds):
-                allowed = "a number" if float in kinds else "2 numbers" if PAIR in kinds else "numbers"
+            types = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+            if not any(_is_a(type_, value) for type_ in types):
+                allowed = "a number" if float in types else "2 numbers" if PAIR in types else "numbers"
                 raise ValueError(f"{name} must be {allowed} within ±{LARGEST_NUMBER:g}, got {quoted(value)}")
     for name in POWERS:
         if getattr(style.foot, name) <= 0.0:
@@ -82,12 +82,12 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
     return style
 
 
-def _is_a(kind: Any, value: Any) -> bool:
-    """Tell whether a value has the type `kind` of a field, with numbers of at most `LARGEST_NUMBER`."""
-    if get_origin(kind) is tuple:
-        right_length = isinstance(value, tuple) and (kind != PAIR or len(value) == 2)
+def _is_a(type_: Any, value: Any) -> bool:
+    """Tell whether a value has the type `type_` of a field, with numbers of at most `LARGEST_NUMBER`."""
+    if get_origin(type_) is tuple:
+        right_length = isinstance(value, tuple) and (type_ != PAIR or len(value) == 2)
         return right_length and all(abs(as_float(number)) <= LARGEST_NUMBER for number in value)
-    return abs(as_float(value)) <= LARGEST_NUMBER if kind is float else isinstance(value, kind)
+    return abs(as_float(value)) <= LARGEST_NUMBER if type_ is float else isinstance(value, type_)
 
 
 def least_work(speed: float, file: Path | None = None) -> WalkStyle:
@@ -105,7 +105,7 @@ def least_work(speed: float, file: Path | None = None) -> WalkStyle:
 
 
 def _mixed(low: Any, high: Any, weight: float) -> Any:
-    """Interpolate between the JSON values of two styles, number by number."""
+    """Interpolate between the JSON values of two styles, number by number: `low` at weight 0, `high` at 1."""
     if low is None:
         return None
     if isinstance(low, dict):

@@ -15,11 +15,11 @@ from .stiffness import SPRINGS
 
 
 def read_foot(path: str | Path) -> dict[str, Any]:
-    """Return the setting `left_foot` or `right_foot` in a file.
+    """Return the foot described in a file, as a value of the settings `left_foot` and `right_foot`.
 
-    A CSV is a passive foot with these torques; the other joint has its defaults. A JSON file is a foot's dictionary, or
-    a `StiffnessSchedule` for an adaptive foot that follows it. Raises `SpringfootError` for another file; the setting
-    checks the numbers.
+    A CSV file is a passive foot with these torques; a joint without columns has its defaults. A JSON file is a foot's
+    dictionary, or a `StiffnessSchedule` for an adaptive foot that follows it. Raises `SpringfootError` for another
+    file; the numbers are checked when the setting is made.
     """
     path = Path(path)
     if path.suffix.lower() == ".csv":
@@ -29,9 +29,9 @@ def read_foot(path: str | Path) -> dict[str, Any]:
 
 
 def _tables(path: Path) -> dict[str, list[list[float]]]:
-    """Return joint -> torque-angle line [deg, N m] of a CSV file."""
+    """Return the settings `ankle_table` and `toe_table` of a CSV file: pairs of angle [deg] and torque [N m]."""
     table = read_csv(path)
-    found = {}
+    tables = {}
     for joint in SPRINGS:
         angle = f"{joint}_deg"
         torque = f"{joint}_torque_Nm"
@@ -39,8 +39,8 @@ def _tables(path: Path) -> dict[str, list[list[float]]]:
             raise SpringfootError(f"{table.name}, line 1: {angle} and {torque} go together")
         if table.has(angle):
             pairs = zip(table.ascending(angle).tolist(), table.numbers(torque).tolist(), strict=True)
-            found[f"{joint}_table"] = [list(pair) for pair in pairs]
-    if not found:
+            tables[f"{joint}_table"] = [list(pair) for pair in pairs]
+    if not tables:
         names = ", ".join(f"{joint}_deg and {joint}_torque_Nm" for joint in SPRINGS)
         raise SpringfootError(f"{table.name}, line 1: needs {names}, or two of them, got {', '.join(table.columns)}")
-    return found
+    return tables

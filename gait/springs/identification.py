@@ -31,7 +31,7 @@ COLLINEAR = 0.95
 ILL_CONDITIONED = 30.0
 """Condition number of (1, angle, velocity), columns of unit length, beyond which it harms (Belsley et al. 1980)."""
 LEAST_SPREAD = np.deg2rad(0.5)
-"""Angle spread [rad] below which there is too little motion: the best of gait laboratories err by as much, and such an
+"""Angle spread [rad] below which there is too little motion: the best gait laboratories err by as much, and such an
 error would halve K."""
 CORRELATED = 0.5
 """Lag-1 correlation of the residuals beyond which a warning calls the intervals too narrow."""
@@ -41,7 +41,7 @@ PARAMETERS = ("stiffness", "damping_time", "equilibrium")
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseSpring:
-    """The spring and damper identified in one phase; None for numbers that the data leave open."""
+    """The spring and damper identified in one phase; None for numbers that the data do not determine."""
 
     start: float
     """Stride phase at its beginning."""
@@ -96,10 +96,10 @@ def identify(
 
 
 def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
-    """Return the spring of one phase, with its warning."""
+    """Identify the spring of one phase, from its bounds and its samples (n,), and collect reasons to doubt it."""
     count = len(torque)
     estimates: Sequence[Estimate | None] = [None] * 3
-    r2 = correlation = lagged = None
+    r2 = correlation = residual_correlation = None
     spread = 0.0
     condition = np.inf
     reasons = []
@@ -108,13 +108,17 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
     else:
         fit = fit_spring(torque, angle, velocity)
         columns = np.stack([np.ones(count), angle, velocity], -1)
-        size = np.sqrt((columns**2).sum(0))
-        condition = float(np.linalg.cond(columns / np.where(size > 0, size, 1.0)))
-        moved = angle - angle.mean()
-        rate = velocity - velocity.mean()
-        scale = np.sqrt((moved @ moved) * (rate @ rate))
-        correlation = float(np.clip(moved @ rate / scale, -1, 1)) if scale > 0 else None
-        spread = float(np.sqrt(moved @ moved / count * (1 - (correlation or 0.0) ** 2)))
+        lengths = np.sqrt((columns**2).sum(0))
+        condition = float(np.linalg.cond(columns / np.where(lengths > 0, lengths, 1.0)))
+        angle_deviation = angle - angle.mean()
+        velocity_deviation = velocity - velocity.mean()
+        deviation_product = np.sqrt((angle_deviation @ angle_deviation) * (velocity_deviation @ velocity_deviation))
+        correlation = (
+            float(np.clip(angle_deviation @ velocity_deviation / deviation_product, -1, 1))
+            if deviation_product > 0
+            else None
+        )
+        spread = float(np.sqrt(angle_deviation @ angle_deviation / count * (1 - (correlation or 0.0) ** 2)))
         if correlation is not None and abs(correlation) > COLLINEAR:
             reasons.append(f"angle and velocity are nearly collinear (r = {correlation:.3f})")
         elif condition > ILL_CONDITIONED:
@@ -124,20 +128,22 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
         if not fit.solvable:
             reasons.append("K, beta and theta_eq cannot be told apart")
         else:
-            estimates = found = [Estimate(*map(float, numbers)) for numbers in intervals(fit)]
-            lost = fit.residual @ fit.residual
+            estimates = fitted = [Estimate(*map(float, numbers)) for numbers in intervals(fit)]
+            unexplained = fit.residual @ fit.residual
             total = np.sum((torque - torque.mean()) ** 2)
-            r2 = float(1 - lost / total) if total > 0 else None
-            if lost > 1e-20 * (torque @ torque):
-                lagged = float(fit.residual[1:] @ fit.residual[:-1] / lost)
-            if found[0].low <= 0:
+            r2 = float(1 - unexplained / total) if total > 0 else None
+            if unexplained > 1e-20 * (torque @ torque):
+                residual_correlation = float(fit.residual[1:] @ fit.residual[:-1] / unexplained)
+            if fitted[0].low <= 0:
                 reasons.append(
                     "the torque grows with the angle: no spring"
-                    if found[0].high < 0
+                    if fitted[0].high < 0
                     else "stiffness is not significantly above 0: beta and theta_eq have no bounds"
                 )
-            if lagged is not None and lagged > CORRELATED:
-                reasons.append(f"residuals are correlated ({lagged:.2f} from sample to sample): intervals too narrow")
+            if residual_correlation is not None and residual_correlation > CORRELATED:
+                reasons.append(
+                    f"residuals are correlated ({residual_correlation:.2f} from sample to sample): intervals too narrow"
+                )
     return PhaseSpring(
         start=edges[0],
         end=edges[1],
@@ -147,7 +153,7 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
         correlation=correlation,
         condition=condition,
         angle_spread=spread,
-        residual_correlation=lagged,
+        residual_correlation=residual_correlation,
         warning="; ".join(reasons),
     )
 
@@ -155,7 +161,10 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
 def _windows(
     torque: ArrayLike, angle: ArrayLike, velocity: ArrayLike, phase: ArrayLike, bounds: Sequence[float], margin: float
 ) -> list[tuple[tuple[float, float], tuple[NDArray, NDArray, NDArray]]]:
-    """Return for each phase its bounds, and torque, angle and velocity (n,) of its samples."""
+    """Check the arguments of `identify`, and cut the samples into phases.
+
+    Returns for each phase its bounds, and torque, angle and velocity (n,) of the samples in it.
+    """
     arrays = [np.asarray(values, float) for values in (torque, angle, velocity, phase)]
     shapes = [values.shape for values in arrays]
     if len(set(shapes)) > 1 or not all(np.isfinite(values).all() for values in arrays):

@@ -58,7 +58,7 @@ UNKNOWN = "not identified"
 
 @dataclass(frozen=True, kw_only=True)
 class PushedSpring:
-    """Result of pushes for one joint in one phase; None for numbers that the data leave open."""
+    """Result of pushes for one joint in one phase; None for numbers that the data do not determine."""
 
     start: float
     """Stride phase at its beginning."""
@@ -101,8 +101,9 @@ def identify_pushed(
     """Identify K, beta and a verdict for each phase of the stride, from many strides under random pushes.
 
     Args:
-        torque: (n,) [N m], positive as the angle, of the same instants as
-        angle: (n,) [rad] and velocity: (n,) [rad/s].
+        torque: (n,) [N m], positive as the angle.
+        angle: (n,) [rad], at the instants of the torque.
+        velocity: (n,) [rad/s], at the same instants.
         phase: (n,) phase [0, 1) by which the rest angle moves; for a device, its controller's.
         trial: (n,) trial of each sample; trials are independent of each other, samples of one need not be.
         bounds: (P + 1,) ascending stride phases [0, 1]: P phases.
@@ -143,68 +144,73 @@ def _checked(
     trial: ArrayLike,
     states: ArrayLike | None,
 ) -> _Data:
-    """Return the samples as arrays; raise `SpringfootError` for wrong shapes or numbers that are not finite."""
+    """Return the samples as float arrays, trials counted from 0; raise `SpringfootError` for wrong shapes or numbers
+    that are not finite."""
     arrays = tuple(np.asarray(values, float) for values in (torque, angle, velocity, phase, trial))
     shapes = [values.shape for values in arrays]
     if len(set(shapes)) > 1 or len(shapes[0]) != 1 or not all(np.isfinite(values).all() for values in arrays):
         raise SpringfootError(
             f"torque, angle, velocity, phase and trial must be finite numbers, one a sample, got shapes {shapes}"
         )
-    more = np.empty((len(arrays[0]), 0)) if states is None else np.asarray(states, float)
-    if more.ndim != 2 or len(more) != len(arrays[0]) or not np.isfinite(more).all():
-        raise SpringfootError(f"states must be finite numbers ({len(arrays[0])}, q), got shape {more.shape}")
+    further = np.empty((len(arrays[0]), 0)) if states is None else np.asarray(states, float)
+    if further.ndim != 2 or len(further) != len(arrays[0]) or not np.isfinite(further).all():
+        raise SpringfootError(f"states must be finite numbers ({len(arrays[0])}, q), got shape {further.shape}")
     torque, angle, velocity, phase, trial = arrays
-    return _Data(torque, angle, velocity, phase, np.unique(trial, return_inverse=True)[1], more)
+    return _Data(torque, angle, velocity, phase, np.unique(trial, return_inverse=True)[1], further)
 
 
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
-    """Return the spring of one phase."""
+    """Identify the spring of the phase from `low` to `high`, and tell whether it is one."""
     # Samples of the phase, by bins of equal phase; bins with few samples are left out.
-    low_in = low + margin
-    high_in = high - margin
-    inside = np.flatnonzero((data.phase >= low_in) & (data.phase < high_in))
-    cell = np.unique(((data.phase[inside] - low_in) / BIN).astype(int), return_inverse=True)[1]
-    full = np.bincount(cell)[cell] >= LEAST_IN_BIN if len(cell) else np.empty(0, bool)
-    inside = inside[full]
-    cell = np.unique(cell[full], return_inverse=True)[1]
+    first = low + margin
+    last = high - margin
+    inside = np.flatnonzero((data.phase >= first) & (data.phase < last))
+    bin_index = np.unique(((data.phase[inside] - first) / BIN).astype(int), return_inverse=True)[1]
+    enough = np.bincount(bin_index)[bin_index] >= LEAST_IN_BIN if len(bin_index) else np.empty(0, bool)
+    inside = inside[enough]
+    bin_index = np.unique(bin_index[enough], return_inverse=True)[1]
     phase = data.phase[inside]
-    trial = np.unique(data.trial[inside], return_inverse=True)[1]
+    trial = np.unique(data.trial[inside], return_inverse=True)[1]  # counted anew from 0
     trials = int(trial.max()) + 1 if len(trial) else 0
-    known = {"start": low, "end": high, "samples": len(inside), "trials": trials}
+    common = {"start": low, "end": high, "samples": len(inside), "trials": trials}
     needed = max(LEAST_TRIALS, 2 * (data.states.shape[1] + 2))
     if trials < needed:
-        return _unknown(known, f"{trials} trials are too few, {needed} are needed")
+        return _unknown(common, f"{trials} trials are too few, {needed} are needed")
     # Deviations from the mean course; curvature of the spring counts as a further state.
     torque, angle, velocity, *states = (
-        _deviation(column, phase, cell)
+        _deviation(column, phase, bin_index)
         for column in (data.torque[inside], data.angle[inside], data.velocity[inside], *data.states[inside].T)
     )
-    bends = [_deviation(bend, phase, cell) for bend in (angle**2, angle * np.abs(angle))]
-    hats = _hats(phase, low_in, high_in, spacing)
-    spread = float(np.sqrt(np.mean((angle - velocity * (angle @ velocity) / max(velocity @ velocity, 1e-300)) ** 2)))
+    curvatures = [_deviation(bend, phase, bin_index) for bend in (angle**2, angle * np.abs(angle))]
+    knot_weights = _knot_weights(phase, first, last, spacing)
+    unexplained = angle - velocity * (angle @ velocity) / max(velocity @ velocity, 1e-300)
+    spread = float(np.sqrt(np.mean(unexplained**2)))
     # d torque = -K d angle - K beta d velocity, K and K beta linear between knots; then with further states besides.
-    springs = np.concatenate([hats * -angle[:, None], hats * -velocity[:, None]], 1)
-    spent = 2 * (int(cell.max()) + 1)
-    fit = fit_by_trial(springs, torque, trial, spent)
-    wide = fit_by_trial(np.column_stack([springs, *states, *bends]), torque, trial, spent)
-    if fit is None or wide is None:
-        return _unknown(known, "angle and velocity move too little, or as one, to tell K from beta")
-    # K, and beta = (K beta) / K, as means over the samples: of all trials, and without each trial.
-    weights = hats.mean(0)
-    columns = len(weights)
-    stiffness = fit.coefficients[:columns] @ weights
-    once = fit.without[:, :columns] @ weights
-    damping = fit.coefficients[columns:] @ weights
-    damping_once = fit.without[:, columns:] @ weights
-    K = fit.interval(stiffness, once)
+    spring_columns = np.concatenate([knot_weights * -angle[:, None], knot_weights * -velocity[:, None]], 1)
+    line_unknowns = 2 * (int(bin_index.max()) + 1)  # of the mean courses, a straight line in each bin
+    fit = fit_by_trial(spring_columns, torque, trial, line_unknowns)
+    fit_with_states = fit_by_trial(
+        np.column_stack([spring_columns, *states, *curvatures]), torque, trial, line_unknowns
+    )
+    if fit is None or fit_with_states is None:
+        return _unknown(common, "angle and velocity move too little, or as one, to tell K from beta")
+    # K and K beta as means over the samples, by all trials and without each trial; beta = (K beta) / K.
+    mean_weights = knot_weights.mean(0)
+    columns = len(mean_weights)
+    stiffness = fit.coefficients[:columns] @ mean_weights
+    stiffness_without = fit.without[:, :columns] @ mean_weights
+    k_beta = fit.coefficients[columns:] @ mean_weights
+    k_beta_without = fit.without[:, columns:] @ mean_weights
+    K = fit.interval(stiffness, stiffness_without)
     bounded = K.low > 0 or K.high < 0
-    reaction = max(wide.explained - fit.explained, 0.0)
-    chance = wide.chance(2 * columns)
+    # The part that further states explain beyond the spring, and its p-value.
+    reaction = max(fit_with_states.explained - fit.explained, 0.0)
+    chance = fit_with_states.chance(2 * columns)
     verdict, reason = _verdict(K, fit.explained, reaction, chance)
     return PushedSpring(
-        **known,
+        **common,
         stiffness=K,
-        damping_time=fit.interval(damping / stiffness, damping_once / once) if bounded else None,
+        damping_time=fit.interval(k_beta / stiffness, k_beta_without / stiffness_without) if bounded else None,
         explained=fit.explained,
         reaction=reaction,
         reaction_p=chance,
@@ -215,9 +221,13 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
 
 
 def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> tuple[str, str]:
-    """Return the verdict on a joint in a phase, and the reason if it is no spring."""
+    """Return the verdict on a joint in a phase, and the reason if it is no spring.
+
+    `explained` and `reaction` are fractions of the torque's variance, `chance` the p-value of the reaction.
+    """
     if chance < REACTION_LEVEL and reaction >= REACTION_SHARE * (explained + reaction):
         return REACTS, f"further states explain {100 * reaction:.0f} % of the torque's deviations beyond K and beta"
+    # K is below 0 even at the end of an interval twice as wide.
     if K.value + 2 * (K.high - K.value) < 0 and explained >= REACTION_SHARE:
         return REACTS, "the torque grows with the angle"
     if K.low <= (1 - LEAST_PRECISION) * K.value:
@@ -227,10 +237,10 @@ def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> t
     return SPRING, ""
 
 
-def _unknown(known: dict[str, float], reason: str) -> PushedSpring:
-    """Return the result of a phase whose data leave all numbers open, with the reason."""
+def _unknown(common: dict[str, float], reason: str) -> PushedSpring:
+    """Return the result of a phase whose data determine no number, with the reason."""
     return PushedSpring(
-        **known,  # type: ignore[arg-type]
+        **common,  # type: ignore[arg-type]
         stiffness=None,
         damping_time=None,
         explained=0.0,
@@ -242,23 +252,27 @@ def _unknown(known: dict[str, float], reason: str) -> PushedSpring:
     )
 
 
-def _deviation(values: NDArray, phase: NDArray, cell: NDArray) -> NDArray:
-    """Return `values` (n,) minus the straight line over `phase` through the values of each `cell`."""
+def _deviation(values: NDArray, phase: NDArray, bin_index: NDArray) -> NDArray:
+    """Return `values` (n,) minus the straight line over `phase` that fits the values of their bin.
+
+    `bin_index` (n,) counts bins from 0.
+    """
 
     def centred(column: NDArray) -> NDArray:
-        return column - (np.bincount(cell, column) / np.bincount(cell))[cell]
+        return column - (np.bincount(bin_index, column) / np.bincount(bin_index))[bin_index]
 
-    moved = centred(phase)
+    phase_deviation = centred(phase)
     values = centred(values)
-    spread = np.bincount(cell, moved**2)
-    slope = np.bincount(cell, moved * values) / np.where(spread > 1e-18, spread, np.inf)
-    return values - slope[cell] * moved
+    spread = np.bincount(bin_index, phase_deviation**2)
+    slope = np.bincount(bin_index, phase_deviation * values) / np.where(spread > 1e-18, spread, np.inf)
+    return values - slope[bin_index] * phase_deviation
 
 
-def _hats(phase: NDArray, low: float, high: float, spacing: float | None) -> NDArray:
-    """Return (n, knots) weights of a piecewise linear function's values at its evenly spaced knots."""
+def _knot_weights(phase: NDArray, low: float, high: float, spacing: float | None) -> NDArray:
+    """Return the weights (n, knots) with which a piecewise linear function's knots, evenly spaced, give its values at
+    `phase` (n,)."""
     if spacing is None:
         return np.ones((len(phase), 1))
     pieces = max(1, int(np.ceil((high - low) / spacing - 1e-9)))
-    place = np.clip((phase - low) / (high - low) * pieces, 0, pieces)
-    return np.maximum(0.0, 1 - np.abs(place[:, None] - np.arange(pieces + 1)))
+    position = np.clip((phase - low) / (high - low) * pieces, 0, pieces)
+    return np.maximum(0.0, 1 - np.abs(position[:, None] - np.arange(pieces + 1)))

@@ -14,7 +14,7 @@ from springfoot.arrays import NDArray
 from .spring_fit import CONFIDENCE, Estimate
 
 WORST_CONDITION = 1e10
-"""Condition number of the normal equations, columns of unit size, beyond which the data leave the coefficients open."""
+"""Condition number of the normal equations, columns of unit size, beyond which columns count as collinear."""
 
 
 class TrialFit(NamedTuple):
@@ -25,58 +25,61 @@ class TrialFit(NamedTuple):
     without: NDArray
     """(trials, p) coefficients without each trial."""
     inflation: float
-    """Factor on variances, for the unknowns fitted before."""
+    """Factor on variances: samples over the degrees of freedom that are left."""
     explained: float
     """Fraction of the variance explained [0..1]."""
 
     def interval(self, value: float, without: NDArray) -> Estimate:
-        """Return a function of the coefficients with its interval.
+        """Return a function of the coefficients, such as their ratio, with its confidence interval.
 
-        `value` is the function of all trials, `without` (trials,) the function without each trial.
+        `value` is the function at `coefficients`, `without` (trials,) the function at each row of `self.without`.
         """
         trials = len(without)
+        # Jackknife variance: (T - 1) / T times the squared deviations of the T values that leave out a trial.
         variance = self.inflation * (trials - 1) / trials * np.sum((without - without.mean()) ** 2)
         half = stdtrit(trials - 1, (1 + CONFIDENCE) / 2) * np.sqrt(variance)  # Student's t
         return Estimate(float(value), float(value - half), float(value + half))
 
     def chance(self, first: int) -> float:
-        """Return p that coefficients `first` and on are all 0, by Hotelling's T^2; 1 with too few trials."""
+        """Return the p-value of coefficients `first` and later ones being all 0, by Hotelling's T^2; 1 with too few
+        trials."""
         values = self.coefficients[first:]
         without = self.without[:, first:]
         trials, count = without.shape
         if trials <= count:
             return 1.0
-        moved = without - without.mean(0)
-        covariance = self.inflation * (trials - 1) / trials * moved.T @ moved
+        deviation = without - without.mean(0)
+        covariance = self.inflation * (trials - 1) / trials * deviation.T @ deviation
         squared = values @ np.linalg.pinv(covariance, hermitian=True) @ values
         return float(fdtrc(count, trials - count, squared * (trials - count) / (count * (trials - 1))))
 
 
 def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) -> TrialFit | None:
-    """Fit `values` (n,) on `columns` (n, p) by least squares through 0; return None if the data leave the coefficients
-    open.
+    """Fit `values` (n,) on `columns` (n, p) by least squares without a constant, with all trials and without each.
 
-    `trial` (n,) counts trials from 0, each with samples. `spent` is the number of unknowns fitted before, such as
-    means.
+    `trial` (n,) is the index of each sample's trial: 0, 1, ..., none without samples. `spent` is the number of degrees
+    of freedom already used, such as by means subtracted from the columns. Returns None if the data do not determine the
+    coefficients: too few samples, a column that is 0, columns nearly collinear, or values all 0.
     """
     count, unknowns = columns.shape
-    size = np.sqrt((columns**2).mean(0))
-    total = values @ values
+    scale = np.sqrt((columns**2).mean(0))
+    total_square = values @ values
     freedom = count - spent - unknowns
-    if not (size > 1e-12).all() or freedom <= 0 or total == 0:
+    if not (scale > 1e-12).all() or freedom <= 0 or total_square == 0:
         return None
-    unit = columns / size
+    scaled = columns / scale
     order = np.argsort(trial, kind="stable")
     ends = np.cumsum(np.bincount(trial))[:-1]
-    parts = list(zip(np.split(unit[order], ends), np.split(values[order], ends), strict=True))
-    squares = np.stack([part.T @ part for part, _ in parts])
-    pulls = np.stack([part.T @ own for part, own in parts])
-    whole = squares.sum(0)
-    pull = pulls.sum(0)
-    if np.linalg.cond(whole) > WORST_CONDITION:
+    trials = list(zip(np.split(scaled[order], ends), np.split(values[order], ends), strict=True))
+    # Normal equations X'X b = X'y of each trial; leaving a trial out subtracts its part.
+    grams = np.stack([part.T @ part for part, _ in trials])
+    moments = np.stack([part.T @ part_values for part, part_values in trials])
+    gram = grams.sum(0)
+    moment = moments.sum(0)
+    if np.linalg.cond(gram) > WORST_CONDITION:
         return None
-    coefficients = np.linalg.solve(whole, pull)
-    floor = 1e-12 * count * np.eye(unknowns)  # a coefficient that one trial alone knows gets a wide interval
-    without = np.linalg.solve(whole - squares + floor, (pull - pulls)[..., None])[..., 0]
-    lost = np.sum((values - unit @ coefficients) ** 2)
-    return TrialFit(coefficients / size, without / size, count / freedom, float(1 - lost / total))
+    coefficients = np.linalg.solve(gram, moment)
+    ridge = 1e-12 * count * np.eye(unknowns)  # a coefficient that one trial alone determines gets a wide interval
+    without = np.linalg.solve(gram - grams + ridge, (moment - moments)[..., None])[..., 0]
+    unexplained = np.sum((values - scaled @ coefficients) ** 2)
+    return TrialFit(coefficients / scale, without / scale, count / freedom, float(1 - unexplained / total_square))

@@ -1,4 +1,4 @@
-"""Compare the ankle's quasi-stiffness, the slope of its angle-moment curve, of people's mean curves and published
+"""Compare the ankle's quasi-stiffness, the slope of its angle-moment curve, between people's mean curves and published
 trials.
 """
 
@@ -43,8 +43,11 @@ adults (Fukuchi et al., PeerJ 6:e4640, 2018, CC BY 4.0; per-trial slopes compute
 
 
 def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
-    """Return people's ankle quasi-stiffness, not the joint's own K, at 1.2 m/s (`human_gait`) beside another
-    laboratory's."""
+    """Return the ankle's quasi-stiffness in four phases at 1.2 m/s: people's (`human_gait`) beside another
+    laboratory's.
+
+    Quasi-stiffness is the slope of the angle-moment curve, not the K of a spring.
+    """
     human = human_gait(FUKUCHI_SPEED)
     phase = np.arange(100) / 100
     angle = human.mean("ankle", phase)

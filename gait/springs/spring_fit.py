@@ -31,34 +31,36 @@ class SpringFit(NamedTuple):
     freedom: int
     """Degrees of freedom, n - 3."""
     solvable: bool
-    """False if the data leave K and c open; the numbers then mean nothing."""
+    """False if the data do not determine K and c; the numbers then mean nothing."""
 
 
 def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
-    """Fit by least squares about the means, angle and velocity scaled to unit size: no digits lost to units or
-    offsets."""
+    """Fit tau = a - K theta - c theta' to torque, angle and velocity (..., n) by least squares.
+
+    It works on deviations from the means, scaled to unit size, so that no digits are lost to units or offsets.
+    """
     count = torque.shape[-1]
     mean = np.stack([angle.mean(-1), velocity.mean(-1)], -1)
-    moved = np.stack([angle, velocity], -1) - mean[..., None, :]
-    size = np.sqrt((moved**2).mean(-2))
-    solvable = bool(np.all(size > 1e-9 * (1 + np.abs(mean))))
-    size = np.where(size > 0, size, 1.0)
-    unit = moved / size[..., None, :]
-    gram = np.einsum("...ni,...nj->...ij", unit, unit)
+    deviation = np.stack([angle, velocity], -1) - mean[..., None, :]
+    scale = np.sqrt((deviation**2).mean(-2))
+    solvable = bool(np.all(scale > 1e-9 * (1 + np.abs(mean))))
+    scale = np.where(scale > 0, scale, 1.0)
+    scaled = deviation / scale[..., None, :]
+    gram = np.einsum("...ni,...nj->...ij", scaled, scaled)
     solvable &= bool(np.all(np.linalg.det(gram) > 1e-10 * count**2))
-    inverse = np.linalg.pinv(gram, hermitian=True) / size[..., None, :] / size[..., :, None]
-    pull = np.einsum("...ni,...n->...i", moved, torque - torque.mean(-1, keepdims=True))
-    slopes = -np.einsum("...ij,...j->...i", inverse, pull)  # K, c
+    inverse = np.linalg.pinv(gram, hermitian=True) / scale[..., None, :] / scale[..., :, None]
+    moment = np.einsum("...ni,...n->...i", deviation, torque - torque.mean(-1, keepdims=True))
+    slopes = -np.einsum("...ij,...j->...i", inverse, moment)  # K, c
     offset = torque.mean(-1) + np.einsum("...i,...i->...", slopes, mean)
-    residual = torque - offset[..., None] + np.einsum("...ni,...i->...n", moved + mean[..., None, :], slopes)
+    residual = torque - offset[..., None] + np.einsum("...ni,...i->...n", deviation + mean[..., None, :], slopes)
     freedom = count - 3
     variance = (residual**2).sum(-1) / freedom
     # a = mean torque + mean . (K, c), and the mean torque errs independently of the slopes.
-    across = np.einsum("...ij,...j->...i", inverse, mean)
+    offset_covariance = np.einsum("...ij,...j->...i", inverse, mean)
     covariance = np.empty((*variance.shape, 3, 3))
     covariance[..., 1:, 1:] = inverse
-    covariance[..., 0, 1:] = covariance[..., 1:, 0] = across
-    covariance[..., 0, 0] = 1 / count + np.einsum("...i,...i->...", across, mean)
+    covariance[..., 0, 1:] = covariance[..., 1:, 0] = offset_covariance
+    covariance[..., 0, 0] = 1 / count + np.einsum("...i,...i->...", offset_covariance, mean)
     return SpringFit(
         np.concatenate([offset[..., None], slopes], -1),
         covariance * variance[..., None, None],
@@ -69,23 +71,24 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
 
 
 def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
-    """Return (value, low, high) of K, beta and theta_eq.
+    """Return (value, low, high) of K, of beta = c / K and of theta_eq = a / K, each (...).
 
-    Fieller 1954 for the ratios: all r for which the numerator - r K does not differ from 0. Exact, other than the delta
-    method; if K may be 0 the ratio has no bounds.
+    Intervals of ratios are Fieller's (1954), exact: all r for which numerator - r K does not differ from 0. If K may be
+    0 a ratio has no bounds.
     """
     quantile = stdtrit(fit.freedom, (1 + CONFIDENCE) / 2)  # Student's t
     a, K, c = np.moveaxis(fit.coefficients, -1, 0)
     v = np.moveaxis(fit.covariance, (-2, -1), (0, 1)) * quantile**2
     results = [(K, K - np.sqrt(v[1, 1]), K + np.sqrt(v[1, 1]))]
     with np.errstate(divide="ignore", invalid="ignore"):
-        for top, index in ((c, 2), (a, 0)):
-            squared = K**2 - v[1, 1]
-            middle = (top * K - v[index, 1]) / squared
-            product = (top**2 - v[index, index]) / squared
-            half = np.sqrt(np.maximum(middle**2 - product, 0.0))
-            bounded = squared > 0
-            low = np.where(bounded, middle - half, -np.inf)
-            high = np.where(bounded, middle + half, np.inf)
-            results.append((top / K, low, high))
+        for numerator, index in ((c, 2), (a, 0)):
+            # The bounds are the roots of (numerator - r K)^2 = v_nn - 2 r v_nK + r^2 v_KK.
+            square = K**2 - v[1, 1]
+            centre = (numerator * K - v[index, 1]) / square
+            product = (numerator**2 - v[index, index]) / square
+            half = np.sqrt(np.maximum(centre**2 - product, 0.0))
+            bounded = square > 0
+            low = np.where(bounded, centre - half, -np.inf)
+            high = np.where(bounded, centre + half, np.inf)
+            results.append((numerator / K, low, high))
     return results

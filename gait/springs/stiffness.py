@@ -97,9 +97,9 @@ def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: fl
     """
     first_angle, first_torque = start
     last_angle, last_torque = end
-    turned = last_angle - first_angle
-    lost = first_torque - last_torque
-    stiffness = lost / turned if abs(turned) > 1e-6 else 0.0
+    angle_change = last_angle - first_angle
+    torque_drop = first_torque - last_torque
+    stiffness = torque_drop / angle_change if abs(angle_change) > 1e-6 else 0.0
     stiffness = max(stiffness, lowest)
     if stiffness == 0.0:
         return 0.0, (first_angle + last_angle) / 2
@@ -111,8 +111,8 @@ def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str
     angle.
 
     `phase` (n,) ascends from 0, heel strike, at least to `toe_off`; `angle` (n,) [rad], dorsiflexion positive. Foot
-    flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has its foot flat at
-    heel strike, one that only plantarflexes its maximum too. Raises `SpringfootError` for curves that do not fit.
+    flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has foot flat at heel
+    strike; one that only plantarflexes has its maximum there too. Raises `SpringfootError` for curves of another form.
     """
     phase, angle = _stance(phase, angle, toe_off)
     top = int(angle.argmax())
@@ -128,9 +128,9 @@ def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str
 def toe_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
     """Return the phases of heel strike, heel-off, maximum dorsiflexion and toe-off, in this order, from the toe angle.
 
-    As `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of stance (a toe
-    lands raised, too); heel-off the last time before it at which the toe has made no more than `HEEL_OFF_RISE` of its
-    rise from the lowest angle since a quarter of stance, when the foot is flat.
+    Arguments as of `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of
+    stance, since a toe also lands raised. The toe rises to it from its lowest angle after a quarter of stance, when the
+    foot is flat; heel-off is the last phase at which it has made at most `HEEL_OFF_RISE` of that rise.
     """
     phase, angle = _stance(phase, angle, toe_off)
     quarter, half = np.searchsorted(phase, [toe_off / 4, toe_off / 2])
@@ -162,8 +162,8 @@ def schedule_from_curves(
         ankle: angle (n,) [rad], dorsiflexion positive, and torque (n,) [N m], positive as the angle (a plantarflexion
             moment with its sign turned).
         toe: the same of the toe, up positive; None without a known moment: `toe_stiffness` resting at 0 in stance.
-        lowest: stiffness of ankle and toe [N m/rad] in swing, below which no line falls; the thesis says 0. A line
-            no spring can follow takes it through its mid-point (`line_spring`).
+        lowest: stiffness of ankle and toe [N m/rad] in swing, and the least of any line; the thesis says 0. A line
+            that no spring can follow gets it, through its mid-point (`line_spring`).
         toe_stiffness: [N m/rad], if `toe` is None.
 
     Raises `SpringfootError` for curves that do not fit, or a rest angle outside `ANGLE_RANGE` (a heavy load on a line
@@ -197,8 +197,8 @@ def thesis_schedule(
 ) -> StiffnessSchedule:
     """Return the thesis's schedule: people's ankle angle-moment curve cut into straight lines between its events.
 
-    Torques scale with mass x height from people's at `speed` [m/s]. People's moment of the toe is unknown: the toe has
-    `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. No line of the ankle falls below its `LOWEST_STIFFNESS`.
+    The curve is people's at `speed` [m/s], scaled by mass x height. People's moment of the toe is unknown: the toe has
+    `TOE_STIFFNESS` from heel strike to toe-off and rests at 0. No line of the ankle is softer than `LOWEST_STIFFNESS`.
     `swing` is (K [N m/rad, for 1.70 m and 63 kg], rest angle [deg]) of ankle and toe after toe-off.
     """
     human = human_gait(speed, body.height)
@@ -239,19 +239,22 @@ def _curves(*curves: ArrayLike) -> list[NDArray]:
 def _lines(
     events: dict[str, float], phase: ArrayLike, angle: ArrayLike, torque: ArrayLike, lowest: float
 ) -> list[Segment]:
-    """Return one segment from each event to the next; events that coincide have none."""
+    """Return the straight line's spring from each event to the next; no segment between events that coincide.
+
+    `events` are stride phases by name, ascending; angle [rad] and torque [N m] are curves (n,) over `phase` (n,).
+    """
     phases, angles, torques = _curves(phase, angle, torque)
     times = list(events.values())
     points = [(float(np.interp(time, phases, angles)), float(np.interp(time, phases, torques))) for time in times]
     return [
-        Segment(time, *line_spring(start, end, lowest))
-        for (time, until), (start, end) in zip(pairwise(times), pairwise(points), strict=True)
-        if until > time
+        Segment(time, *line_spring(start_point, end_point, lowest))
+        for (time, end), (start_point, end_point) in zip(pairwise(times), pairwise(points), strict=True)
+        if end > time
     ]
 
 
 def _segment(joint: str, entry: object) -> Segment:
-    """Return a segment from its JSON form; raise `SpringfootError` for bad numbers."""
+    """Return a segment of a joint from its JSON form [phase, N m/rad, rad]; raise `SpringfootError` for bad numbers."""
     if not isinstance(entry, (list, tuple)) or len(entry) != 3:
         raise SpringfootError(f"{joint} segment must be [phase, N m/rad, rad], got {entry!r:.80}")
     start = require_within(f"{joint} segment start", entry[0], (0.0, 1.0))

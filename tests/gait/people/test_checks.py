@@ -8,7 +8,7 @@ import tyro
 
 from springfoot.cli.evaluate import EvaluateFlags
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.report import write_gait_cycle
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
@@ -193,7 +193,7 @@ WALKS = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "settings"), WALKS.values(), ids=WALKS)
 def test_what_walks_here_can_be_walked_after(tmp_path, name, settings):
-    gait = measure(record(*prepare(name, {"episode_seconds": 8.0} | settings), name=name, episodes=1))
+    gait = measure(record(*policy_and_settings(name, {"episode_seconds": 8.0} | settings), name=name, episodes=1))
     for side, curves in enumerate(gait.feet):
         assert curves.count
         path = tmp_path / f"{side}.csv"

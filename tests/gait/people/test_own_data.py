@@ -310,8 +310,8 @@ def test_a_leg_that_was_not_measured_is_left_out(tmp_path):
         ({"step_length_m": 2 * HUMAN.step_length}, "a stride's length, or a step's time?"),
         ({"stride_time_s": HUMAN.stride_time / 2}, "a stride's length, or a step's time?"),
         ({"n": 2.5}, "n must be a whole number of strides, got 2.5"),
-        ({"knee_flexion_deg_sd": -5.0}, "knee_flexion_deg_sd must lie from 0 to twice the range of its curve"),
-        ({"knee_flexion_deg_sd": 500.0}, "knee_flexion_deg_sd must lie from 0 to twice the range of its curve"),
+        ({"knee_flexion_deg_sd": -5.0}, "knee_flexion_deg_sd must lie from 0 to 2 times the range of its curve"),
+        ({"knee_flexion_deg_sd": 500.0}, "knee_flexion_deg_sd must lie from 0 to 2 times the range of its curve"),
     ],
 )
 def test_numbers_beside_the_curves_that_contradict_them_are_refused(tmp_path, wrong, words):

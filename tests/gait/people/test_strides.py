@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.gait.people.contacts import Contacts
 from springfoot.gait.people.motion_files import Trial
-from springfoot.gait.people.strides import MeasuredWalk, cut_strides, together
+from springfoot.gait.people.strides import MeasuredWalk, cut_strides, merge_trials
 
 TICK = 0.01
 
@@ -13,7 +13,7 @@ TICK = 0.01
 def test_trials_have_in_common_the_time_from_the_last_beginning_to_the_first_end():
     slow = Trial(name="a", time=0.5 + 0.02 * np.arange(101), legs={"left": {"knee": 0.02 * np.arange(101)}})
     quick = Trial(name="b", time=0.8 + 0.01 * np.arange(101), legs={"left": {"hip": 0.01 * np.arange(101)}})
-    walk = together([slow, quick])
+    walk = merge_trials([slow, quick])
     assert (walk.name, walk.first, walk.tick) == ("a,b", 0.8, pytest.approx(0.01))
     assert walk.last == pytest.approx(1.8)
     np.testing.assert_allclose(walk.legs["left"]["hip"], 0.01 * np.arange(101), atol=1e-12)
