@@ -21,7 +21,7 @@ from springfoot.envs.control.constants import constants_from
 from springfoot.envs.control.reference_walk import reference_walks
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import Recording, load_recording, record
 from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
 from springfoot.files.json_file import read_object
@@ -55,7 +55,7 @@ class Reader:
 
 def readers(folder: Path) -> dict[str, Reader]:
     """Every reader by name; what it takes to make files of theirs stands in `folder`."""
-    walk = record(*prepare("schedule", {"episode_seconds": 4.0}), name="schedule", episodes=1)
+    walk = record(*policy_and_settings("schedule", {"episode_seconds": 4.0}), name="schedule", episodes=1)
     recording = folder / "strides.npz"
     walk.save(recording)
     own = OwnGait.from_json(read_gait(_write(folder / "own.csv", _percent())).to_json())

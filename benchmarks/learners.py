@@ -173,8 +173,8 @@ def _judge_recurrent(learner: Learner, python: Path, out: Path) -> dict[str, Any
     train(learner, python, out)
     given = {"episode_seconds": TASK.episode_seconds, "push_newton": TASK.push_newton}
     code = f"""import json
-from springfoot.evaluation import prepare, record
-policy, settings = prepare("sb3_recurrent:act", {given})
+from springfoot.evaluation import policy_and_settings, record
+policy, settings = policy_and_settings("sb3_recurrent:act", {given})
 print(json.dumps(record(policy, settings, name="recurrent", episodes={EPISODES}).returns.tolist()))"""
     own = _environ() | {"RECURRENT": str(out)}
     done = subprocess.run([python, "-c", code], cwd=EXAMPLES, env=own, capture_output=True, text=True)

@@ -27,7 +27,7 @@ from springfoot.envs.physics.timing import WINDOWS_PER_STEP
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers.metrics import Gait, measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 
 from .physics_changes import DEFAULT, JOINT_ROWS, ROWS, edited, joint_constant, without_stairs
@@ -121,7 +121,7 @@ def run(flags: Flags) -> None:
     """Walk every row, and of physics settings measure the costs; print."""
     for name in ("episodes", "rounds", "threads"):
         require_count(name, getattr(flags, name))
-    prepared = {name: prepare(name, {"episode_seconds": flags.seconds}) for name in flags.policies}
+    prepared = {name: policy_and_settings(name, {"episode_seconds": flags.seconds}) for name in flags.policies}
     about = machine()
     print(f"{about['processor']}, load {load():.2f}, MuJoCo {about['versions']['mujoco']}")
     vary = {"settings": _vary_settings, "joints": _vary_joints, "stairs": _vary_stairs}

@@ -22,7 +22,7 @@ from springfoot.agents.policies.policy import read_policy
 from springfoot.agents.training.config import PRESETS
 from springfoot.agents.training.training import train
 from springfoot.envs.control.constants import leg_constants
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait.people.human import PEOPLE_FILE
 from springfoot.studies.searches.constants_file import read_constants, write_constants
@@ -93,7 +93,7 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
     train(replace(preset, timesteps=how.timesteps, threads=1, environment=settings), folder / "run")
     policy = read_policy(folder / "run" / "last.safetensors")
     given: dict[str, Any] = {"people_file": file} if file else {}
-    walked = record(*prepare("predicted", given), name="predicted", episodes=how.episodes, threads=1)
+    walked = record(*policy_and_settings("predicted", given), name="predicted", episodes=how.episodes, threads=1)
     return {
         "what candidates pay": json.dumps(paid).encode(),
         "constants": json.dumps([read_constants(each)["constants"] for each in (constants, walking)]).encode(),

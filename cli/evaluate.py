@@ -100,7 +100,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     prepared = []
     for label, name in zip(labels, flags.policies, strict=True):
         with _bar(f"{label}, copying", 0.0, delay=0.5) as bar:
-            prepared.append(policies.prepare(name, settings, flags.seed, flags.threads, _follow(bar)))
+            prepared.append(policies.policy_and_settings(name, settings, flags.seed, flags.threads, _follow(bar)))
     for _, environment in prepared:
         recording.require_recordable(environment, flags.episodes)
 

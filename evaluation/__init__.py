@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .numbers.curves import StrideCurves
     from .numbers.metrics import Gait, measure
     from .recording.open_loop import open_loop_copy
-    from .recording.policies import prepare
+    from .recording.policies import policy_and_settings
     from .recording.recording import Recording, load_recording, record, record_each
     from .report.animation import save_animation
     from .report.gait_figure import save_gait_figure
@@ -29,7 +29,7 @@ __all__ = [
     "load_recording",
     "measure",
     "open_loop_copy",
-    "prepare",
+    "policy_and_settings",
     "print_table",
     "record",
     "record_each",
@@ -50,7 +50,7 @@ _MODULE = {
     "load_recording": "recording.recording",
     "measure": "numbers.metrics",
     "open_loop_copy": "recording.open_loop",
-    "prepare": "recording.policies",
+    "policy_and_settings": "recording.policies",
     "print_table": "report.gait_table",
     "record": "recording.recording",
     "record_each": "recording.recording",

@@ -9,7 +9,7 @@ import argparse
 
 from matplotlib.figure import Figure
 
-from springfoot.evaluation import measure, prepare, record
+from springfoot.evaluation import measure, policy_and_settings, record
 from springfoot.gait import PERCENT
 
 ROWS = {
@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--out", default="schedule.png")
     args = parser.parse_args()
 
-    policy, settings = prepare(args.policy, {"episode_seconds": args.seconds})
+    policy, settings = policy_and_settings(args.policy, {"episode_seconds": args.seconds})
     gait = measure(record(policy, settings, name=args.policy, episodes=args.episodes))
 
     figure = Figure(figsize=(8, 7), layout="constrained")

@@ -11,7 +11,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_sb3, save_policy
-from springfoot.evaluation import prepare, record
+from springfoot.evaluation import policy_and_settings, record
 
 
 def main() -> None:
@@ -43,7 +43,7 @@ def main() -> None:
     ppo.learn(args.timesteps)
     save_policy(args.out, policy_from_sb3(ppo))  # with the statistics of its VecNormalize
 
-    policy, settings = prepare(str(args.out), {"episode_seconds": args.seconds})
+    policy, settings = policy_and_settings(str(args.out), {"episode_seconds": args.seconds})
     walk = record(policy, settings, name=args.out.stem, episodes=1)
     print(f"walked {0.01 * walk.ticks[0]:.2f} s, return {walk.returns[0]:.1f}, {walk.fall_reason[0] or 'no fall'}")
     print(f"Next: python evaluate.py {args.out}")

@@ -38,15 +38,17 @@ _FAULTS = (
 
 
 def write_arrays(path: Path, header: dict[str, Any], arrays: dict[str, NDArray]) -> None:
-    """Write arrays and a JSON header as an .npz file."""
+    """Write arrays and a JSON header as an .npz file, with a digest of both in the header."""
     packed = {name: np.asarray(array, order="C") for name, array in arrays.items()}
     text = json.dumps(header | {DIGEST: digest_of(header, packed)}, allow_nan=False)
     np.savez(path, **{HEADER: np.array(text)}, **dict[str, Any](packed))
 
 
-def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Return header and arrays of a file of `write_arrays`; raise `SpringfootError` for any other, calling it no
-    `what`."""
+def read_arrays(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return header and arrays of a file that `write_arrays` wrote.
+
+    Raises `SpringfootError` for any other file; the message calls it no `kind` ("FILE is no walk's recording").
+    """
     try:
         with open_file(path) as file, ZipFile(file) as archive:
             members = archive.infolist()
@@ -54,21 +56,21 @@ def read_arrays(path: Path, what: str) -> tuple[dict[str, Any], dict[str, NDArra
                 any(member.compress_type != ZIP_STORED for member in members)
                 or sum(member.file_size for member in members) > os.fstat(file.fileno()).st_size
             ):
-                raise SpringfootError(f"{path} is no {what}: it is compressed")
+                raise SpringfootError(f"{path} is no {kind}: it is compressed")
             arrays = {member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in members}
         header = json.loads(str(arrays.pop(HEADER)))
         digest = header.pop(DIGEST, None)
-        whole = digest == digest_of(header, arrays)
+        unchanged = digest == digest_of(header, arrays)
     except SpringfootError:
         raise
     except BadZipFile as error:
-        raise SpringfootError(f"{path} is no {what}, or it is damaged: {error}") from None
+        raise SpringfootError(f"{path} is no {kind}, or it is damaged: {error}") from None
     except _FAULTS as error:
         reason = f": {error.strerror}" if isinstance(error, OSError) and error.strerror else ""
-        raise SpringfootError(f"{path} is no {what}{reason}") from None
+        raise SpringfootError(f"{path} is no {kind}{reason}") from None
     if digest is None:
         raise SpringfootError(f"{path} has no digest: another version of springfoot wrote it; evaluate again")
-    if not whole:
+    if not unchanged:
         raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
     return header, arrays
 
@@ -79,11 +81,11 @@ def _array(content: bytes) -> NDArray:
     Raises `ValueError` for objects, and for a header that claims more data than there is.
     """
     file = io.BytesIO(content)
-    read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))
-    if read is None:
+    read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))
+    if read_header is None:
         raise ValueError("another version of the format")
     try:
-        shape, _, dtype = read(file)
+        shape, _, dtype = read_header(file)
     except (TokenError, SyntaxError, RecursionError) as error:
         raise ValueError(f"its header is not Python's: {error}") from None
     if dtype.hasobject or prod(shape) * dtype.itemsize != len(content) - file.tell():

@@ -14,14 +14,14 @@ MOST_MEMORY, MOST_SECONDS, MOST_WAIT = 2**29, 60, 300
 minutes takes a tenth of each."""
 
 
-def in_process(code: str, *words: str) -> bytes | None:
+def output_in_process(code: str, *arguments: str) -> bytes | None:
     """Return the standard output of Python `code` in a new process; None if the process fails or is ended.
 
-    `code` calls `bound_resources` after its imports; `words` are its arguments.
+    `code` has to call `bound_resources` after its imports; it finds `arguments` in `sys.argv`.
     """
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", code, *words],  # -P: no modules of this folder
+        finished = subprocess.run(
+            [sys.executable, "-P", "-c", code, *arguments],  # -P: no modules of this folder
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -30,11 +30,11 @@ def in_process(code: str, *words: str) -> bytes | None:
         )
     except subprocess.TimeoutExpired:
         return None
-    return None if done.returncode else done.stdout
+    return None if finished.returncode else finished.stdout
 
 
 def bound_resources() -> None:
-    """Bound the further memory and the further processor time of this process."""
+    """Bound this process to `MOST_MEMORY` more memory than now, and to `MOST_SECONDS` of processor time in all."""
     try:
         import resource  # not on every system
     except ImportError:

@@ -10,26 +10,27 @@ from pathlib import Path
 
 from springfoot.errors import SpringfootError
 
-SEAL = "sha256"
-"""Name of the digest's CSV column or JSON entry; it also stands before the digits, so that no single bit hides both."""
-BLANK = f"{SEAL}:{'0' * 64}"
+DIGEST = "sha256"
+"""Name of the digest's CSV column or JSON entry. It also stands before the digits, so that a file in which one of the
+two is damaged still shows that it had a digest."""
+BLANK_DIGEST = f"{DIGEST}:{'0' * 64}"
 """Placeholder for the digest in a text without one."""
 _DIGITS = re.compile(rb"sha256:([0-9a-f]{64})")
 
 
-def sealed(text: str) -> str:
-    """Return `text` with its digest in place of every `BLANK`."""
-    return text.replace(BLANK, f"{SEAL}:{sha256(text.encode()).hexdigest()}")
+def with_digest(text: str) -> str:
+    """Return `text` with its digest in place of every `BLANK_DIGEST`."""
+    return text.replace(BLANK_DIGEST, f"{DIGEST}:{sha256(text.encode()).hexdigest()}")
 
 
-def require_whole(path: Path, content: bytes) -> None:
-    """Raise `SpringfootError` if a file's content has a digest that does not fit."""
-    if SEAL.encode() not in content:
-        return  # of somebody else, or of an earlier version
-    found = _DIGITS.search(content)
-    blank = content.replace(found[1], BLANK.removeprefix(f"{SEAL}:").encode()) if found else b""
-    if found is None or sha256(blank).hexdigest().encode() != found[1]:
+def require_unchanged(path: Path, content: bytes) -> None:
+    """Raise `SpringfootError` if a file's content has a digest that does not fit; content without a digest passes."""
+    if DIGEST.encode() not in content:
+        return  # the file is not springfoot's, or an earlier version wrote it
+    written = _DIGITS.search(content)
+    blank = content.replace(written[1], BLANK_DIGEST.removeprefix(f"{DIGEST}:").encode()) if written else b""
+    if written is None or sha256(blank).hexdigest().encode() != written[1]:
         raise SpringfootError(
-            f"{path} is damaged or was changed: its contents are not those that were written; without its {SEAL} it "
+            f"{path} is damaged or was changed: its contents are not those that were written; without its {DIGEST} it "
             "is read as it is"
         )

@@ -8,7 +8,7 @@ from typing import Any
 
 from springfoot.errors import SpringfootError, printable
 
-from .digest import BLANK, SEAL, require_whole, sealed
+from .digest import BLANK_DIGEST, DIGEST, require_unchanged, with_digest
 from .text_table import read_bytes
 
 MOST_JSON_BYTES = 2**23
@@ -16,25 +16,25 @@ MOST_JSON_BYTES = 2**23
 text."""
 
 
-def sealed_object(values: Mapping[str, Any]) -> bytes:
-    """Return the values as a JSON file's content, with a digest (`seal`)."""
-    return sealed(json.dumps({**values, SEAL: BLANK}, indent=2) + "\n").encode()
+def object_with_digest(values: Mapping[str, Any]) -> bytes:
+    """Return the values as the content of a JSON file that also holds its digest (`digest`)."""
+    return with_digest(json.dumps({**values, DIGEST: BLANK_DIGEST}, indent=2) + "\n").encode()
 
 
-def read_object(path: Path, what: str) -> dict[str, Any]:
+def read_object(path: Path, kind: str) -> dict[str, Any]:
     """Return the object in a JSON file, without its digest.
 
-    Raises `SpringfootError` for any other file, calling it no `what`.
+    Raises `SpringfootError` for any other file; the message calls it no `kind` ("FILE is no policy's settings").
     """
     content = read_bytes(path, MOST_JSON_BYTES)
-    require_whole(path, content)
+    require_unchanged(path, content)
     try:
         value = json.loads(content, object_pairs_hook=keys_once, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
-        raise SpringfootError(f"{path} is no {what}: it is not JSON, {json_fault(error)}") from None
+        raise SpringfootError(f"{path} is no {kind}: it is not JSON, {json_fault(error)}") from None
     if not isinstance(value, dict):
-        raise SpringfootError(f"{path} is no {what}: it must be an object in braces")
-    return {name: each for name, each in value.items() if name != SEAL}
+        raise SpringfootError(f"{path} is no {kind}: it must be an object in braces")
+    return {name: entry for name, entry in value.items() if name != DIGEST}
 
 
 def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _finite(text: str) -> float:
-    """Return a number of a JSON text; raise `ValueError` for NaN and for what no float can hold, which JSON has not."""
+    """Return the number in a JSON text; raise `ValueError` for NaN, infinity and numbers too large for a float."""
     value = float(text)
     if not isfinite(value):
         raise ValueError(f"{text:.40} is not a finite number")
@@ -56,7 +56,7 @@ def _finite(text: str) -> float:
 
 
 def json_fault(error: Exception) -> str:
-    """Return the fault of a text that is not JSON, in a few words."""
+    """Return words for the fault of a text that is not JSON, from the `error` that reading it raised."""
     if isinstance(error, json.JSONDecodeError):
         return f"line {error.lineno}, column {error.colno}: {error.msg[0].lower()}{error.msg[1:]}"
     if isinstance(error, UnicodeDecodeError):

@@ -50,64 +50,82 @@ def owned(folder: Path) -> Iterator[None]:
 
     A missing folder is made, and removed at the end if it is empty. A message on standard error says when the folder
     comes from a dead owner. Raises `SpringfootError`, with nothing changed, if the folder cannot be made, and if the
-    folder or its owner's file is a link, or the latter no regular file. Raises `TakenError` if another process owns the
-    folder.
+    folder or its owner's file is a link, or that file is not a regular one. Raises `TakenError` if another process owns
+    the folder.
     """
     try:
         str(folder).encode()
     except UnicodeEncodeError:  # TensorBoard, JSON and pages could not name it
         raise SpringfootError(f"cannot make the folder {folder}: its name must be UTF-8 text") from None
     path = folder / OWNER
-    made: list[Path] = []
+    new_folders: list[Path] = []
     try:
-        handle, locked = _locked(path, made)
-        mine = True
-        over = threading.Event()
+        handle, locked = _open_and_lock(path, new_folders)
+        removes_file = True
+        ended = threading.Event()
         try:
-            former = _read(handle)
-            if os.fstat(handle).st_size and not former.keys() >= _KEYS:
-                mine = False
-                raise SpringfootError(f"{path} is not a file of springfoot's: remove it")
-            if former and (former.get("host") != socket.gethostname() or (not locked and _runs(former))):
-                silent = time.time() - path.stat().st_mtime
-                mine = silent >= DEAD
-                if silent < -DEAD:
-                    raise TakenError(
-                        _taken(folder, former, f", by a clock {_span(-silent)} ahead; remove {path} if not")
-                    )
-                if not mine:
-                    raise TakenError(_taken(folder, former, f", last heard of {_span(silent)} ago"))
-            if former:
-                print(f"{folder}: taken over from {_named(former)}, which has ended", file=sys.stderr, flush=True)
-            me = {"pid": os.getpid(), "host": socket.gethostname(), "began": datetime.now(UTC).isoformat()}
+            try:
+                former_owner = _dead_owner(folder, handle, locked)
+            except SpringfootError:
+                removes_file = False
+                raise
+            if former_owner:
+                print(
+                    f"{folder}: taken over from {_owner_in_words(former_owner)}, which has ended",
+                    file=sys.stderr,
+                    flush=True,
+                )
+            owner = {"pid": os.getpid(), "host": socket.gethostname(), "began": datetime.now(UTC).isoformat()}
             os.ftruncate(handle, 0)
-            os.pwrite(handle, json.dumps(me).encode(), 0)
-            threading.Thread(target=_live, args=(path, over), daemon=True).start()
+            os.pwrite(handle, json.dumps(owner).encode(), 0)
+            threading.Thread(target=_keep_touching, args=(path, ended), daemon=True).start()
             yield
         finally:
-            over.set()
-            if mine and _same(handle, path):  # it is another's, or nobody's, where the folder was moved
+            ended.set()
+            if removes_file and _is_file_at(handle, path):  # it is not where the folder was moved or replaced
                 path.unlink()
             os.close(handle)
     finally:
         with suppress(OSError):
-            for each in reversed(made):
-                each.rmdir()
+            for new_folder in reversed(new_folders):
+                new_folder.rmdir()
 
 
-def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
-    """Return a handle of the file at `path`, and whether it is locked, as it always is where file systems have locks.
+def _dead_owner(folder: Path, handle: int, locked: bool) -> dict[str, Any]:
+    """Return the record of a folder's former owner, empty if there was none.
 
-    Makes missing folders above it, and adds them to `made`. Links above the folder are followed, but neither the folder
-    nor the file may be one: whoever made it would have us write elsewhere.
+    `handle` is that of the owner's file, and `locked` tells whether this process holds its lock. Raises `TakenError` if
+    the owner may still live, and `SpringfootError` for a file with another content.
+    """
+    path = folder / OWNER
+    owner = _owner_in(handle)
+    if os.fstat(handle).st_size and not owner.keys() >= _KEYS:
+        raise SpringfootError(f"{path} is not a file of springfoot's: remove it")
+    # With the lock, an owner of this host is dead. Otherwise its process tells, and on another host its last touch.
+    if owner and (owner.get("host") != socket.gethostname() or (not locked and _is_running(owner))):
+        silence = time.time() - path.stat().st_mtime
+        if silence < -DEAD:
+            ahead = _time_in_words(-silence)
+            raise TakenError(_taken_message(folder, owner, f", by a clock {ahead} ahead; remove {path} if not"))
+        if silence < DEAD:
+            raise TakenError(_taken_message(folder, owner, f", last heard of {_time_in_words(silence)} ago"))
+    return owner
+
+
+def _open_and_lock(path: Path, new_folders: list[Path]) -> tuple[int, bool]:
+    """Open the owner's file at `path`, made if missing, and lock it: return its handle, and whether it is locked.
+
+    It is not locked where the file system has no locks. Missing folders above it are made and added to `new_folders`.
+    Links above the folder are followed, but neither the folder nor the file may be one: whoever made it would have us
+    write elsewhere. Raises `TakenError` if another process holds the lock.
     """
     while True:
         if path.parent.is_symlink():
             raise SpringfootError(f"{path.parent} is a link: name the folder itself")
-        made += _make(path.parent)
+        new_folders += _make_folders(path.parent)
         try:
             handle = os.open(path, os.O_RDWR | os.O_CREAT | _NO_LINK, 0o644)
-        except FileNotFoundError:  # the one before has just removed its folder
+        except FileNotFoundError:  # the former owner has just removed its folder
             continue
         except OSError as error:
             if path.is_symlink() or not path.is_file():
@@ -121,21 +139,21 @@ def _locked(path: Path, made: list[Path]) -> tuple[int, bool]:
             if fcntl is not None:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            until = time.monotonic() + _NAMED_WITHIN
-            while not (owner := _read(handle)) and time.monotonic() < until:
-                time.sleep(0.01)  # it has only just locked the file
+            deadline = time.monotonic() + _NAMED_WITHIN
+            while not (owner := _owner_in(handle)) and time.monotonic() < deadline:
+                time.sleep(0.01)  # the owner has only just locked the file, and not yet written its name
             os.close(handle)
-            raise TakenError(_taken(path.parent, owner)) from None
+            raise TakenError(_taken_message(path.parent, owner)) from None
         except OSError:  # a file system without locks
             locked = False
-        if _same(handle, path):
+        if _is_file_at(handle, path):
             return handle, locked
-        os.close(handle)  # the one before has just removed its file
+        os.close(handle)  # the former owner has just removed its file
 
 
-def _make(folder: Path) -> list[Path]:
+def _make_folders(folder: Path) -> list[Path]:
     """Make a folder and those above it; return the new ones, outermost first."""
-    missing = [each for each in (folder, *folder.parents) if not each.exists()][::-1]
+    missing = [ancestor for ancestor in (folder, *folder.parents) if not ancestor.exists()][::-1]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -143,7 +161,7 @@ def _make(folder: Path) -> list[Path]:
     return missing
 
 
-def _same(handle: int, path: Path) -> bool:
+def _is_file_at(handle: int, path: Path) -> bool:
     """Tell whether a handle is still that of the file at `path`."""
     try:
         return os.path.samestat(os.fstat(handle), path.stat())
@@ -151,20 +169,20 @@ def _same(handle: int, path: Path) -> bool:
         return False
 
 
-def _live(path: Path, over: threading.Event) -> None:
-    """Touch the owner's file every `BEAT` seconds until the event `over`."""
-    while not over.wait(BEAT):
+def _keep_touching(path: Path, ended: threading.Event) -> None:
+    """Touch the owner's file every `BEAT` seconds until the event `ended` is set."""
+    while not ended.wait(BEAT):
         with suppress(OSError):
             os.utime(path, follow_symlinks=False)
 
 
-def _read(handle: int) -> dict[str, Any]:
-    """Return the record of the owner; empty if there is none."""
+def _owner_in(handle: int) -> dict[str, Any]:
+    """Return the record of the owner in an open file; empty if there is none."""
     try:
-        found = json.loads(os.pread(handle, MOST_OWNER_BYTES, 0))
+        record = json.loads(os.pread(handle, MOST_OWNER_BYTES, 0))
     except (OSError, ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return record if isinstance(record, dict) else {}
 
 
 def is_marked(folder: Path) -> bool:
@@ -174,7 +192,7 @@ def is_marked(folder: Path) -> bool:
     except OSError:
         return False
     try:
-        return _may_be_ours(os.fstat(handle)) and _read(handle).keys() >= _KEYS
+        return _may_be_ours(os.fstat(handle)) and _owner_in(handle).keys() >= _KEYS
     finally:
         os.close(handle)
 
@@ -184,8 +202,8 @@ def _may_be_ours(file: os.stat_result) -> bool:
     return stat.S_ISREG(file.st_mode) and file.st_nlink <= 1
 
 
-def _runs(owner: dict[str, Any]) -> bool:
-    """Tell whether this host runs a process of that id."""
+def _is_running(owner: dict[str, Any]) -> bool:
+    """Tell whether this host runs a process with the owner's id."""
     try:
         os.kill(int(owner["pid"]), 0)
     except (ProcessLookupError, KeyError, TypeError, ValueError, OverflowError):
@@ -195,20 +213,20 @@ def _runs(owner: dict[str, Any]) -> bool:
     return True
 
 
-def _taken(folder: Path, owner: dict[str, Any], more: str = "") -> str:
-    return f"{folder} is being written by {_named(owner)}{more}; wait for it, or choose another folder"
+def _taken_message(folder: Path, owner: dict[str, Any], detail: str = "") -> str:
+    return f"{folder} is being written by {_owner_in_words(owner)}{detail}; wait for it, or choose another folder"
 
 
-def _named(owner: dict[str, Any]) -> str:
+def _owner_in_words(owner: dict[str, Any]) -> str:
     """Return the owner in words: process, host and age."""
     try:
         age = (datetime.now(UTC) - datetime.fromisoformat(owner["began"])).total_seconds()
-        return f"process {int(owner['pid'])} on {owner['host']}, begun {_span(age)} ago"
+        return f"process {int(owner['pid'])} on {owner['host']}, begun {_time_in_words(age)} ago"
     except (KeyError, TypeError, ValueError):
         return "another process"
 
 
-def _span(seconds: float) -> str:
+def _time_in_words(seconds: float) -> str:
     """Return a time [s] in words."""
     for unit, size in (("d", 86400), ("h", 3600), ("min", 60)):
         if seconds >= 2 * size:

@@ -6,7 +6,7 @@ MISSING = "–"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a markdown table."""
+    """Return a Markdown table: a line of headings, and rows of as many cells."""
     return "\n".join("| " + " | ".join(line) + " |" for line in (head, ("---",) * len(head), *rows))
 
 
@@ -16,9 +16,9 @@ def text_of(value: float | None, pattern: str) -> str:
 
 
 def plus_minus(spread: Mapping[str, float | None], pattern: str, *, alone: bool = True) -> str:
-    """Return a spread of `mean_sd` as "mean ± SD".
+    """Return a dictionary {"mean", "sd"} as text "mean ± SD", each by the format `pattern`.
 
-    Without an SD the mean stands `alone`, or else with `MISSING` for the SD.
+    If "sd" is None, the text is the mean `alone`, or with `alone=False` "mean ± –".
     """
     mean, sd = (text_of(spread[name], pattern) for name in ("mean", "sd"))
     return mean if alone and spread["sd"] is None else f"{mean} ± {sd}"

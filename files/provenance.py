@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 
-def source(packages: Iterable[str]) -> dict[str, Any]:
-    """Return the versions of Python and `packages`, and the git commit (None outside a clone of the project)."""
+def versions_and_commit(packages: Iterable[str]) -> dict[str, Any]:
+    """Return entries for a result's record: the versions of Python and `packages`, and the git commit.
+
+    The commit, and whether files differ from it, are None outside a clone of the project.
+    """
 
     def git(*words: str) -> str | None:
         command = ["git", "-C", str(Path(__file__).parent), *words]
@@ -18,9 +21,9 @@ def source(packages: Iterable[str]) -> dict[str, Any]:
         except (OSError, subprocess.CalledProcessError):
             return None
 
-    ours = git("ls-files", "--error-unmatch", Path(__file__).name) is not None
+    in_clone = git("ls-files", "--error-unmatch", Path(__file__).name) is not None
     return {
-        "commit": git("rev-parse", "HEAD") if ours else None,
-        "modified": bool(git("status", "--porcelain", "--untracked-files=no")) if ours else None,
+        "commit": git("rev-parse", "HEAD") if in_clone else None,
+        "modified": bool(git("status", "--porcelain", "--untracked-files=no")) if in_clone else None,
         "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
     }

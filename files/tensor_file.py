@@ -37,17 +37,17 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
 
 
 def read_tensors(
-    path: Path, key: str, what: str, entries: AbstractSet[str], finite: bool = True, sealed: bool = False
+    path: Path, key: str, kind: str, entries: AbstractSet[str], finite: bool = True, needs_digest: bool = False
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Return the JSON under `key` of a .safetensors header, and the tensors.
 
     Args:
         path: of the file.
         key: of the header's JSON text.
-        what: name of such a file, in messages.
+        kind: name of such a file, in messages.
         entries: allowed entries of the JSON.
         finite: refuse infinite numbers and NaN.
-        sealed: refuse a file without a digest; files of earlier versions have none.
+        needs_digest: refuse a file without a digest; files of earlier versions have none.
 
     Raises `SpringfootError` for any other file.
     """
@@ -63,7 +63,7 @@ def read_tensors(
         with safe_open(path, framework="numpy") as file:
             text = (file.metadata() or {}).get(key)
             if text is None:
-                raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {what}")
+                raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {kind}")
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         header = json.loads(text)
     except (SafetensorError, OSError, TypeError, AttributeError) as error:
@@ -75,10 +75,10 @@ def read_tensors(
     if unknown := sorted(header.keys() - entries - {DIGEST}):
         raise SpringfootError(f"{path} is damaged: its header has an entry {quoted(unknown[0])}")
     if DIGEST in header:
-        whole = text == _text(header)
-        if header.pop(DIGEST) != digest_of(header, tensors) or not whole:
+        same_text = text == _text(header)
+        if header.pop(DIGEST) != digest_of(header, tensors) or not same_text:
             raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
-    elif sealed:
+    elif needs_digest:
         raise SpringfootError(f"{path} is damaged or was changed: it has no {DIGEST}")
     for tensor_name, tensor in tensors.items() if finite else ():
         if tensor.dtype not in (np.float32, np.float64) or not np.isfinite(tensor).all():
@@ -91,9 +91,10 @@ def _text(header: Mapping[str, Any]) -> str:
 
 
 def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
-    """Return the digest of a JSON header and arrays: of their names, types, shapes and bytes, in any order."""
-    found = sha256(_text(header).encode())
+    """Return the digest of a JSON header and of arrays, with their names, types and shapes; their order is no
+    matter."""
+    digest = sha256(_text(header).encode())
     for name in sorted(tensors):
-        found.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())
-        found.update(np.ascontiguousarray(tensors[name]).data)
-    return found.hexdigest()
+        digest.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())
+        digest.update(np.ascontiguousarray(tensors[name]).data)
+    return digest.hexdigest()

@@ -16,7 +16,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
-from .digest import require_whole
+from .digest import require_unchanged
 
 MOST_TEXT_BYTES, LONGEST_LINE, MOST_COLUMNS, MOST_CELLS = 2**26, 2**20, 2000, 3_000_000
 """Largest text file to read: bytes, letters of a line, columns, cells; chosen: 25 minutes of 20 curves at 100 Hz, which
@@ -44,8 +44,8 @@ class Table:
 
     def numbers(self, column: str) -> NDArray:
         """Return a column's cells as finite numbers; raise `SpringfootError` for any other cell."""
-        at = self.columns.index(column)
-        return np.array([self._number(line, column, cells[at]) for line, cells in self.rows])
+        index = self.columns.index(column)
+        return np.array([self._number(line, column, cells[index]) for line, cells in self.rows])
 
     def ascending(self, column: str) -> NDArray:
         """Return a column's cells as `numbers` does; raise `SpringfootError` unless each is greater than the one
@@ -56,9 +56,9 @@ class Table:
                 raise self.error(line, column, f"{value:g} must be greater than {before:g} in the row before")
         return values
 
-    def error(self, line: int, column: str, what: str) -> SpringfootError:
+    def error(self, line: int, column: str, fault: str) -> SpringfootError:
         """Return the error that names a cell and its fault in one line."""
-        return SpringfootError(f"{self.name}, line {line}, column {column}: {what}")
+        return SpringfootError(f"{self.name}, line {line}, column {column}: {fault}")
 
     def _number(self, line: int, column: str, cell: str) -> float:
         """Return a cell as a finite number; raise `SpringfootError` otherwise."""
@@ -81,8 +81,10 @@ def existing(path: Path) -> Path:
 
 
 def open_file(path: Path) -> BinaryIO:
-    """Open a regular file for reading; raise `SpringfootError` for anything else, also where one takes its place
-    now."""
+    """Open a regular file for reading; raise `SpringfootError` for anything else.
+
+    The opened file is checked again, as another may have taken its name since; opening a pipe does not wait.
+    """
 
     def opener(name: str, flags: int) -> int:
         return os.open(name, flags | _NO_WAIT)
@@ -97,23 +99,23 @@ def open_file(path: Path) -> BinaryIO:
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     """Return the content of a file; raise `SpringfootError` if it is missing or larger than `most` bytes.
 
-    Never reads more than that, and never waits for more.
+    A file that grows meanwhile is read up to `most` bytes only, and a read never waits for more content.
     """
     with open_file(path) as file:
         size = os.fstat(file.fileno()).st_size
-        content = (file.read(most + 1) or b"") if size <= most else b""  # None: it would wait
+        content = (file.read(most + 1) or b"") if size <= most else b""  # None instead of waiting
     if max(size, len(content)) > most:
         raise SpringfootError(f"{path.name} must have at most {most:,} bytes, has {max(size, len(content)):,}")
     return content
 
 
 def has_content(path: Path, content: bytes) -> bool:
-    """Tell whether a file has exactly this content; it is read only if it has the size of it."""
+    """Tell whether a file has exactly this content; a file of another size is not read."""
     return path.is_file() and path.stat().st_size == len(content) and read_bytes(path, len(content)) == content
 
 
 def read_csv(path: Path) -> Table:
-    """Return a CSV file: header, then rows of as many cells. Raises `SpringfootError` for any other file."""
+    """Read a CSV file: a header, then rows of as many cells. Raises `SpringfootError` for any other file."""
     try:
         return make_table(path.name, enumerate(csv.reader(text_lines(path), strict=True), 1))
     except csv.Error as error:
@@ -123,7 +125,7 @@ def read_csv(path: Path) -> Table:
 def text_lines(path: Path) -> Iterator[str]:
     """Yield the lines of a text file whose digest, if it has one, fits; raise `SpringfootError` for any other file."""
     content = read_bytes(path)
-    require_whole(path, content)
+    require_unchanged(path, content)
     if b"\0" in content:
         raise SpringfootError(f"{path.name} is not a text file")
     try:
@@ -144,12 +146,12 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
         raise SpringfootError(
             f"{name}, line {header}: must have at most {MOST_COLUMNS:,} columns, has {len(columns):,}"
         )
-    if len(columns) == 1 and (separator := next((each for each in ";\t" if each in names[0]), None)):
+    if len(columns) == 1 and (separator := next((mark for mark in ";\t" if mark in names[0]), None)):
         raise SpringfootError(
             f"{name}, line {header}: cells must be separated by commas, with decimal points, got {separator!r}"
         )
-    if twice := next((column for column, times in Counter(columns).items() if times > 1), None):
-        raise SpringfootError(f"{name}, line {header}: column {twice} stands twice")
+    if repeated := next((column for column, times in Counter(columns).items() if times > 1), None):
+        raise SpringfootError(f"{name}, line {header}: column {repeated} stands twice")
     rows = []
     for line, cells in filled:
         if len(cells) != len(columns):

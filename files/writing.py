@@ -20,7 +20,10 @@ from .locks import OWNER, TakenError, is_marked, owned
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a whole file or nothing, on the disk: readers see the old content or the new, never a part of it."""
+    """Write a file so that it has the old content or all of the new, also after a crash, and never a part.
+
+    The content goes to a temporary file, to the disk, and then takes the name.
+    """
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -46,7 +49,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def remove_temporary(folder: Path) -> None:
-    """Remove leftovers of a `write_atomically` that was killed, in a folder without other writers."""
+    """Remove the temporary files that a killed `write_atomically` left in a folder without other writers."""
     for path in folder.glob(".*"):
         if _is_temporary(path):
             path.unlink(missing_ok=True)
@@ -89,16 +92,17 @@ def require_new_files(paths: Iterable[Path]) -> None:
 
 @contextmanager
 def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
-    """Give a folder to write into, and the new folder that it becomes if the block ends without an error.
+    """Give a hidden folder to write into, and the new folder that it becomes if the block ends without an error.
 
-    The new folder is `out`, or if None the first of `free`-1, `free`-2, … that neither exists nor is being made. After
-    an error nothing is left; leftovers of a killed process are removed. Raises `SpringfootError` for an existing `out`.
+    The new folder is `out`, or with None the first of `free`-1, `free`-2, … that neither exists nor is being made by
+    another process. After an error nothing is left; leftovers of a killed process are removed. Raises `SpringfootError`
+    for an existing `out`.
     """
     with ExitStack() as stack:
         names = (free.with_name(f"{free.name}-{number}") for number in count(1)) if out is None else [out]
         for name in names:
             try:
-                part = stack.enter_context(_part(name))
+                part = stack.enter_context(_hidden_folder(name))
             except TakenError:
                 if out is not None:
                     raise
@@ -108,11 +112,11 @@ def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
 
 
 @contextmanager
-def _part(out: Path) -> Iterator[Path]:
-    """Give the hidden folder that becomes `out`.
+def _hidden_folder(out: Path) -> Iterator[Path]:
+    """Give the hidden folder .NAME.part that becomes `out`, named NAME, if the block ends without an error.
 
-    Raises `TakenError` if `out` exists or another process makes it, and if the hidden folder is there but not ours: a
-    link, a file, or a folder with something in it and without an owner's file.
+    Raises `TakenError` if `out` exists or another process makes it, and if the hidden name is taken, but not by
+    springfoot: by a link, a file, or a folder with something in it and without an owner's file.
     """
     part = out.parent / f".{out.name}.part"
     if not _is_ours(part):
@@ -124,7 +128,7 @@ def _part(out: Path) -> Iterator[Path]:
             try:
                 _empty(part)
                 yield part
-                _settle(part, out)
+                _rename_finished(part, out)
             except BaseException:
                 _empty(part)
                 raise
@@ -142,7 +146,7 @@ def _is_ours(part: Path) -> bool:
     return part.is_dir() and (is_marked(part) or all(path.name == OWNER for path in part.iterdir()))
 
 
-def _settle(part: Path, out: Path) -> None:
+def _rename_finished(part: Path, out: Path) -> None:
     """Rename a finished folder; if another process has taken the name meanwhile, use another name and say so."""
     name = out
     for number in count(2):
@@ -169,8 +173,10 @@ def _empty(folder: Path) -> None:
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Return a CSV file: numbers to six significant digits, empty cells for None and for numbers that are not
-    finite."""
+    """Return the text of a CSV file with a line of names and rows of values.
+
+    Floats have six significant digits; None and floats that are not finite are empty cells.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
@@ -187,7 +193,7 @@ def _cell(value: Any) -> Any:
 def require_new(out: str | Path) -> Path:
     """Return `out` as a path; raise `SpringfootError` if it exists and is not an empty folder.
 
-    Files of a process that was killed before its first result do not count.
+    Files that a process left which was killed before its first result do not count.
     """
     out = Path(out)
     if is_taken(out) and not (

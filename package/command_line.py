@@ -1,4 +1,4 @@
-"""Run a command: tell bad input in one line, return an exit code, name its results."""
+"""Run a command: read its flags, report bad input in one line, return an exit code."""
 
 import errno
 import io
@@ -22,7 +22,7 @@ LONGEST_WORD = 160
 terminal."""
 _NOT_WRITTEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO, errno.ENOENT})
 """System errors that end a writing: full, read-only, forbidden, broken, vanished."""
-_OURS = {
+_REWORDED = {
     r"^Error parsing (--\S+): ": r"\1 ",
     r"invalid literal for int\(\) with base 10: ": "must be a whole number, got ",
     r"could not convert string to float: ": "must be a number, got ",
@@ -33,63 +33,63 @@ _OURS = {
 
 
 def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flags:
-    """Return the flags on the command line, `words` or those of the process; `--help` exits with 0.
+    """Return the flags of a command line as the dataclass `flags`; `--help` exits with 0.
 
-    Bad flags, and a flag that is given twice, exit with 2, after one line on standard error that names the flag and its
-    fault.
+    The command line is `words`, or with None that of the process. `program` is the command's name in messages. A bad
+    flag, and one that is given twice, exits with 2 after one line on standard error that names the flag and its fault.
     """
     words = list(sys.argv[1:] if words is None else words)
-    said = io.StringIO()
+    output = io.StringIO()
     try:
-        with redirect_stderr(said):
+        with redirect_stderr(output):
             parsed = tyro.cli(flags, args=words, prog=program)
     except SystemExit as end:
         if end.code == 2:
-            print(f"{program}: error: {_in_a_line(_of_box(said.getvalue()))}", file=sys.stderr)
+            print(f"{program}: error: {_one_line(_message_in_box(output.getvalue()))}", file=sys.stderr)
         raise
-    if twice := _repeated_flag(words):
-        print(f"{program}: error: {twice} is given twice; give it once", file=sys.stderr)
+    if repeated := _repeated_flag(words):
+        print(f"{program}: error: {repeated} is given twice; give it once", file=sys.stderr)
         raise SystemExit(2)
     return parsed
 
 
 def _repeated_flag(words: Sequence[str]) -> str:
-    """Return the first flag that stands twice among the words, or no text; tyro takes the last one without a word."""
+    """Return the first flag that stands twice among the words, "" if none does; tyro would take the last silently."""
     flags = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
     return next((flag for flag, count in Counter(flags).items() if count > 1), "")
 
 
-def _of_box(text: str) -> str:
-    """Return the text of one of tyro's drawn boxes in one line: its first part, and the first suggested flag."""
+def _message_in_box(text: str) -> str:
+    """Return one line for the error that tyro has printed in a box: its first part, and the first suggested flag."""
     lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
     parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))
     if not text.startswith("╭"):  # where there is no UTF-8, the title is above a line of its own
         parts = parts[1:] or parts
-    what = " ".join(parts[0].split())
-    for theirs, ours in _OURS.items():
-        what = re.sub(theirs, ours, what)
-    what = what[:1].lower() + re.sub(r"(?<!\.)\.$", "", what[1:])
-    meant = re.search(r"Perhaps you meant: (--\S+)", " ".join(" ".join(parts[1:]).split()))
-    return f"{what}; perhaps {meant[1]}?" if meant else what
+    message = " ".join(parts[0].split())
+    for pattern, wording in _REWORDED.items():
+        message = re.sub(pattern, wording, message)
+    message = message[:1].lower() + re.sub(r"(?<!\.)\.$", "", message[1:])
+    suggestion = re.search(r"Perhaps you meant: (--\S+)", " ".join(" ".join(parts[1:]).split()))
+    return f"{message}; perhaps {suggestion[1]}?" if suggestion else message
 
 
 def exit_code(name: str, work: Callable[[], int | None]) -> int:
     """Run the `work` of the command `name` and return its exit code.
 
-    The code is the value of `work` (0 for None); 2, after one line on standard error, for bad input, a file that cannot
-    be read or written, or too little memory; 130 after Ctrl-C and 143 after SIGTERM, with a line too.
+    The code is the value that `work` returns (0 for None), or, after one line on standard error:
+    2 for bad input, a file that cannot be read or written, or too little memory; 130 after Ctrl-C; 143 after SIGTERM.
     """
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # closed
+        if stream is not None:  # None: closed
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
     in_main = threading.current_thread() is threading.main_thread()
-    before = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)] if in_main else []
+    handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)] if in_main else []
     try:
         return work() or 0
     except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
         raise
     except (SpringfootError, OSError, MemoryError, UnicodeEncodeError) as error:
-        print(f"{name}: error: {_in_a_line(_told(error))}", file=sys.stderr)
+        print(f"{name}: error: {_one_line(_error_message(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
@@ -98,7 +98,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
         print(f"{name}: ended by SIGTERM", file=sys.stderr)
         return TERMINATED
     finally:
-        for number, handler in before:
+        for number, handler in handlers:
             signal.signal(number, handler)
 
 
@@ -125,8 +125,8 @@ def stopped_by(record: dict[str, Any]) -> int:
     return TERMINATED if record.get("signal") == "SIGTERM" else INTERRUPTED
 
 
-def _told(error: Exception) -> str:
-    """Return the message of an error; if files cannot be written, with those that are safe."""
+def _error_message(error: Exception) -> str:
+    """Return the message of an error, and after a failed writing that nothing half-written is left."""
     if isinstance(error, MemoryError):
         return "not enough memory; results are written whole or not at all"
     if isinstance(error, UnicodeEncodeError):
@@ -139,7 +139,7 @@ def _told(error: Exception) -> str:
     return f"{error.strerror}{where}{safe}"
 
 
-def _in_a_line(text: str) -> str:
-    """Return one line for a terminal, with words, such as names of files, cut to `LONGEST_WORD`."""
+def _one_line(text: str) -> str:
+    """Return a text as one line for a terminal, with words such as names of files cut to `LONGEST_WORD`."""
     half = LONGEST_WORD // 2 - 2
     return re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: f"{word[0][:half]}...{word[0][-half:]}", printable(text))

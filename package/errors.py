@@ -17,7 +17,7 @@ class SpringfootError(ValueError):
 
 
 def printable(text: str) -> str:
-    """Return `text` as one line that is harmless to a terminal: control characters as Python writes them."""
+    """Return `text` as one line that is harmless to a terminal: control characters escaped (as `\\n`)."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 

@@ -19,52 +19,54 @@ READER_LEFT = 128 + 13
 
 INTERRUPTED, TERMINATED = 128 + 2, 128 + 15
 """Exit codes after Ctrl-C and SIGTERM, as a shell gives them for a program that these end."""
-_SAID = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"ended by SIGTERM", TERMINATED)}
+_SIGNALS = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"ended by SIGTERM", TERMINATED)}
 
 
 def at_terminal(command: Callable[[], int]) -> int:
-    """Run a command; return its exit code, 141 if its reader left, 2 if its output cannot be written.
+    """Run a command and return its exit code; 141 if the reader of its output left, 2 if it cannot be written.
 
-    Ctrl-C and SIGTERM end the process with one line until the command handles them itself, before its first writing.
+    Ctrl-C and SIGTERM end the process at once, with one line. A command that writes files handles them itself from
+    before its first writing on (`command_line.end_in_order`).
     """
     _name_glfw_library()
     in_main = threading.current_thread() is threading.main_thread()
-    before = {number: signal.signal(number, _end_at_once) for number in _SAID} if in_main else {}
+    handlers = {number: signal.signal(number, _end_at_once) for number in _SIGNALS} if in_main else {}
     try:
-        return _written_out(command)
+        return _run_and_flush(command)
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 
 def _name_glfw_library() -> None:
-    """Name glfw's library, so that its import starts no process to look for it, which a signal would reach too."""
-    found = find_spec("glfw")
-    if found is None or found.origin is None:
+    """Set glfw's variable with the path of its library; to look for it, glfw would start a process, which Ctrl-C would
+    reach too."""
+    spec = find_spec("glfw")
+    if spec is None or spec.origin is None:
         return
     variant = "wayland" if os.environ.get("XDG_SESSION_TYPE") == "wayland" else "x11"
-    library = Path(found.origin).parent / variant / "libglfw.so"
+    library = Path(spec.origin).parent / variant / "libglfw.so"
     if library.is_file():
         os.environ.setdefault("PYGLFW_LIBRARY", str(library))
 
 
 def _end_at_once(number: int, _frame: Any) -> None:
     """End the process with one line on standard error and the signal's exit code."""
-    said, code = _SAID[signal.Signals(number)]
+    text, code = _SIGNALS[signal.Signals(number)]
     with suppress(OSError):  # nobody reads it any more
-        os.write(2, b"springfoot: " + said + b"\n")
+        os.write(2, b"springfoot: " + text + b"\n")
     os._exit(code)  # an exception is lost in some imports, and is a traceback in others
 
 
-def _written_out(command: Callable[[], int]) -> int:
-    """Run a command and write out its output; return the exit code, also if the output cannot be written."""
-    for handle in (0, 1, 2):  # one that is closed would become that of a file, into which others then print
+def _run_and_flush(command: Callable[[], int]) -> int:
+    """Run a command and flush its output; return the exit code, also if the output cannot be written."""
+    for handle in (0, 1, 2):  # a closed one would be given to the next opened file, into which prints would then go
         try:
             os.fstat(handle)
         except OSError:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by who started us
+        if getattr(sys, name) is None:  # the starting process had closed it
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     if shutil.get_terminal_size().columns < NARROWEST:
         os.environ["COLUMNS"] = str(NARROWEST)
@@ -74,15 +76,15 @@ def _written_out(command: Callable[[], int]) -> int:
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
-        _forget(sys.stdout)
+        _discard_buffer(sys.stdout)
         return READER_LEFT
-    except OSError as error:  # the commands tell of their own
-        _forget(sys.stdout)
+    except OSError as error:  # only from the output: commands report their own files' errors
+        _discard_buffer(sys.stdout)
         print(f"springfoot: error: cannot write the output: {error.strerror}", file=sys.stderr)
         return 2
 
 
-def _forget(stream: object) -> None:
+def _discard_buffer(stream: object) -> None:
     """Discard the rest of a stream's buffer, which Python would try to write again at its end."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())  # type: ignore[attr-defined]

@@ -10,7 +10,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
-from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, in_process
+from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, output_in_process
 
 MOST_ONNX_BYTES = 2**26
 """Largest ONNX file to read; chosen, ten times the largest network that is trained here."""
@@ -39,7 +39,7 @@ def onnx_session(path: Path, observations: NDArray) -> tuple[Any, dict[str, str]
     """
     if (size := path.stat().st_size) > MOST_ONNX_BYTES:
         raise SpringfootError(f"{path} must have at most {MOST_ONNX_BYTES:,} bytes, has {size:,}")
-    said = in_process(_CHILD, str(path.absolute()), json.dumps(np.asarray(observations, float).tolist()))
+    said = output_in_process(_CHILD, str(path.absolute()), json.dumps(np.asarray(observations, float).tolist()))
     if said is None:
         raise SpringfootError(
             f"{path} is damaged: onnxruntime crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"

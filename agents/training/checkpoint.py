@@ -56,7 +56,7 @@ def write_checkpoint(
 def read_checkpoint(path: Path) -> Checkpoint:
     """Return header and arrays of a checkpoint; raise `SpringfootError` for a damaged file and for any other."""
     names = Header.__annotations__
-    header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, sealed=True)
+    header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, needs_digest=True)
     if missing := [name for name in names if name not in header]:
         raise SpringfootError(f"{path} is of another version of springfoot: it has no {missing[0]}")
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from springfoot.errors import SpringfootError, require_count, require_number
-from springfoot.files.json_file import read_object, sealed_object
+from springfoot.files.json_file import object_with_digest, read_object
 from springfoot.files.writing import write_atomically
 
 from ..policies.policy import RUN
@@ -57,7 +57,7 @@ def runs_within(out: Path) -> list[Path]:
 
 def write_record(out: Path, record: Mapping[str, Any]) -> None:
     """Write the record, whole or not at all."""
-    write_atomically(out / RUN, sealed_object(dict(record)))
+    write_atomically(out / RUN, object_with_digest(dict(record)))
 
 
 def is_of_rllib(record: Mapping[str, Any]) -> bool:

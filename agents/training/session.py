@@ -15,7 +15,7 @@ from stable_baselines3.common.logger import TensorBoardOutputFormat, configure
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import settings_to_json
 from springfoot.errors import SpringfootError
-from springfoot.files.provenance import source
+from springfoot.files.provenance import versions_and_commit
 from springfoot.files.tensor_file import MOST_TENSOR_BYTES
 from springfoot.files.text_table import has_content, read_bytes
 from springfoot.files.writing import write_atomically
@@ -88,7 +88,7 @@ class Session(BaseCallback):
     def _learn(self) -> None:
         """Run PPO from the beginning or the checkpoint, with progress and signals handled."""
         ppo = self.learner.ppo
-        session = {"from_timesteps": self._first, **source(PACKAGES)}
+        session = {"from_timesteps": self._first, **versions_and_commit(PACKAGES)}
         logged = self._go_on(session)
         self._write_record("running")
         ppo.set_logger(configure(str(self._out), ["tensorboard"]))

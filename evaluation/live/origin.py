@@ -34,6 +34,8 @@ def own_pages_only(host: str) -> Iterator[None]:
     serve = websockets.serve
 
     def serve_own(*arguments: Any, process_request: Callable[..., Any], **options: Any) -> Any:
+        """Start the server with an answer of 403 to requests from other pages."""
+
         def process(connection: Any, request: Any) -> Any:
             if is_own_page(request.headers, host):
                 return process_request(connection, request)

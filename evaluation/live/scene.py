@@ -62,15 +62,15 @@ class LiveScene:
         data = session.data()
         slope = np.radians(session.wishes.slope_deg)
         x = float(data.qpos[0])
-        away = np.array([x, 0.0, x * np.tan(slope)])
-        data.xpos[:] -= away
+        walked = np.array([x, 0.0, x * np.tan(slope)])
+        data.xpos[:] -= walked
         with self._server.atomic():
             for body, frame in self._bodies.items():
                 frame.position = data.xpos[body]
                 frame.wxyz = data.xquat[body]
             along = (-x / np.cos(slope)) % 1.0  # the grid repeats itself every metre
             self._ground.position = (along * np.cos(slope), 0.0, along * np.sin(slope))
-            self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], away)
+            self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], walked)
 
     def _begin(self) -> None:
         """Build the scene of a new model: ground, body, arrows."""
@@ -100,15 +100,15 @@ class LiveScene:
     def _add_geom(self, geom: int) -> None:
         """Draw a capsule or sphere of the model on its body."""
         model = self._model
-        radius, half = model.geom_size[geom, :2]
+        radius, half_length = model.geom_size[geom, :2]
         name = f"{_name(model.geom_bodyid[geom])}/{geom}"
         colour = tuple(model.geom_rgba[geom, :3].tolist())
-        place = {"wxyz": model.geom_quat[geom], "position": model.geom_pos[geom]}
+        pose = {"wxyz": model.geom_quat[geom], "position": model.geom_pos[geom]}
         if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            mesh = trimesh.creation.capsule(2.0 * half, radius, count=(ROUND // 2, ROUND))
-            self._server.scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, **place)
+            mesh = trimesh.creation.capsule(2.0 * half_length, radius, count=(ROUND // 2, ROUND))
+            self._server.scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, **pose)
         else:
-            self._server.scene.add_icosphere(name, radius, colour, subdivisions=2, **place)
+            self._server.scene.add_icosphere(name, radius, colour, subdivisions=2, **pose)
 
 
 def _name(body: int) -> str:
@@ -116,7 +116,7 @@ def _name(body: int) -> str:
 
 
 def _grid() -> NDArray:
-    """Return (K, 2, 3) lines along and across the ground [m]."""
+    """Return the lines of the ground's grid, along and across it, (K, (start, end), 3) [m]."""
     along = GROUND_LENGTH / 2
     across = GROUND_WIDTH / 2
     xs = np.arange(-along, along + GROUND_CELL, GROUND_CELL)
@@ -125,13 +125,14 @@ def _grid() -> NDArray:
     return np.array(lines, np.float32)
 
 
-def _arrows(force: NDArray, feet: NDArray, away: NDArray) -> NDArray:
-    """Return arrows (side, (start, end), 3) of `force` as in a `Frame`, in the planes of the `feet` (side, 3).
+def _arrows(force: NDArray, feet: NDArray, walked: NDArray) -> NDArray:
+    """Return the arrows of the ground reaction forces, (side, (start, end), 3) [m].
 
-    An arrow of no force has no length.
+    `force` is that of a `Frame`. Arrows stand in the planes of the `feet` (side, 3) and are shifted back by `walked`
+    (3,), as the body is. An arrow of no force has no length.
     """
     points = np.zeros((len(force), 2, 3), np.float32)
-    for side, (place, height, forward, up) in enumerate(force):
-        start = np.array([place, feet[side, 1], height]) - away * (1, 0, 1)
+    for side, (x, height, forward, up) in enumerate(force):
+        start = np.array([x, feet[side, 1], height]) - walked * (1, 0, 1)
         points[side] = start, start + FORCE_LENGTH * np.array([forward, 0.0, up])
     return points

@@ -1,7 +1,7 @@
 """Walk one step after another under wishes that may change at any time.
 
-This module knows no browser and no clock: `live_view` shows the walk in real time, tests drive it step by step. The
-body is one `Biped`. Actions set K, and the K that acted in the simulation is read back.
+This module knows no browser and no clock: `LiveView` shows the walk in real time, tests drive it step by step. The body
+is one `Biped`. Actions set K, and the K that acted in the simulation is read back.
 """
 
 import sys
@@ -28,7 +28,7 @@ from springfoot.gait import GRAVITY
 from springfoot.gait.body.body import Body
 from springfoot.gait.springs.stiffness import SPRINGS
 
-from ..recording.policies import prepare
+from ..recording.policies import policy_and_settings
 
 Source = Literal["policy", "scaled", "by hand"]
 """Source of K: the policy, the policy times a factor, or a number that the user sets."""
@@ -63,7 +63,7 @@ LYING_SECONDS = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """Wishes for the walk. Slope, body and feet restart it; all others act while it runs."""
+    """The user's wishes for a live walk. Slope, body and feet restart it; all others act while it runs."""
 
     ankle_source: Source = "policy"
     toe_source: Source = "policy"
@@ -136,11 +136,16 @@ class LiveSession:
 
     def __init__(self, policy: str, given: dict[str, Any] | None = None, seed: int = 0):
         for name, instead in ELSEWHERE.items():
-            if (given or {}).get(name):  # 0 pushes and no range are what it does
+            if (given or {}).get(name):  # 0 and None ask for nothing
                 raise SpringfootError(f"live takes no {name}: {instead}")
-        own = {"speed_range": LIVE_SPEEDS, "height_range": LIVE_HEIGHTS, "mass_range": LIVE_MASSES, "push_newton": 0.0}
-        asked = (given or {}) | own | {"episode_seconds": LONGEST_EPISODE}
-        self._policy, self._settings = prepare(policy, asked, seed)
+        fixed = {
+            "speed_range": LIVE_SPEEDS,
+            "height_range": LIVE_HEIGHTS,
+            "mass_range": LIVE_MASSES,
+            "push_newton": 0.0,
+        }
+        settings = (given or {}) | fixed | {"episode_seconds": LONGEST_EPISODE}
+        self._policy, self._settings = policy_and_settings(policy, settings, seed)
         self.name = policy
         self._seed = seed
         self._pushed = 0.0
@@ -183,22 +188,23 @@ class LiveSession:
 
     def ask(self, **wishes: Any) -> None:
         """Change wishes, by name; raises `SpringfootError`, with nothing changed, for impossible wishes."""
-        asked = replace(self.wishes, **wishes)
-        self._check(asked)
+        new_wishes = replace(self.wishes, **wishes)
+        self._check(new_wishes)
         before = self.wishes
         biped = self._biped
-        changed = {item.name for item in fields(Wishes) if getattr(asked, item.name) != getattr(before, item.name)}
-        self.wishes = asked
+        changed = {item.name for item in fields(Wishes) if getattr(new_wishes, item.name) != getattr(before, item.name)}
+        self.wishes = new_wishes
         try:
             if changed & {*ANEW}:
-                self._biped = self._make(asked)
+                self._biped = self._make(new_wishes)
                 self.restart()
-            elif changed & {*OFFSETS} or (_offset(asked).any() and "speed" in changed):
-                self._biped = self._make(asked)
+            # Offsets of theta_eq act through new tables of rest angles: a new batch that takes over the state.
+            elif changed & {*OFFSETS} or (_offset(new_wishes).any() and "speed" in changed):
+                self._biped = self._make(new_wishes)
                 self._biped.restore(biped.state())
                 self._walk = walked_steps(self._biped, self._action, ENDLESS)
             if "speed" in changed:
-                self._biped.command(np.arange(1), np.array([asked.speed]))
+                self._biped.command(np.arange(1), np.array([new_wishes.speed]))
         except SpringfootError:
             self.wishes = before
             self._biped = biped
@@ -212,8 +218,8 @@ class LiveSession:
 
     def restart(self) -> None:
         """Restart the walk with the present wishes."""
-        who = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
-        self._biped.reset(np.arange(1), [self._seed], None, who)
+        walker = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
+        self._biped.reset(np.arange(1), [self._seed], None, walker)
         self._walk: Iterator[Walked] = walked_steps(self._biped, self._action, ENDLESS)
         self._steps = 0
         self._push_steps = self._lying = 0
@@ -272,14 +278,15 @@ class LiveSession:
         return np.concatenate([cop, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
     def _action(self, observation: NDArray) -> NDArray:
-        """Return the action (1, 4) for the wished K; the policy's own action, unchanged, with the source `policy`."""
-        own = np.asarray(self._policy(observation), float).reshape(len(SIDES), len(SPRINGS))
+        """Return the action (1, 4) that gives the wished K; joints with the source `policy` keep the policy's."""
+        action = np.asarray(self._policy(observation), float).reshape(len(SIDES), len(SPRINGS))
         settings = self._settings
         body = self.body
         wishes = self.wishes
         residual = settings.action_mode == "residual"
-        schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(own)
-        stiffness = schedule * np.exp(own) if residual else stiffness_of(own, settings, body)
+        schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(action)
+        # A residual action is the logarithm of K over the schedule's; an absolute one maps to a range of K.
+        stiffness = schedule * np.exp(action) if residual else stiffness_of(action, settings, body)
         for joint, name in enumerate(SPRINGS):
             match getattr(wishes, f"{name}_source"):
                 case "policy":
@@ -288,9 +295,9 @@ class LiveSession:
                     stiffness[:, joint] *= getattr(wishes, f"{name}_factor")
                 case "by hand":
                     stiffness[:, joint] = getattr(wishes, f"{name}_stiffness")
-            action = np.log(stiffness / schedule) if residual else action_of(stiffness, settings, body)
-            own[:, joint] = np.clip(action[:, joint], -1.0, 1.0)
-        return own.reshape(1, -1)
+            joint_action = np.log(stiffness / schedule) if residual else action_of(stiffness, settings, body)
+            action[:, joint] = np.clip(joint_action[:, joint], -1.0, 1.0)
+        return action.reshape(1, -1)
 
     def _make(self, wishes: Wishes) -> Biped:
         """Return a batch of one body on the ground and feet of `wishes`, its rest angles offset as wished."""
@@ -315,5 +322,5 @@ class LiveSession:
 
 
 def _offset(wishes: Wishes) -> NDArray:
-    """Return the offset of theta_eq, (joint,) [rad]."""
+    """Return the wished offset of theta_eq of ankle and toe, (joint,) [rad]."""
     return np.radians([getattr(wishes, name) for name in OFFSETS])

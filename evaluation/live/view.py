@@ -64,7 +64,8 @@ class LiveView:
         session.step()  # compiles, which takes a while
         session.restart()
         self._session = session
-        self._asked: SimpleQueue[dict[str, Any] | Callable[[], None]] = SimpleQueue()
+        # From viser's threads to the loop: wishes by name, and functions to call.
+        self._requests: SimpleQueue[dict[str, Any] | Callable[[], None]] = SimpleQueue()
         with redirect_stdout(StringIO()), own_pages_only(host):  # viser would print a table of addresses
             self._server = viser.ViserServer(host=host, port=port, label="springfoot live", verbose=False)
         accept_values_only(self._server)
@@ -73,7 +74,7 @@ class LiveView:
         self._dark: set[int] = set()
         self._server.on_client_connect(fit_to_screen)
         self.address = f"http://{host}:{self._server.get_port()}"
-        """Where the page is."""
+        """Address of the page."""
         self.frames = 0
         """Pictures of the body shown so far."""
         self._history: deque[Frame] = deque([session.frame], maxlen=round(CURVE_SECONDS / session.dt))
@@ -84,46 +85,52 @@ class LiveView:
         self._curves = self._add_curves()
         self._scene = LiveScene(self._server, session)
         self._show()
-        self._tell()
+        self._send_numbers()
 
     def run(self, seconds: float | None = None) -> float:
-        """Walk in real time for `seconds`, for ever if None; return the shown pictures a second."""
+        """Walk in real time for `seconds`, for ever if None; return the shown pictures a second.
+
+        Each step is `due` at a time of the clock. Late steps leave out pictures; the clock waits for a delay over
+        `LATE`.
+        """
         dt = self._session.dt
         begin = time.perf_counter()
-        shown = self.frames
+        frames_before = self.frames
         due = begin
-        between = max(1, round(1 / (CURVES_HZ * dt)))
+        steps_a_curve = max(1, round(1 / (CURVES_HZ * dt)))
         step = 0
         while seconds is None or time.perf_counter() - begin < seconds:
-            self._obey()
+            self._apply_requests()
             self._history.append(self._session.step())
             due = due + dt
             step = step + 1
-            if time.perf_counter() - due < dt:  # else the walk is kept in time, and this picture left out
+            if time.perf_counter() - due < dt:
                 self._show()
-            if step % between == 0:
-                self._tell()
-            late = time.perf_counter() - due
-            due += late if late > LATE else 0.0
-            time.sleep(max(0.0, -late))
-        return (self.frames - shown) / (time.perf_counter() - begin)
+            if step % steps_a_curve == 0:
+                self._send_numbers()
+            delay = time.perf_counter() - due
+            due += delay if delay > LATE else 0.0
+            time.sleep(max(0.0, -delay))
+        return (self.frames - frames_before) / (time.perf_counter() - begin)
 
     def stop(self) -> None:
         """Close the page."""
         with redirect_stdout(StringIO()):
             self._server.stop()
 
-    def _obey(self) -> None:
-        """Apply the wishes since the last step; for an impossible wish tell the error and show the present value
-        again."""
+    def _apply_requests(self) -> None:
+        """Apply the wishes since the last step.
+
+        After an impossible wish the page shows the error, and its input the present value again.
+        """
         wishes: dict[str, Any] = {}
         try:
-            while not self._asked.empty():
-                asked = self._asked.get()
-                if isinstance(asked, dict):
-                    wishes |= asked
+            while not self._requests.empty():
+                request = self._requests.get()
+                if isinstance(request, dict):
+                    wishes |= request
                 else:
-                    asked()
+                    request()
             if wishes:
                 self._session.ask(**wishes)
         except Exception as error:  # a walk outlives whatever a message asks
@@ -133,15 +140,16 @@ class LiveView:
                 self._handles[name].value = _shown(getattr(self._session.wishes, name))
 
     def _add_buttons(self) -> None:
+        """Add the buttons Push, Restart and page colour, and the slider of the push."""
         push = self._gui.add_button("Push")
         restart = self._gui.add_button("Restart")
         size = self._gui.add_slider(
             "Push, N", *LIVE_PUSHES, step=10.0, initial_value=FIRST_PUSH, hint="forward positive"
         )
         theme = self._gui.add_button("Dark or light page", color="gray")
-        theme.on_click(lambda event: self._asked.put(partial(self._turn_theme, event.client)))
-        push.on_click(lambda _: self._asked.put(lambda: self._session.push(size.value)))
-        restart.on_click(lambda _: self._asked.put(self._session.restart))
+        theme.on_click(lambda event: self._requests.put(partial(self._turn_theme, event.client)))
+        push.on_click(lambda _: self._requests.put(lambda: self._session.push(size.value)))
+        restart.on_click(lambda _: self._requests.put(self._session.restart))
 
     def _turn_theme(self, client: viser.ClientHandle | None) -> None:
         """Turn the page of one browser dark, or light again; others keep theirs."""
@@ -150,6 +158,7 @@ class LiveView:
             _set_theme(client.gui, client.client_id in self._dark)
 
     def _add_wishes(self) -> None:
+        """Add a slider or a list for each of the `Wishes`."""
         most = self._session.stiffness_ranges()
         for joint, name in enumerate(SPRINGS):
             with self._gui.add_folder(f"{name.capitalize()}: stiffness K"):
@@ -179,7 +188,7 @@ class LiveView:
 
     def _listen(self, name: str) -> None:
         handle = self._handles[name]
-        handle.on_update(lambda event: self._asked.put({name: handle.value}) if event.client is not None else None)
+        handle.on_update(lambda event: self._requests.put({name: handle.value}) if event.client is not None else None)
 
     def _add_curves(self) -> dict[str, Any]:
         """Add the charts over time; return them by the name of their quantity."""
@@ -194,6 +203,7 @@ class LiveView:
             return charts | {"speed": self._chart("Speed of the CoM, m/s", [{"label": "speed", "stroke": "#009E73"}])}
 
     def _chart(self, title: str, lines: list[dict[str, Any]]) -> Any:
+        """Add a chart of `lines` over time [s]; return its handle."""
         empty = np.zeros(1)
         series: Any = ({"label": "s"}, *lines)
         time_scale: dict[str, uplot.Scale] = {"x": {"time": False}}
@@ -203,25 +213,27 @@ class LiveView:
         self._scene.show()
         self.frames += 1
 
-    def _tell(self) -> None:
-        """Send words and curves."""
-        frame = self._history[-1]
+    def _send_numbers(self) -> None:
+        """Send the last step's numbers and the curves of the last seconds to the page."""
+        last_frame = self._history[-1]
         session = self._session
         rows = "\n".join(
-            f"| {side} | {k[0]:.0f} | {k[1]:.0f} | {rest[0]:.1f} | {rest[1]:.1f} |"
-            for side, k, rest in zip(SIDES, frame.stiffness, np.degrees(frame.equilibrium), strict=True)
+            f"| {side} | {k[0]:.0f} | {k[1]:.0f} | {equilibrium[0]:.1f} | {equilibrium[1]:.1f} |"
+            for side, k, equilibrium in zip(
+                SIDES, last_frame.stiffness, np.degrees(last_frame.equilibrium), strict=True
+            )
         )
-        state = f"**fell: {frame.fell}**" if frame.fell else f"{frame.speed:.2f} m/s"
+        state = f"**fell: {last_frame.fell}**" if last_frame.fell else f"{last_frame.speed:.2f} m/s"
         self._words.content = (
-            f"{_plain(session.name)}: {frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
+            f"{_plain(session.name)}: {last_frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
             "| K that acts, N·m/rad | ankle | toe | ankle θ_eq, deg | toe θ_eq, deg |\n|-|-|-|-|-|\n" + rows
         )
         seconds = session.dt * np.arange(1 - len(self._history), 1)
         stiffness, force = (
-            np.array([getattr(each, name) for each in self._history]) for name in ("stiffness", "force")
+            np.array([getattr(frame, name) for frame in self._history]) for name in ("stiffness", "force")
         )
         curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)} | {"load": force[..., -1].T}
-        for name, lines in (curves | {"speed": np.array([[each.speed for each in self._history]])}).items():
+        for name, lines in (curves | {"speed": np.array([[frame.speed for frame in self._history]])}).items():
             self._curves[name].data = (seconds, *np.ascontiguousarray(lines))
 
 

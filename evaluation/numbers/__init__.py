@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, numbers, unmet
+    from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
     from .effort import mean_effort
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
@@ -28,9 +28,9 @@ __all__ = [
     "mean_effort",
     "measure",
     "number_text",
-    "numbers",
     "strides_within",
     "unmet",
+    "with_derived",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
@@ -52,7 +52,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "mean_effort": "effort",
             "measure": "metrics",
             "number_text": "criteria",
-            "numbers": "criteria",
+            "with_derived": "criteria",
             "strides_within": "series",
             "unmet": "criteria",
         },

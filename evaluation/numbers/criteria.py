@@ -14,11 +14,11 @@ LOOSENED_BY, LOOSENED_R_BY = 0.2, 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """A number of `numbers(metrics)` and its allowed range, ends included."""
+    """A number of `with_derived(metrics)` and its allowed range, ends included."""
 
     name: str
     path: tuple[str, ...]
-    """Keys of the number in `numbers(metrics)`."""
+    """Keys of the number in `with_derived(metrics)`."""
     low: float = -inf
     high: float = inf
     unit: str = ""
@@ -30,10 +30,10 @@ class Criterion:
 
     def value(self, values: dict[str, Any]) -> float | None:
         """Return the number; None if it could not be measured."""
-        found: Any = values
+        value: Any = values
         for key in self.path:
-            found = found[key]
-        return found
+            value = value[key]
+        return value
 
     def holds(self, values: dict[str, Any]) -> bool:
         """Tell whether the number was measured and lies in the range."""
@@ -41,8 +41,10 @@ class Criterion:
         return value is not None and self.low <= value <= self.high
 
     def loosened(self) -> "Criterion":
-        """Return the criterion with a wider range: by `LOOSENED_BY` of each end, by `LOOSENED_R_BY`, or unchanged, as
-        `loosen` says."""
+        """Return the criterion with a wider range, for each of several seeds.
+
+        `loosen` names the rule: each end moves by `LOOSENED_BY` of itself ("share"), the low end by `LOOSENED_R_BY`
+        ("r"), or none ("")."""
         if self.loosen == "share":
             return replace(
                 self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)
@@ -58,12 +60,16 @@ class Criterion:
         return low + self.unit if self.low == self.high else f"{low} … {high}{self.unit}"
 
 
-def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
-    """Return metrics.json with two more keys: `off`, distances from command and plan, and `double_support_percent`."""
+def with_derived(metrics: dict[str, Any]) -> dict[str, Any]:
+    """Return the metrics with two more keys for the criteria: `off` and `double_support_percent`.
+
+    `off` holds absolute differences: of the speed from the commanded one [m/s], of step length and cadence from the
+    plan's [%]. `double_support_percent` is one double support as a percent of the stride.
+    """
     settings = settings_from(**metrics["environment"])
     plan = reference_walk_at(settings, settings.speed).plan
     cadence = metrics["cadence_steps_min"]
-    support = metrics["double_support_s"]
+    double_support = metrics["double_support_s"]
 
     def percent_off(value: float | None, planned: float) -> float | None:
         return None if value is None else 100 * abs(value / planned - 1)
@@ -74,18 +80,21 @@ def numbers(metrics: dict[str, Any]) -> dict[str, Any]:
         "step_length_percent": percent_off(metrics["step_length_m"], plan.step_length),
         "cadence_percent": percent_off(cadence, 60 / plan.step_time),
     }
-    percent = None if support is None or not cadence else 100 * support * cadence / 120
-    return metrics | {"off": off, "double_support_percent": percent}
+    # The stride is two steps: it lasts 120 / cadence [s], with the cadence in steps a minute.
+    double_support_percent = None if double_support is None or not cadence else 100 * double_support * cadence / 120
+    return metrics | {"off": off, "double_support_percent": double_support_percent}
 
 
 def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
     """Return the criteria that an evaluation misses, each in words with its number; empty if it meets all."""
-    values = numbers(metrics)
-    return [f"{each.name} {number_text(each, values)}" for each in criteria if not each.holds(values)]
+    values = with_derived(metrics)
+    return [
+        f"{criterion.name} {number_text(criterion, values)}" for criterion in criteria if not criterion.holds(values)
+    ]
 
 
 def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
-    """Return the number with its unit, as words."""
+    """Return the criterion's number with its unit as text, "?" if it could not be measured."""
     value = criterion.value(values)
     return "?" if value is None else format(value, criterion.pattern) + criterion.unit
 
@@ -104,6 +113,7 @@ _FORCES = {
 
 
 def _force(name: str, low: float = -inf, high: float = inf) -> Criterion:
+    """Return the criterion of a number of the ground reaction force [body weights]; `name` as in `_FORCES`."""
     label = _FORCES[name]
     return Criterion(name=name, path=("grf", name), low=low, high=high, unit=" BW", loosen="share", label=label)
 
@@ -116,6 +126,7 @@ def _rmse(joint: str, high: float) -> Criterion:
 
 
 def _r(name: str, path: tuple[str, ...], low: float) -> Criterion:
+    """Return the criterion of a correlation with people's curve, at least `low`."""
     return Criterion(name=name, path=path, low=low, pattern=".3f", loosen="r", label=_FORCES.get(name, ""))
 
 
@@ -221,10 +232,10 @@ def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
     return Criterion(name=name, path=path, low=low, high=high, unit=" J/kg", pattern=".3f", loosen="share")
 
 
-def _near_people(joint: str, sign: str, theirs: float) -> Criterion:
+def _near_people(joint: str, sign: str, peoples_work: float) -> Criterion:
     """Return the criterion of work within 30 % or, if larger, 0.05 J/kg of people's work in a stride [J/kg]."""
-    band = max(0.3 * theirs, 0.05)
-    return _work(joint, sign, round(max(theirs - band, 0.0), 3), round(theirs + band, 3))
+    band = max(0.3 * peoples_work, 0.05)
+    return _work(joint, sign, round(max(peoples_work - band, 0.0), 3), round(peoples_work + band, 3))
 
 
 WORKS_LIKE_PEOPLE = (

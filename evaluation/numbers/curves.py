@@ -13,9 +13,13 @@ class StrideCurves:
     """Mean and spread over strides of C curves, added block by block; NaN before the first stride."""
 
     names: tuple[str, ...]
+    """Names of the C curves."""
     count: int = 0
+    """Strides so far."""
     total: NDArray | float = 0.0
+    """(101, C) sum over the strides."""
     squares: NDArray | float = 0.0
+    """(101, C) sum of squares over the strides."""
 
     def add(self, curves: NDArray) -> None:
         """Add strides' curves (S, 101, C)."""
@@ -24,11 +28,11 @@ class StrideCurves:
         self.squares = self.squares + np.square(curves).sum(axis=0)
 
     def mean(self, name: str) -> NDArray:
-        """Mean curve (101,)."""
+        """Return the mean of a curve over strides (101,)."""
         return self._pick(np.asarray(self.total) / max(self.count, 1), name) if self.count else self._missing()
 
     def sd(self, name: str) -> NDArray:
-        """Return standard deviation over strides (101,), n - 1."""
+        """Return the standard deviation of a curve over strides (101,), with n - 1; NaN for fewer than two strides."""
         if self.count < 2:
             return self._missing()
         total = np.asarray(self.total)

@@ -30,11 +30,11 @@ class EpisodeEffort:
     seconds: float
     """Length of the span [s]."""
     distance: float
-    """Way of the CoM [m]."""
+    """Distance that the CoM covers in it [m]."""
     use: MuscleUse
-    """Of the fibres."""
+    """Activation, rate and energy of the muscles' fibres."""
     net_energy: NDArray
-    """(side, joint) the same price of the work of net joint moments [J]."""
+    """(side, joint) energy by the same price, but of the work of net joint moments [J]."""
     acceleration: float
     """`Effort.acceleration`."""
     beyond_range: float
@@ -72,26 +72,28 @@ def episode_effort(series: dict[str, NDArray], body: Body, feet: Feet, first: in
 
 
 def mean_effort(episodes: Sequence[EpisodeEffort], body: Body) -> Effort | None:
-    """Return the effort of several episodes of one body together; None without progress."""
+    """Return the effort of several episodes of one body together; None if it does not move forward."""
     total = _Total.of(episodes)
     if total.distance <= 0.0:
         return None
     return Effort(
         work=float(total.energy.sum() / (body.total_mass * GRAVITY * total.distance)),
         activation=float(total.activation.sum() / total.seconds),
-        rate=float(sum(each.use.rate.sum() for each in episodes) / total.seconds),
-        acceleration=sum(each.acceleration * each.seconds for each in episodes) / total.seconds,
-        beyond_range=max(each.beyond_range for each in episodes),
+        rate=float(sum(episode.use.rate.sum() for episode in episodes) / total.seconds),
+        acceleration=sum(episode.acceleration * episode.seconds for episode in episodes) / total.seconds,
+        beyond_range=max(episode.beyond_range for episode in episodes),
     )
 
 
 def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, Any]:
-    """Return `effort` of metrics.json, nested as in docs/reference/metrics.md; numbers are None without progress."""
+    """Return `effort` of metrics.json, nested as in docs/reference/metrics.md; None for numbers of a body that does not
+    move forward."""
     effort = mean_effort(episodes, body)
     total = _Total.of(episodes)
     per_metre = 1.0 / (body.mass * total.distance) if effort else np.nan
 
-    def of(energy: NDArray, net_energy: NDArray, activation: NDArray) -> dict[str, float | None]:
+    def numbers_of(energy: NDArray, net_energy: NDArray, activation: NDArray) -> dict[str, float | None]:
+        """Return the numbers of the legs and joints whose sums over the episodes are given."""
         return {
             "fibre_J_kg_m": float(energy.sum() * per_metre) if effort else None,
             "net_joint_J_kg_m": float(net_energy.sum() * per_metre) if effort else None,
@@ -100,12 +102,12 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
 
     parts = total.energy, total.net_energy, total.activation
     return {
-        **of(*parts),
+        **numbers_of(*parts),
         "rate": effort and effort.rate,
         "acceleration": effort and effort.acceleration,
         "total": effort and effort.total,
-        "per_joint": {joint: of(*(part[:, index] for part in parts)) for index, joint in enumerate(JOINTS)},
-        "per_leg": {side: of(*(part[index] for part in parts)) for index, side in enumerate(SIDES)},
+        "per_joint": {joint: numbers_of(*(part[:, index] for part in parts)) for index, joint in enumerate(JOINTS)},
+        "per_leg": {side: numbers_of(*(part[index] for part in parts)) for index, side in enumerate(SIDES)},
     }
 
 
@@ -122,11 +124,11 @@ class _Total:
     @classmethod
     def of(cls, episodes: Sequence[EpisodeEffort]) -> "_Total":
         """Return the sums of `episodes`."""
-        none = np.zeros((len(SIDES), len(JOINTS)))
+        zero = np.zeros((len(SIDES), len(JOINTS)))
         return cls(
-            seconds=sum(each.seconds for each in episodes),
-            distance=sum(each.distance for each in episodes),
-            energy=sum((each.use.energy for each in episodes), none),
-            net_energy=sum((each.net_energy for each in episodes), none),
-            activation=sum((each.use.activation for each in episodes), none),
+            seconds=sum(episode.seconds for episode in episodes),
+            distance=sum(episode.distance for episode in episodes),
+            energy=sum((episode.use.energy for episode in episodes), zero),
+            net_energy=sum((episode.net_energy for episode in episodes), zero),
+            activation=sum((episode.use.activation for episode in episodes), zero),
         )

@@ -23,7 +23,7 @@ from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
 from .effort import effort_numbers
-from .per_leg import ANGLE_COLUMNS, asymmetry, differ, kinds_of, leg_numbers
+from .per_leg import ANGLE_COLUMNS, USUAL_TOE_OFF, asymmetry, feet_differ, kinds_of, leg_numbers
 from .tally import StrideTally, tally_strides
 
 MOMENT_CURVES = {
@@ -78,6 +78,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     com_z = tally.com.mean("z")
 
     def joint(name: str) -> dict[str, Any]:
+        """Return the likeness of a joint's angle to people's."""
         curve = both.mean(ANGLE_COLUMNS[name])
         people = np.degrees(human.mean(name, phase))
         return {
@@ -87,10 +88,11 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         }
 
     def moment(name: str) -> dict[str, Any]:
+        """Return a joint moment's peaks and its likeness to people's; people's toe moment is unknown."""
         curve = both.mean(MOMENT_CURVES[name])
         peak, percent = score.largest(curve)
-        late = score.largest(curve[LATE_SWING_PERCENT:])[0]
-        entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late}
+        late_swing = score.largest(curve[LATE_SWING_PERCENT:])[0]
+        entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late_swing}
         if name == "toe":
             return entry | {"r": None, "within_2sd_percent": None}
         people = human.mean(f"{name}_moment", phase)
@@ -104,10 +106,11 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         return score.correlation(both.mean(f"{name}_bw"), human.mean(name, phase))
 
     def stiffness(name: str) -> dict[str, Any]:
-        return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), 60.0 if toe_off is None else toe_off)
+        swing = USUAL_TOE_OFF if toe_off is None else toe_off
+        return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), swing)
 
     work = _joint_work(tally)
-    legs = leg_numbers(tally) if differ(settings) else None
+    legs = leg_numbers(tally) if feet_differ(settings) else None
     return {
         "policy": recording.policy,
         "environment": settings_to_json(settings),
@@ -168,7 +171,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
 
 
 def _reward_terms(recording: Recording) -> dict[str, dict[str, float]]:
-    """Return `reward_terms`: the contribution of each term to the return of an episode."""
+    """Return `reward_terms` of metrics.json: each term's weight and mean contribution to the return of an episode."""
     terms = np.nan_to_num(recording.series[REWARD].astype(float))
     weights = DEFAULT_WEIGHTS | recording.settings.reward_weights
     alive = terms[..., TERMS.index("alive")]
@@ -182,12 +185,16 @@ def _reward_terms(recording: Recording) -> dict[str, dict[str, float]]:
 
 
 def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
-    """`joint_work_J_kg`."""
+    """Return `joint_work_J_kg` of metrics.json: each joint's mean positive and negative work of one leg in a stride.
+
+    Negative work is a positive number.
+    """
     if not tally.joint_work:
         return {joint: {"positive": None, "negative": None} for joint in JOINTS}
     mean = np.mean(tally.joint_work, axis=0)
     return {
-        joint: {"positive": float(up), "negative": float(-down)} for joint, (up, down) in zip(JOINTS, mean, strict=True)
+        joint: {"positive": float(positive), "negative": float(-negative)}
+        for joint, (positive, negative) in zip(JOINTS, mean, strict=True)
     }
 
 
@@ -199,7 +206,11 @@ SPRING_SOURCES = ("stiffness_changes", "equilibrium_changes", "spring_damping")
 
 
 def _energy(tally: StrideTally) -> dict[str, float | None]:
-    """Return `energy_J_kg`: of both legs in a stride, into the body positive."""
+    """Return `energy_J_kg` of metrics.json: mean flows of energy in a stride, both legs together, into the body
+    positive.
+
+    `residual` is the part of the change of mechanical energy that the flows do not explain.
+    """
     order = ("actuators", "stiffness_changes", "equilibrium_changes", "passive_damping", "spring_damping", "contact")
     names = (*order, "pushes", "mechanical_change", "residual")
     if not tally.energy:
@@ -213,7 +224,7 @@ def _energy(tally: StrideTally) -> dict[str, float | None]:
 
 
 def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
-    """Return `springs_J_kg`: of one leg in a stride."""
+    """Return `springs_J_kg` of metrics.json: mean energy put into each joint's spring of one leg in a stride."""
     if not tally.energy:
         return {joint: dict.fromkeys(SPRING_SOURCES) for joint in JOINTS}
     entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
@@ -221,14 +232,18 @@ def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
 
 
 def _zmp(planned: NDArray, tally: StrideTally) -> dict[str, float | None]:
-    """Return `zmp`: the mean CoP against the plan over percent 0 to 99 of the step; at 100 % the plan is at the next
-    foot."""
+    """Return `zmp` of metrics.json: the mean centre of pressure (CoP) against the planned ZMP (101,) over the step.
+
+    Percent 100 is left out, as the plan is at the next foot there.
+    """
     cop = tally.cop.mean("x")[:-1]
-    alone = np.full(len(cop), False)
+    single_support = np.full(len(cop), False)
     if tally.step_time:
-        alone = PERCENT[:-1] >= 100 * np.mean(tally.double_support) / np.mean(tally.step_time)
+        single_support = PERCENT[:-1] >= 100 * np.mean(tally.double_support) / np.mean(tally.step_time)
     return {
-        "cop_rmse_single_support_m": score.rmse(cop[alone], planned[:-1][alone]) if alone.any() else None,
+        "cop_rmse_single_support_m": score.rmse(cop[single_support], planned[:-1][single_support])
+        if single_support.any()
+        else None,
         "cop_rmse_m": score.rmse(cop, planned[:-1]),
         "r": score.correlation(cop, planned[:-1]),
     }

@@ -18,6 +18,8 @@ ANGLE_COLUMNS = {
     "toe": "mtp_dorsiflexion_deg",
 }
 """Joint -> column of the curves over the stride."""
+USUAL_TOE_OFF = 60.0
+"""Percent of the stride at which swing begins in means by phase if no toe-off was measured; chosen, near people's."""
 
 
 def kinds_of(settings: BipedSettings) -> dict[str, str]:
@@ -25,7 +27,7 @@ def kinds_of(settings: BipedSettings) -> dict[str, str]:
     return {"left": settings.left_foot.kind, "right": settings.right_foot.kind}
 
 
-def differ(settings: BipedSettings) -> bool:
+def feet_differ(settings: BipedSettings) -> bool:
     """Tell whether the two feet differ."""
     left, right = settings.feet
     return left != right
@@ -33,25 +35,25 @@ def differ(settings: BipedSettings) -> bool:
 
 def leg_numbers(tally: StrideTally) -> dict[str, dict[str, Any]]:
     """Return `per_leg` of metrics.json: the numbers of the left and of the right leg."""
-    return {side: _of_leg(tally, index) for index, side in enumerate(SIDES)}
+    return {side: _leg_metrics(tally, index) for index, side in enumerate(SIDES)}
 
 
 def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
-    """Return `asymmetry` of metrics.json: right less left over their mean, 0 for equal legs."""
+    """Return `asymmetry` of metrics.json: for some numbers (right - left) over their mean, 0 for equal legs."""
     names = ("step_length_m", "stance_percent", "vertical_max_mean_bw")
-    return {name.rpartition("_")[0]: _apart(*(legs[side][name] for side in SIDES)) for name in names}
+    return {name.rpartition("_")[0]: _relative_difference(*(legs[side][name] for side in SIDES)) for name in names}
 
 
-def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
-    """Return the numbers of one leg, 0 left, 1 right."""
+def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
+    """Return the numbers of metrics.json for one leg, `side` 0 left, 1 right."""
     curves = tally.feet[side]
-    mine = np.array(tally.stride_sides, int) == side
+    of_side = np.array(tally.stride_sides, int) == side
     features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))
-    work = _chosen(tally.joint_work, mine)
-    stance = _mean(_chosen(tally.toe_off, mine))
+    work = _chosen(tally.joint_work, of_side)
+    stance = _mean(_chosen(tally.toe_off, of_side))
     swings = np.array(tally.step_sides, int) == side  # steps that begin as this leg pushes off and the other one lands
     return {
-        "strides": int(mine.sum()),
+        "strides": int(of_side.sum()),
         "step_length_m": _mean(_chosen(tally.step_length, swings)),
         "stance_percent": stance,
         "joint_range_deg": {
@@ -60,7 +62,7 @@ def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
         },
         "vertical_peak1_bw": features.vertical_peak1,
         "vertical_peak2_bw": features.vertical_peak2,
-        "vertical_max_mean_bw": _mean(_chosen(tally.vertical_max, mine)),
+        "vertical_max_mean_bw": _mean(_chosen(tally.vertical_max, of_side)),
         "braking_peak_bw": features.braking_peak,
         "forward_peak_bw": features.forward_peak,
         "joint_work_J_kg": {
@@ -71,16 +73,18 @@ def _of_leg(tally: StrideTally, side: int) -> dict[str, Any]:
             "push_off": _mean(_chosen(tally.push_off, swings)),
             "collision": _mean(_chosen(tally.collision, ~swings)),
         },
-        "toe_clearance_m": float(np.median(_chosen(tally.clearance, mine))) if mine.any() else None,
+        "toe_clearance_m": float(np.median(_chosen(tally.clearance, of_side))) if of_side.any() else None,
         "stiffness_Nm_rad": {
-            name: score.phase_means(curves.mean(f"{name}_stiffness_Nm_per_rad"), 60.0 if stance is None else stance)
+            name: score.phase_means(
+                curves.mean(f"{name}_stiffness_Nm_per_rad"), USUAL_TOE_OFF if stance is None else stance
+            )
             for name in ("ankle", "toe")
         },
     }
 
 
-def _chosen(values: list[Any], mine: NDArray) -> NDArray:
-    return np.array(values)[mine] if len(values) else np.empty(0)
+def _chosen(values: list[Any], chosen: NDArray) -> NDArray:
+    return np.array(values)[chosen] if len(values) else np.empty(0)
 
 
 def _mean(values: NDArray) -> float | None:
@@ -95,5 +99,5 @@ def _signs(work: NDArray, joint: int) -> tuple[float | None, float | None]:
     return float(up), float(-down)
 
 
-def _apart(left: float | None, right: float | None) -> float | None:
+def _relative_difference(left: float | None, right: float | None) -> float | None:
     return None if left is None or right is None else 2 * (right - left) / (right + left)

@@ -53,7 +53,10 @@ def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
 
 
 def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
-    """Return (S, 101, C) `GAIT_CYCLE_COLUMNS` of one leg over `strides` (S, 3)."""
+    """Return one leg's curves over percent of its strides, (S, 101, C) in the order of `GAIT_CYCLE_COLUMNS`.
+
+    `series` are those of one episode, `side` is 0 left, 1 right, `strides` (S, 3) as of `strides_within`.
+    """
     begin, _, end = strides.T
     return np.concatenate(
         [
@@ -65,7 +68,7 @@ def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: ND
 
 
 def mid_tick(state: NDArray) -> NDArray:
-    """Return a state, known at the ends of ticks (T, ...), at the middles of the ticks."""
+    """Return a state at the middles of ticks, from its values at their ends (T, ...); the first stays as it is."""
     return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
 
 

@@ -136,6 +136,7 @@ def add_episode(
     # Curves and numbers of each foot's strides, cut at its heel strikes.
     vertical = series["force"][..., 1].sum(axis=2)
     contacts = foot_contacts(vertical, body)
+    # How far the material of the sole at each contact point has moved: the slip of a loaded sole.
     material = contact_material(body, series["contact"], series["base"], series["angle"])
     for side, foot in enumerate(contacts):
         strides = strides_within(foot, steady)
@@ -183,10 +184,10 @@ def _add_steps(
         cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
-        # Step length: where the other foot lands at the step's end, less where this one landed at its start.
-        at = np.floor(np.stack([begin, end]) / TICK).astype(int)
+        # Step length: the place at which the other foot lands at the step's end, less this one's at the step's start.
+        tick_of = np.floor(np.stack([begin, end]) / TICK).astype(int)
         ankle = series["ankle"][..., 0]
-        tally.step_length += list(ankle[at[1], 1 - side] - ankle[at[0], side])
+        tally.step_length += list(ankle[tick_of[1], 1 - side] - ankle[tick_of[0], side])
         tally.step_time += list(end - begin)
         tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
@@ -219,16 +220,19 @@ def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
 
     def sum_until(time: NDArray) -> NDArray:
         ticks = time / TICK
-        whole = np.minimum(ticks.astype(int), len(per_tick) - 1)
-        fraction = (ticks - whole).reshape(-1, *[1] * (sum_before.ndim - 1))
-        return sum_before[whole] + fraction * (sum_before[whole + 1] - sum_before[whole])
+        whole_ticks = np.minimum(ticks.astype(int), len(per_tick) - 1)
+        fraction = (ticks - whole_ticks).reshape(-1, *[1] * (sum_before.ndim - 1))
+        return sum_before[whole_ticks] + fraction * (sum_before[whole_ticks + 1] - sum_before[whole_ticks])
 
     return sum_until(end) - sum_until(begin)
 
 
 def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """Return the ledger (S, entries) of strides from `begin` to `end` (S,) [s]: works, and the rise of mechanical
-    energy [J]."""
+    """Return each stride's energy ledger (S, entries) [J]: works, and the rise of mechanical energy.
+
+    `energy` (T, entries) is the ledger of each tick, with the mechanical energy at its end; strides last from `begin`
+    to `end` (S,) [s].
+    """
     flow = energy.copy()
     state = ledger_entries().index("mechanical")
     flow[1:, state] = np.diff(energy[:, state])

@@ -18,7 +18,7 @@ from springfoot.gait.springs.stiffness import SPRINGS, thesis_schedule
 
 from ..numbers.curves import StrideCurves
 from ..numbers.metrics import MOMENT_CURVES, Gait
-from ..numbers.per_leg import ANGLE_COLUMNS, differ
+from ..numbers.per_leg import ANGLE_COLUMNS, feet_differ
 from ..recording.recording import Recording
 from ..report.schedule_tables import schedule_curves
 from .page_figure import figure_data, shown_numbers
@@ -30,9 +30,12 @@ FORCE_PANELS = {
 
 
 def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
-    """Return the data of one policy but its words and its table."""
+    """Return the page's data of one policy: numbers, panels of curves, loops, and two strides of the body.
+
+    The page's table and verdict come beside it (`report_page`).
+    """
     human = reference_gait(recording.settings)
-    apart = differ(recording.settings)
+    by_leg = feet_differ(recording.settings)
     return {
         "name": recording.policy,
         "metrics": gait.metrics,
@@ -41,42 +44,45 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
             np.array([np.nan if (t := gait.metrics["toe_off_percent"]) is None else t, 100 * human.toe_off])
         ),
         "panels": [
-            *_angles(gait, human, apart),
-            *_kinetics(gait, human, apart),
+            *_angles(gait, human, by_leg),
+            *_kinetics(gait, human, by_leg),
             *_com(recording, gait),
             *_springs(recording),
             *_reward(gait),
         ],
-        "loops": _loops(recording, gait, human, apart),
+        "loops": _loops(recording, gait, human, by_leg),
         "figure": figure_data(recording),
     }
 
 
-def _panel(group: str, title: str, unit: str, own: tuple[NDArray, NDArray], **more: Any) -> dict[str, Any]:
-    """Return one panel of the page: title, unit, the walk's mean and SD, and `more`, such as people's."""
+def _panel(group: str, title: str, unit: str, curve: tuple[NDArray, NDArray], **entries: Any) -> dict[str, Any]:
+    """Return one panel of the page: title, unit, mean and SD of the walk's `curve`, and more `entries`, such as
+    people's."""
     return {
         "group": group,
         "title": title,
         "unit": unit,
-        "mean": shown_numbers(own[0]),
-        "sd": shown_numbers(own[1]),
-    } | more
+        "mean": shown_numbers(curve[0]),
+        "sd": shown_numbers(curve[1]),
+    } | entries
 
 
-def _of(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
+def _mean_and_sd(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
     return curves.mean(name), curves.sd(name)
 
 
-def _legs(gait: Gait, name: str, apart: bool) -> dict[str, Any]:
-    """Return `legs`: the same curve of the left and of the right leg if the feet are `apart`, that is differ."""
-    if not apart:
+def _leg_curves(gait: Gait, name: str, by_leg: bool) -> dict[str, Any]:
+    """Return a panel's entry `legs`: the curve of the left and of the right leg; nothing unless `by_leg`."""
+    if not by_leg:
         return {}
     return {
-        "legs": [{"mean": shown_numbers(own.mean(name)), "sd": shown_numbers(own.sd(name))} for own in gait.feet],
+        "legs": [
+            {"mean": shown_numbers(curves.mean(name)), "sd": shown_numbers(curves.sd(name))} for curves in gait.feet
+        ],
     }
 
 
-def _people(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any]:
+def _people_curve(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any]:
     """Return people's mean and SD of a curve over percent of the stride, for a panel."""
     unit = np.degrees(1.0) if degrees else 1.0
     phase = PERCENT / 100
@@ -86,37 +92,39 @@ def _people(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any
     }
 
 
-def _angles(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+def _angles(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
     """Return the panels of joint angles."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}
     return [
         _panel(
             *("Angles", f"{joint.capitalize()} angle", f"{positive.get(joint, 'flexion')}, deg"),
-            _of(gait.both, column),
-            **_people(human, joint, degrees=True),
-            **_legs(gait, column, apart),
+            _mean_and_sd(gait.both, column),
+            **_people_curve(human, joint, degrees=True),
+            **_leg_curves(gait, column, by_leg),
         )
         for joint, column in ANGLE_COLUMNS.items()
     ]
 
 
-def _kinetics(gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
+def _kinetics(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
     """Return the panels of moments, powers and ground reaction forces."""
 
-    def stride(group: str, title: str, unit: str, column: str, theirs: dict[str, Any]) -> dict[str, Any]:
-        return _panel(group, title, unit, _of(gait.both, column), **theirs, **_legs(gait, column, apart))
+    def stride(group: str, title: str, unit: str, column: str, people: dict[str, Any]) -> dict[str, Any]:
+        return _panel(
+            group, title, unit, _mean_and_sd(gait.both, column), **people, **_leg_curves(gait, column, by_leg)
+        )
 
     panels = []
     for joint, column in MOMENT_CURVES.items():
         unit = f"{'extension' if joint in ('hip', 'knee') else 'plantarflexion'}, N·m/kg"
-        theirs = {} if joint == "toe" else _people(human, f"{joint}_moment")
-        panels.append(stride("Moments", f"{joint.capitalize()} moment", unit, column, theirs))
+        people = {} if joint == "toe" else _people_curve(human, f"{joint}_moment")
+        panels.append(stride("Moments", f"{joint.capitalize()} moment", unit, column, people))
     for joint in ("hip", "knee", "ankle"):
         column = f"{joint}_power_W_per_kg"
-        theirs = _people(human, f"{joint}_power")
-        panels.append(stride("Powers", f"{joint.capitalize()} power", "generation, W/kg", column, theirs))
+        people = _people_curve(human, f"{joint}_power")
+        panels.append(stride("Powers", f"{joint.capitalize()} power", "generation, W/kg", column, people))
     for name, (title, unit) in FORCE_PANELS.items():
-        panels.append(stride("Ground reaction forces", title, unit, f"{name}_bw", _people(human, name)))
+        panels.append(stride("Ground reaction forces", title, unit, f"{name}_bw", _people_curve(human, name)))
     return panels
 
 
@@ -128,13 +136,13 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
     x, z = recording.plan_com.T
     cop = gait.tally.cop
     return [
-        _panel(group, "CoM ahead of the ankle", "forward, m", _of(com, "x"), plan=shown_numbers(x), axis=axis),
-        _panel(group, "CoM height", "above the ground, m", _of(com, "z"), plan=shown_numbers(z), axis=axis),
+        _panel(group, "CoM ahead of the ankle", "forward, m", _mean_and_sd(com, "x"), plan=shown_numbers(x), axis=axis),
+        _panel(group, "CoM height", "above the ground, m", _mean_and_sd(com, "z"), plan=shown_numbers(z), axis=axis),
         _panel(
             group,
             "CoP and planned ZMP",
             "ahead of the ankle, m",
-            _of(cop, "x"),
+            _mean_and_sd(cop, "x"),
             plan=shown_numbers(recording.plan_zmp),
             axis=axis,
         ),
@@ -164,15 +172,18 @@ def _reward(gait: Gait) -> list[dict[str, Any]]:
     """Return the reward's terms over the step: rewards from 0 to 1, and costs."""
     group = "Reward terms over the step, unweighted"
     return [
-        _panel(group, f"Reward term {name}", "dimensionless", _of(gait.tally.reward, name), zero=True, axis="step")
+        _panel(
+            group, f"Reward term {name}", "dimensionless", _mean_and_sd(gait.tally.reward, name), zero=True, axis="step"
+        )
         for name in TERMS
     ]
 
 
-def _loops(recording: Recording, gait: Gait, human: HumanGait, apart: bool) -> list[dict[str, Any]]:
-    """Return moment over angle of ankle and toe; of the ankle also people's, and the thesis's straight lines."""
+def _loops(recording: Recording, gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
+    """Return the loops of moment over angle of ankle and toe; of the ankle also people's, and the thesis's lines."""
     phase = PERCENT / 100
     body = body_of(recording.settings)
+    # The thesis's springs in stance, each a straight line from its start to that of the next.
     lines = [
         segment for segment in thesis_schedule(body, recording.settings.speed).ankle if segment.start < human.toe_off
     ]
@@ -189,7 +200,7 @@ def _loops(recording: Recording, gait: Gait, human: HumanGait, apart: bool) -> l
         return {"x": shown_numbers(angle), "y": shown_numbers(moment)}
 
     def loop(joint: str) -> dict[str, Any]:
-        return of(gait.both, joint) | ({"legs": [of(own, joint) for own in gait.feet]} if apart else {})
+        return of(gait.both, joint) | ({"legs": [of(foot, joint) for foot in gait.feet]} if by_leg else {})
 
     return [
         {

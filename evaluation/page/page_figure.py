@@ -36,17 +36,17 @@ def figure_data(recording: Recording) -> dict[str, Any]:
     settings = recording.settings
     body = body_of(recording.settings)
     _, first, last = clip_of(recording, body)
-    whole = recording.shown()
-    series = {name: values[first:last] for name, values in whole.items()}
+    walk = recording.shown()
+    series = {name: values[first:last] for name, values in walk.items()}
     slope = tan(radians(settings.slope_deg))
     forces = {name: values[first:last] for name, values in opensim_forces(recording).items()}
-    contacts = foot_contacts(whole["force"][..., 1].sum(axis=2), body)
-    percent = [_percent_of(each.heel_strikes, len(whole["phase"]))[first:last] for each in contacts]
-    steps = np.unique(np.concatenate([each.heel_strikes for each in contacts]))
-    phase = np.append(whole["phase"], whole["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
+    contacts = foot_contacts(walk["force"][..., 1].sum(axis=2), body)
+    percent = [_percent_of(foot.heel_strikes, len(walk["phase"]))[first:last] for foot in contacts]
+    steps = np.unique(np.concatenate([foot.heel_strikes for foot in contacts]))
+    phase = np.append(walk["phase"], walk["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
     offsets = contact_offsets(body)
     weight = body.mass * GRAVITY
-    acting = {"px": 1.0, "vx": weight, "vy": weight}
+    units = {"px": 1.0, "vx": weight, "vy": weight}
     return {
         "seconds_a_frame": TICK,
         "strides": bool(np.isfinite(percent[0]).any()),
@@ -67,50 +67,55 @@ def figure_data(recording: Recording) -> dict[str, Any]:
         "angle": shown_numbers(series["angle"].reshape(len(series["angle"]), -1)),
         "com": shown_numbers(series["com"]),
         "plan": shown_numbers(series["com_reference"]),
-        "zmp": shown_numbers(planned_zmp(recording, whole)[first:last]),
+        "zmp": shown_numbers(planned_zmp(recording, walk)[first:last]),
         "force": [
             shown_numbers(
-                np.stack([forces[f"ground_force_{side[0]}_{part}"] / unit for part, unit in acting.items()], -1)
+                np.stack([forces[f"ground_force_{side[0]}_{part}"] / unit for part, unit in units.items()], -1)
             )
             for side in SIDES
         ],
         "stiffness": shown_numbers(series["stiffness"].reshape(len(series["stiffness"]), -1)),
         "equilibrium": shown_numbers(np.degrees(series["equilibrium"]).reshape(len(series["equilibrium"]), -1)),
         "percent": shown_numbers(np.stack(percent, -1)),
-        "step": shown_numbers(_percent_of(steps, len(whole["phase"]))[first:last]),
+        "step": shown_numbers(_percent_of(steps, len(walk["phase"]))[first:last]),
         "phase": shown_numbers(phase % 1.0),
     }
 
 
 def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
-    """Return (T,) percent from one of `strikes` [s] to the next at the end of each of `ticks`, NaN outside them."""
+    """Return the percent (T,) of the way from one of `strikes` [s] to the next, at the end of each of T `ticks`.
+
+    It is NaN before the first and after the last strike.
+    """
     time = TICK * np.arange(1, ticks + 1)
     if len(strikes) < 2:
         return np.full(len(time), np.nan)
-    at = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
-    return 100 * (at % 1.0)
+    strides_done = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
+    return 100 * (strides_done % 1.0)
 
 
 def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
-    """Return (T,) the planned ZMP [m forward of the world's origin], over the step of the foot whose stance began
-    last."""
+    """Return the planned ZMP (T,) at the end of each tick [m forward of the world's origin].
+
+    It is that of the step of the foot whose stance began last.
+    """
     phase = series["phase"] % 1.0
     side = np.where(phase[:, 0] < phase[:, 1], 0, 1)
-    every = np.arange(len(phase))
-    ahead = np.interp(np.minimum(200 * phase[every, side], 99.0), PERCENT, recording.plan_zmp)
-    return series["ankle"][every, side, 0] + ahead
+    ticks = np.arange(len(phase))
+    ahead = np.interp(np.minimum(200 * phase[ticks, side], 99.0), PERCENT, recording.plan_zmp)
+    return series["ankle"][ticks, side, 0] + ahead
 
 
 def _foot(setting: FootSetting) -> dict[str, Any]:
     """Describe a foot: its words, whether it is one piece without a toe joint, and the parts at its ankle and toe."""
     foot = setting.foot
     joints = [_at_joint(joint) for joint in foot.joints]
-    worn = any(joint.orthosis is not None for joint in foot.joints)
-    return {"words": foot_words(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": worn}
+    orthosis = any(joint.orthosis is not None for joint in foot.joints)
+    return {"words": foot_words(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": orthosis}
 
 
 def _at_joint(joint: FootJoint) -> str:
-    """Return the word for the parts at a joint: muscles, lock or device."""
+    """Return the word for the mechanism at a joint: muscles, lock or device."""
     if joint.device is None:
         return "muscles"
     return "lock" if joint.device == LOCK else "device"
@@ -119,23 +124,25 @@ def _at_joint(joint: FootJoint) -> str:
 def foot_words(setting: FootSetting) -> str:
     """Return a foot of the settings in words: its kind, and the numbers that the user gave."""
     given = setting.numbers
-    known = KINDS[setting.kind] | SEGMENT_RATIOS
-    words = [f"{_plain(name)} {given[name]:g} {known[name].unit}" for name in known if name in given]
+    units = KINDS[setting.kind] | SEGMENT_RATIOS
+    words = [f"{_plain(name)} {given[name]:g} {units[name].unit}" for name in units if name in given]
     words += [f"{_plain(name)} of {len(given[name])} points" for name in given if name.endswith("_table")]
     words += ["on a schedule of its own"] if "schedule" in given else []
     if "orthosis" in given:
-        own = given["orthosis"]
-        its = [f"{_plain(name)} {own[name]:g} {ORTHOSIS_NUMBERS[name].unit}" for name in own if name != ENGAGES]
-        alone = f" in {own[ENGAGES]} alone" if ENGAGES in own else ""
-        words.append(f"in an orthosis with {' and '.join(its) or 'no spring'}{alone}")
+        orthosis = given["orthosis"]
+        springs = [
+            f"{_plain(name)} {orthosis[name]:g} {ORTHOSIS_NUMBERS[name].unit}" for name in orthosis if name != ENGAGES
+        ]
+        part = f" in {orthosis[ENGAGES]} alone" if ENGAGES in orthosis else ""
+        words.append(f"in an orthosis with {' and '.join(springs) or 'no spring'}{part}")
     return f"{_plain(setting.kind)} ({', '.join(words)})" if words else _plain(setting.kind)
 
 
 def walker_words(settings: BipedSettings) -> str:
     """Return body and feet of the settings in words."""
     height, mass = (
-        f"{given[0]:g} to {given[1]:g}" if given else f"{usual:g}"
-        for given, usual in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
+        f"{bounds[0]:g} to {bounds[1]:g}" if bounds else f"{value:g}"
+        for bounds, value in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
     )
     left, right = foot_words(settings.left_foot), foot_words(settings.right_foot)
     feet = f"both feet {left}" if left == right else f"left foot {left}, right foot {right}"

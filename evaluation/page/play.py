@@ -31,28 +31,28 @@ class PlayPage(NamedTuple):
 
     text: str
     """HTML."""
-    told: list[dict[str, Any]]
+    numbers: list[dict[str, Any]]
     """Numbers of each walk, as `play_data.walk_of`."""
 
 
-def play_page(grid: Grid, recordings: Sequence[Recording], what: str, made: str) -> PlayPage:
+def play_page(grid: Grid, recordings: Sequence[Recording], subject: str, command: str) -> PlayPage:
     """Return the page of `recordings`, one for each combination of `grid` in its order.
 
-    `what` describes the recordings in a sentence; `made` names the command.
+    `subject` describes the recordings in a sentence; `command` is the one that made the page.
     """
-    told, walks = zip(*map(walk_of, recordings), strict=True)
-    a_foot = len(recordings) // len(grid.feet)
-    a_speed = a_foot // len(grid.speed)
+    numbers, series = zip(*map(walk_of, recordings), strict=True)
+    walks_a_foot = len(recordings) // len(grid.feet)
+    walks_a_speed = walks_a_foot // len(grid.speed)
     middle = {"ankle": len(grid.ankle) // 2, "toe": len(grid.toe) // 2, "pace": len(grid.speed) // 2}
     data = {
         "grid": grid._asdict(),
         "begin": middle,
-        "walks": told,
-        "series": packed(walks),
+        "walks": numbers,
+        "series": packed(series),
         "units": {title: unit for title, (_, unit, _) in PANELS.items()},
-        "people": [people_behind(recordings[at * a_speed]) for at in range(len(grid.speed))],
-        "bodies": [drawn_body(recordings[at * a_foot]) for at in range(len(grid.feet))],
-        "what": f"{what} Between these points, the marks of the sliders, the page blends what was recorded.",
-        "made": made,
+        "people": [people_behind(recordings[index * walks_a_speed]) for index in range(len(grid.speed))],
+        "bodies": [drawn_body(recordings[index * walks_a_foot]) for index in range(len(grid.feet))],
+        "what": f"{subject} Between these points, the marks of the sliders, the page blends what was recorded.",
+        "made": command,
     }
-    return PlayPage(filled("play.html", {"DATA": as_json(data)}), list(told))
+    return PlayPage(filled("play.html", {"DATA": as_json(data)}), list(numbers))

@@ -53,40 +53,40 @@ LARGEST = 65535
 
 
 def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
-    """Return numbers and series (MOMENTS, len(PLAY_COLUMNS)) of one recorded walk.
+    """Return one recorded walk as the page needs it: its numbers, and its series (MOMENTS, len(PLAY_COLUMNS)).
 
     The series is the mean stride of the left leg after the warm-up, over the episodes without a fall; if every episode
     fell, the end of the longest one, and `ended` names the reason. Positions are forward of the hip, which moves on by
     `length` [m] in `seconds` [s].
     """
     standing = recording.fall_reason == ""
-    told = {"falls": int((~standing).sum()), "episodes": len(standing)}
+    numbers = {"falls": int((~standing).sum()), "episodes": len(standing)}
     if not standing.any():
-        return _end(recording, told)
+        return _last_moments(recording, numbers)
     upright = episodes_of(recording, standing)
     gait = measure(upright)
     body = body_of(recording.settings)
     strides = []
-    times = []
+    durations = []
     lengths = []
     for episode, ticks in enumerate(upright.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in upright.series.items()}
         left, _ = foot_contacts(series["force"][..., 1].sum(axis=2), body)
         begin, _, end = strides_within(left, (WARM_UP, np.inf)).T
         drawn = _figure_series(upright, series, body)
-        at = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, MOMENTS)
-        found = sample(drawn, at, TICK, TICK)
-        length = found[:, -1, 0] - found[:, 0, 0]
-        found[..., 0] -= found[:, :1, 0] + length[:, None] * np.linspace(0, 1, MOMENTS)
-        strides = [*strides, *found]
-        times = [*times, *(end - begin)]
+        times = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, MOMENTS)
+        sampled = sample(drawn, times, TICK, TICK)
+        length = sampled[:, -1, 0] - sampled[:, 0, 0]
+        sampled[..., 0] -= sampled[:, :1, 0] + length[:, None] * np.linspace(0, 1, MOMENTS)
+        strides = [*strides, *sampled]
+        durations = [*durations, *(end - begin)]
         lengths = [*lengths, *length]
     if not (strides and all(foot.count for foot in gait.feet)):
-        return _end(recording, told)
+        return _last_moments(recording, numbers)
     curves = [foot.mean(column)[:: 100 // (MOMENTS - 1)] for column, _, _ in PANELS.values() for foot in gait.feet]
     metrics = gait.metrics
-    told |= {
-        "seconds": float(np.mean(times)),
+    numbers |= {
+        "seconds": float(np.mean(durations)),
         "length": float(np.mean(lengths)),
         "speed": metrics["speed_m_s"]["mean"],
         "cost": metrics["cost_of_transport"],
@@ -94,7 +94,7 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
         "toe_off": metrics["toe_off_percent"],
         **{joint: metrics["joints"][joint]["rmse_deg"] for joint in ("thigh", "knee", "ankle")},
     }
-    return told, np.concatenate([np.mean(strides, axis=0), np.stack(curves, -1)], axis=-1)
+    return numbers, np.concatenate([np.mean(strides, axis=0), np.stack(curves, -1)], axis=-1)
 
 
 def episodes_of(recording: Recording, rows: NDArray) -> Recording:
@@ -103,28 +103,29 @@ def episodes_of(recording: Recording, rows: NDArray) -> Recording:
     return replace(recording, **named, series={name: values[rows] for name, values in recording.series.items()})
 
 
-def _end(recording: Recording, told: dict[str, Any]) -> tuple[dict[str, Any], NDArray]:
-    """Return numbers and series of the last moments of a walk that only fell."""
+def _last_moments(recording: Recording, numbers: dict[str, Any]) -> tuple[dict[str, Any], NDArray]:
+    """Return `numbers` with those of a walk that only fell, and the series of its last moments."""
     series = recording.shown()
     drawn = _figure_series(recording, series, body_of(recording.settings))
     end = TICK * len(drawn)
     seconds = min(FALL_SECONDS, end - TICK)
-    found = sample(drawn, np.linspace(end - seconds, end, MOMENTS)[None], TICK, TICK)[0]
-    found[:, 0] -= found[0, 0]
-    told |= {
+    sampled = sample(drawn, np.linspace(end - seconds, end, MOMENTS)[None], TICK, TICK)[0]
+    sampled[:, 0] -= sampled[0, 0]
+    numbers |= {
         "seconds": seconds,
         "length": 0.0,
         "ended": str(recording.fall_reason[recording.example]) or "without a stride of both legs",
         "after": end,
     }
-    return told, np.concatenate([found, np.zeros((MOMENTS, len(PLAY_COLUMNS) - found.shape[1]))], axis=-1)
+    return numbers, np.concatenate([sampled, np.zeros((MOMENTS, len(PLAY_COLUMNS) - sampled.shape[1]))], axis=-1)
 
 
 def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body) -> NDArray:
-    """Return (T, 26) columns of `BODY_PARTS`.
+    """Return the drawing's series of one episode: columns (T, 26) of `BODY_PARTS`.
 
-    Hip x, z and pitch; joint angles; CoM, its plan and the planned ZMP, forward of the hip; forces in body weights; the
-    vertical force times its CoP forward of the hip, 0 without a force; K.
+    They are: `base`, hip x, z and trunk pitch; `angle` of the joints; CoM, `plan` of the CoM and planned `zmp`, forward
+    of the hip; forces `forward` and `up` in body weights; `lever`, the vertical force times its CoP forward of the hip,
+    0 without a force; `stiffness` K.
     """
     hip = series["base"][:, :1]
     ahead = np.array([[1.0, 0.0]]) * hip
@@ -145,19 +146,20 @@ def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body)
 
 
 def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
-    """Return all series of a page as text: `low` and `high` of each column, and integers between them."""
+    """Return all series of a page as JSON values: `low` and `high` of each column, and 16-bit integers between them in
+    base 64."""
     values = np.stack(walks)
     values = np.where(values < LOCK.stiffness, values, 0.0)  # of a locked joint no K is drawn
     low = values.min(axis=(0, 1))
     high = values.max(axis=(0, 1))
-    share = (values - low) / np.where(high > low, high - low, 1.0)
-    whole = np.round(share * LARGEST).astype("<u2")
+    fraction = (values - low) / np.where(high > low, high - low, 1.0)
+    integers = np.round(fraction * LARGEST).astype("<u2")
     return {
         "samples": MOMENTS,
         "columns": PLAY_COLUMNS,
         "low": shown_numbers(low),
         "high": shown_numbers(high),
-        "data": b64encode(whole.tobytes()).decode(),
+        "data": b64encode(integers.tobytes()).decode(),
     }
 
 
@@ -169,16 +171,16 @@ def people_behind(recording: Recording) -> dict[str, Any]:
     for title, (_, unit, name) in PANELS.items():
         if name is None:
             continue
-        turn = np.degrees(1.0) if unit.endswith("deg") else 1.0
+        unit_factor = np.degrees(1.0) if unit.endswith("deg") else 1.0
         curves[title] = {
-            "people": shown_numbers(turn * human.mean(name, phase)),
-            "people_sd": shown_numbers(turn * human.sd(name, phase)),
+            "people": shown_numbers(unit_factor * human.mean(name, phase)),
+            "people_sd": shown_numbers(unit_factor * human.sd(name, phase)),
         }
     return {"toe_off": 100 * human.toe_off, "curves": curves}
 
 
 def drawn_body(recording: Recording) -> dict[str, Any]:
-    """Return lengths, feet and colours of the body."""
+    """Return the body for the drawing: height, lengths, feet, slope of the ground, and ranges of K for its colours."""
     names = ("slope", "height", "feet", "lengths", "ranges")
-    whole = figure_data(recording)
-    return {name: whole[name] for name in names}
+    figure = figure_data(recording)
+    return {name: figure[name] for name in names}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from springfoot.envs.settings.settings import settings_from
-from springfoot.files.provenance import source
+from springfoot.files.provenance import versions_and_commit
 
 from ..numbers.criteria import (
     LOADS_LIKE_PEOPLE,
@@ -20,7 +20,7 @@ from ..numbers.criteria import (
     Criterion,
     fault,
     number_text,
-    numbers,
+    with_derived,
 )
 from ..numbers.metrics import Gait
 from ..recording.recording import Recording
@@ -40,20 +40,20 @@ def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str
         "policies": [policy_data(recording, gait) for recording, gait in walks],
         "tables": [table_rows(gait.metrics) for _, gait in walks],
         "legs": [leg_rows(gait.metrics) for _, gait in walks],
-        "made": _made(walks, command),
+        "made": _origin_text(walks, command),
     }
     verdicts = "\n".join(_verdict(index, gait.metrics) for index, (_, gait) in enumerate(walks))
     path.write_text(filled("page.html", {"VERDICT": verdicts, "DATA": as_json(data)}), encoding="utf-8")
 
 
-def _made(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
+def _origin_text(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
     """Return the text on the origin of the page: command, seeds, commit, versions, settings."""
-    made = source(PAGE_PACKAGES)
-    commit = made["commit"] or "none: not in a clone of the project"
+    origin = versions_and_commit(PAGE_PACKAGES)
+    commit = origin["commit"] or "none: not in a clone of the project"
     lines = [f"command: {command}"] if command else []
     lines += [f"{recording.policy}: episodes seeded from {recording.seed} on" for recording, _ in walks]
-    lines += [f"commit: {commit}{' and changes to it' if made['modified'] else ''}"]
-    lines += [f"{name} {number}" for name, number in made["versions"].items()]
+    lines += [f"commit: {commit}{' and changes to it' if origin['modified'] else ''}"]
+    lines += [f"{name} {number}" for name, number in origin["versions"].items()]
     settings = [
         f"settings of {recording.policy}: {json.dumps(gait.metrics['environment'])}" for recording, gait in walks
     ]
@@ -67,7 +67,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 def _verdict(index: int, metrics: dict[str, Any]) -> str:
     """Return the HTML of one policy's verdict."""
     colour = COLOURS[index % len(COLOURS)]
-    items = "".join(f"<dt>{escape(term)}</dt><dd>{escape(said)}</dd>" for term, said in spoken_verdict(metrics).items())
+    items = "".join(f"<dt>{escape(term)}</dt><dd>{escape(text)}</dd>" for term, text in spoken_verdict(metrics).items())
     return (
         f'<section class="verdict" aria-label="Verdict on {escape(metrics["policy"])}">'
         f'<h2 class="name" style="border-color:{colour}">{escape(metrics["policy"])}</h2><dl>{items}</dl></section>'
@@ -75,7 +75,7 @@ def _verdict(index: int, metrics: dict[str, Any]) -> str:
 
 
 def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
-    """Return falls, body and feet, a fault of the simulation, speed, joints, forces and energy in words."""
+    """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy."""
     environment = metrics["environment"]
     settings = settings_from(**environment)
     people = people_metrics(settings)
@@ -83,26 +83,26 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     falls = metrics["falls"]
     episodes = metrics["episodes"]
     reasons = ", ".join(f"{count} × {reason}" for reason, count in metrics["fall_reasons"].items())
-    counted = f"{episodes} episode{'s' * (episodes != 1)}"
-    fell = f"Fell in {falls} of {counted}: {reasons}." if falls else f"Never fell in {counted}."
+    episode_count = f"{episodes} episode{'s' * (episodes != 1)}"
+    falls_text = f"Fell in {falls} of {episode_count}: {reasons}." if falls else f"Never fell in {episode_count}."
     joints = metrics["joints"]
     grf = metrics["grf"]
     work = metrics["joint_work_J_kg"]["ankle"]
-    said = {
-        "Falls": f"{fell} Mean length {metrics['seconds_mean']:.1f} s.",
+    verdict = {
+        "Falls": f"{falls_text} Mean length {metrics['seconds_mean']:.1f} s.",
         "Walker": f"{walker_words(settings)}.",
     }
     if metrics["strides"]["count"] == 0:
-        return said | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
-    angles = ", ".join(f"{name} {_text(each['rmse_deg'], '.1f')}°" for name, each in joints.items())
+        return verdict | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
+    angles = ", ".join(f"{name} {_text(errors['rmse_deg'], '.1f')}°" for name, errors in joints.items())
     peaks = " / ".join(_text(grf[name], ".2f") for name in _PEAKS)
-    theirs = " / ".join(_text(people["grf"][name], ".2f") for name in _PEAKS)
-    if found := fault(metrics):
-        said["Warning"] = found
-    return said | {
+    people_peaks = " / ".join(_text(people["grf"][name], ".2f") for name in _PEAKS)
+    if warning := fault(metrics):
+        verdict["Warning"] = warning
+    return verdict | {
         "Speed": f"{_text(metrics['speed_m_s']['mean'], '.2f')} m/s, asked for {environment['speed']:.2f}.",
         "Joints": f"Off people's mean by {angles} (rms). {_judged(metrics, MOVES_LIKE_PEOPLE, judged)}",
-        "Forces": f"Vertical peak, valley, peak {peaks} body weights, people {theirs}. "
+        "Forces": f"Vertical peak, valley, peak {peaks} body weights, people {people_peaks}. "
         f"{_judged(metrics, LOADS_LIKE_PEOPLE, judged)}",
         "Energy": f"Cost of transport {_text(metrics['cost_of_transport'], '.3f')}; the ankle gives "
         f"{_text(work['positive'], '.2f')} J/kg a stride, people's {people['ankle_work_J_kg']['positive']:.2f}. "
@@ -114,12 +114,15 @@ _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
 
 
 def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: bool) -> str:
-    """Return, in words, the number of criteria and the missed ones; that there is no verdict unless the walk is
-    `judged`."""
+    """Return a sentence that names the missed criteria; unless the walk is `judged`, one that there is no verdict."""
     if not judged:
         return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
-    values = numbers(dict(metrics))
-    missed = [f"{each.label or each.name}: {number_text(each, values)}" for each in criteria if not each.holds(values)]
+    values = with_derived(dict(metrics))
+    missed = [
+        f"{criterion.label or criterion.name}: {number_text(criterion, values)}"
+        for criterion in criteria
+        if not criterion.holds(values)
+    ]
     if not missed:
         return f"Meets all {len(criteria)} criteria of a human-like walk."
     return f"Misses {len(missed)} of {len(criteria)} criteria ({'; '.join(missed)})."

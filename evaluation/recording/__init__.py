@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .policies import policy_label, prepare
+    from .policies import policy_and_settings, policy_label
     from .recording import (
         BATCH,
         TICK,
@@ -26,8 +26,8 @@ __all__ = [
     "Episodes",
     "Recording",
     "planned_course",
+    "policy_and_settings",
     "policy_label",
-    "prepare",
     "record",
     "record_each",
     "record_feet",
@@ -45,7 +45,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "Recording": "recording",
             "planned_course": "recording",
             "policy_label": "policies",
-            "prepare": "policies",
+            "policy_and_settings": "policies",
             "record": "recording",
             "record_each": "recording",
             "record_feet": "recording",

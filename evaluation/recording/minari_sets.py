@@ -59,40 +59,40 @@ def set_id(name: str) -> str:
 
 def walked_episodes(settings: BipedSettings, policy: PolicyFunction, episodes: int, seed: int) -> list[WalkedEpisode]:
     """Walk episodes seeded `seed`, `seed` + 1, … and return what a learner sees of each."""
-    done: list[WalkedEpisode] = []
-    while len(done) < episodes:
-        count = min(_BATCH, episodes - len(done))
-        seeds = [seed + len(done) + index for index in range(count)]
-        done += _walked_batch(Biped(settings, count), policy, seeds)
-    return done
+    walked: list[WalkedEpisode] = []
+    while len(walked) < episodes:
+        count = min(_BATCH, episodes - len(walked))
+        seeds = [seed + len(walked) + index for index in range(count)]
+        walked += _walked_batch(Biped(settings, count), policy, seeds)
+    return walked
 
 
 def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[WalkedEpisode]:
-    """Walk one episode in each environment."""
+    """Walk one episode in each environment of the batch, seeded by `seeds`."""
     biped.reset(np.arange(len(seeds)), seeds)
     observations = [biped.observe().copy()]
     actions: list[NDArray] = []
     rewards: list[NDArray] = []
-    active: list[NDArray] = []
+    walking_by_step: list[NDArray] = []
     fell = np.zeros(len(seeds), bool)
 
     def act(observation: NDArray) -> NDArray:
         actions.append(policy(observation))
         return actions[-1]
 
-    for taken, result in walked_steps(biped, act):
+    for walking, result in walked_steps(biped, act):
         observations.append(result.observation.copy())
         rewards.append(result.reward.copy())
-        active.append(taken)
-        fell |= taken & result.terminated
-    steps = np.sum(active, axis=0)
-    seen, acted, paid = np.stack(observations, 1), np.stack(actions, 1), np.stack(rewards, 1)
+        walking_by_step.append(walking)
+        fell |= walking & result.terminated
+    steps = np.sum(walking_by_step, axis=0)
+    observed, acted, rewarded = np.stack(observations, 1), np.stack(actions, 1), np.stack(rewards, 1)
     return [
         WalkedEpisode(
             seed=seeds[k],
-            observations=seen[k, : steps[k] + 1],
+            observations=observed[k, : steps[k] + 1],
             actions=acted[k, : steps[k]],
-            rewards=paid[k, : steps[k]],
+            rewards=rewarded[k, : steps[k]],
             fell=bool(fell[k]),
         )
         for k in range(len(seeds))
@@ -117,12 +117,12 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
             raise SpringfootError(f"the Minari set {set_id(name)} exists already; minari delete {set_id(name)}")
     if NAMESPACE not in namespace.list_local_namespaces():
         namespace.create_namespace(NAMESPACE)
-    told = {}
+    results = {}
     environment = gym.make(ENVIRONMENT, **settings_to_json(settings))
     for name in names:
-        policy, words = SETS[name]
-        act = baseline(policy, settings, seed) if policy == "random" else read_policy(policy)
-        walks = walked_episodes(settings, act, episodes, seed)
+        policy, description = SETS[name]
+        acting = baseline(policy, settings, seed) if policy == "random" else read_policy(policy)
+        walked = walked_episodes(settings, acting, episodes, seed)
         buffers = [
             EpisodeBuffer(
                 id=index,
@@ -133,7 +133,7 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
                 terminations=_last(len(walk.rewards), walk.fell),
                 truncations=_last(len(walk.rewards), not walk.fell),
             )
-            for index, walk in enumerate(walks)
+            for index, walk in enumerate(walked)
         ]
         out = get_dataset_path(set_id(name))
         with whole_folder(out, out) as (part, _), _datasets_in(part), warnings.catch_warnings():
@@ -144,26 +144,26 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
                 env=environment.spec,
                 observation_space=environment.observation_space,
                 action_space=environment.action_space,
-                algorithm_name=words,
+                algorithm_name=description,
                 author="springfoot contributors",
-                description=f"{episodes} episodes from seed {seed} on: {words}.",
+                description=f"{episodes} episodes from seed {seed} on: {description}.",
                 requirements=[f"springfoot=={__version__}"],
             )
             (part / set_id(name) / "data").rename(part / "data")
             shutil.rmtree(part / NAMESPACE.split("/")[0])
-        told[name] = {
+        results[name] = {
             "episodes": episodes,
-            "steps": sum(len(walk.rewards) for walk in walks),
-            "return_mean": float(np.mean([walk.rewards.sum() for walk in walks])),
-            "falls": sum(walk.fell for walk in walks),
+            "steps": sum(len(walk.rewards) for walk in walked),
+            "return_mean": float(np.mean([walk.rewards.sum() for walk in walked])),
+            "falls": sum(walk.fell for walk in walked),
         }
     environment.close()
-    return told
+    return results
 
 
 @contextmanager
 def _datasets_in(folder: Path) -> Iterator[None]:
-    """Let Minari write below another folder until the block ends."""
+    """Set Minari's variable so that it writes below `folder` until the block ends."""
     before = os.environ.get(DATASETS_FOLDER)
     os.environ[DATASETS_FOLDER] = str(folder)
     try:

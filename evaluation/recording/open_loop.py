@@ -33,9 +33,10 @@ decisions for each knot."""
 UNDISTURBED: dict[str, Any] = {
     name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS if THEME_OF[name] in ("episode", "disturbance")
 } | {"unevenness_m": 0.0, "episode_seconds": COPY_SECONDS}
-"""Settings of those episodes; body, speed, slope, friction and all else are the given ones."""
+"""Settings of those episodes; body, speed, slope, friction and all else stay as they are."""
 Watch = Callable[[float], Callable[[float], object]]
-"""Function that is given the length of a walk [s] and returns a function to call with the seconds of each step."""
+"""Function that starts a report of progress: it takes the length of a walk [s], and returns a function to call with the
+seconds of each step."""
 SAME_K = 1e-9
 """Variance of log K below which K counts as constant."""
 
@@ -52,27 +53,27 @@ def alike_legs(settings: BipedSettings) -> list[list[int]]:
     return [legs] if left == right else [[leg] for leg in legs]
 
 
-def decided(
+def decisions_of(
     recording: Recording, sides: Sequence[int] | None = None, series: str = "stiffness"
 ) -> tuple[NDArray, NDArray]:
     """Return the phase (n,) of a leg at each decision, and K (n, 2) [N m/rad] of ankle and toe from then on.
 
-    Decisions of the steady walk without its first `WARM_UP` seconds, of all `sides` together; by default the
-    `deciding_legs`, or both legs if there are none. Times with slack muscles are left out. `series` names another pair
-    in place of K.
+    Decisions are those of the steady walk without its first `WARM_UP` seconds, of all `sides` together: by default the
+    `deciding_legs`, or both legs if there are none. Times with slack muscles are left out. `series` names another
+    recorded pair, such as the rest angles, to return in place of K.
     """
     begin, end = steady_walk(recording.settings)
     step = round(recording.settings.step_seconds / TICK)
-    at = np.arange(step, recording.series["phase"].shape[1], step)
-    at = at[(at * TICK >= begin + WARM_UP) & (at * TICK < end)]
-    own = deciding_legs(recording.settings) or [0, 1]
-    where = np.ix_(range(len(recording.ticks)), at, own if sides is None else sides)
-    phase = recording.series["phase"][where].ravel().astype(float)  # at the tick's beginning, when K was decided
+    samples = np.arange(step, recording.series["phase"].shape[1], step)
+    samples = samples[(samples * TICK >= begin + WARM_UP) & (samples * TICK < end)]
+    deciding = deciding_legs(recording.settings) or [0, 1]
+    chosen = np.ix_(range(len(recording.ticks)), samples, deciding if sides is None else sides)
+    phase = recording.series["phase"][chosen].ravel().astype(float)  # at the tick's beginning, when K was decided
     values, stiffness = (
-        recording.series[name][where].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
+        recording.series[name][chosen].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
     )
-    walked = np.isfinite(phase) & np.isfinite(values).all(-1) & (stiffness > 0.0).all(-1)
-    return phase[walked] % 1.0, values[walked]
+    usable = np.isfinite(phase) & np.isfinite(values).all(-1) & (stiffness > 0.0).all(-1)
+    return phase[usable] % 1.0, values[usable]
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
@@ -98,33 +99,35 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
         for column in values.T
     ]
     # Second differences of the knots around the circle: the curvature.
-    one = np.eye(MEAN_KNOTS)
-    curvature = np.roll(one, 1, axis=1) + np.roll(one, -1, axis=1) - 2 * one
+    identity = np.eye(MEAN_KNOTS)
+    curvature = np.roll(identity, 1, axis=1) + np.roll(identity, -1, axis=1) - 2 * identity
     return np.linalg.solve(normal + SMOOTHING * curvature.T @ curvature, np.stack(right_side, -1))
 
 
 def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
-    """Return the mean K (SAMPLES, 2) on `GRID` of decisions, between the least and the largest one."""
+    """Return the mean K over the stride, (SAMPLES, 2) on `GRID`, of decisions at `phase` (n,) of `stiffness` (n, 2).
+
+    Both in N m/rad; the mean is clipped to the range of the decisions.
+    """
     knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
-    at = np.arange(MEAN_KNOTS) / MEAN_KNOTS
-    return np.stack([np.interp(GRID, at, curve, period=1.0) for curve in knots.T], -1)
+    knot_phases = np.arange(MEAN_KNOTS) / MEAN_KNOTS
+    return np.stack([np.interp(GRID, knot_phases, curve, period=1.0) for curve in knots.T], -1)
 
 
 def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
-    """Return `feedback` of metrics.json: the part of log K of ankle and toe that the phase does not explain; None
-    without K.
+    """Return `feedback` of metrics.json: the variation of log K of ankle and toe that the phase does not explain.
 
-    `share` is that part of the variance [0, 1], `spread` its standard deviation at equal phase (0.1: K varies by 10 %).
-    The variance at equal phase is half the mean squared difference of neighbours in phase (Rice, Annals of Statistics
-    12 (1984) 1215), so that any schedule has none, with or without steps. Legs with different feet have schedules of
-    their own: their variances are taken apart, and averaged.
+    `share` is its part of the variance [0, 1], `spread` its standard deviation (0.1: at equal phase K varies by 10 %);
+    None without K. The variance at equal phase is half the mean squared difference of neighbours in phase (Rice, Annals
+    of Statistics 12 (1984) 1215), so that any schedule has none, with or without steps. Legs with different feet have
+    schedules of their own: the variances of each leg are averaged.
     """
-    by_leg = [decided(recording, legs) for legs in alike_legs(recording.settings)]
+    by_leg = [decisions_of(recording, legs) for legs in alike_legs(recording.settings)]
     logarithms = [np.log(stiffness[np.argsort(phase)]) for phase, stiffness in by_leg if len(phase) >= 2]
     if not logarithms:
         return {joint: {"share": None, "spread": None} for joint in SPRINGS}
     totals = np.mean([logarithm.var(0) for logarithm in logarithms], axis=0)
-    at_equal_phase = np.mean([0.5 * (np.diff(each, axis=0) ** 2).mean(0) for each in logarithms], axis=0)
+    at_equal_phase = np.mean([0.5 * (np.diff(logarithm, axis=0) ** 2).mean(0) for logarithm in logarithms], axis=0)
     return {
         joint: {"share": min(float(alike / total), 1.0) if total > SAME_K else 0.0, "spread": float(np.sqrt(alike))}
         for joint, total, alike in zip(SPRINGS, totals, at_equal_phase, strict=True)
@@ -137,36 +140,36 @@ def open_loop_copy(
     *,
     name: str,
     threads: int = 2,
-    watch: Watch = lambda seconds: lambda walked: None,
+    watch: Watch = lambda seconds: lambda decisions: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """Return a policy's mean K over the stride as a policy, and its environment: `settings` with absolute actions.
+    """Return a policy's mean K over the stride as a policy, and settings for it: `settings` with absolute actions.
 
     Args:
         policy: observations to actions.
         settings: of its environment; the mean is of its body on its ground, under `UNDISTURBED`.
         name: of the policy, in errors.
         threads: of the physics; any number gives the same bits.
-        watch: see `Watch`.
+        watch: reports the progress of the walk from which the mean is taken, see `Watch`.
 
     The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`); of each leg by
     itself if the feet differ. If other speeds can be commanded, it is taken at each tabulated speed, and is linear
     between them; K scales with the body. The equilibrium is that of the settings. A residual action can leave the range
-    of absolute actions, a copy cannot: K beyond the range becomes its nearer end. Raises
-    `SpringfootError` for a policy that walks no strides.
+    of absolute actions, a copy cannot: K beyond the range becomes its nearer end. Raises `SpringfootError` for a policy
+    that walks no strides.
     """
-    alone = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
+    undisturbed = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     groups = alike_legs(settings)
     # A leg with a device follows no K: it is given that of the other one.
     group_of = [next((number for number, legs in enumerate(groups) if side in legs), 0) for side in range(len(SIDES))]
     means: dict[float, NDArray] = {}
     speeds = tabulated_speeds(settings).tolist()
-    how: dict[str, Any] = {"name": name, "episodes": COPY_EPISODES, "threads": threads}
-    how["progress"] = watch(len(speeds) * COPY_EPISODES * COPY_SECONDS)
+    recorded: dict[str, Any] = {"name": name, "episodes": COPY_EPISODES, "threads": threads}
+    recorded["progress"] = watch(len(speeds) * COPY_EPISODES * COPY_SECONDS)
     for speed in speeds:
-        recording = record(policy, replace(alone, speed=speed), **how)
-        walked = [decided(recording, legs) for legs in groups]
-        if all(len(phase) for phase, _ in walked):
-            curves = [_mean_stiffness(phase, stiffness) for phase, stiffness in walked]
+        recording = record(policy, replace(undisturbed, speed=speed), **recorded)
+        decisions = [decisions_of(recording, legs) for legs in groups]
+        if all(len(phase) for phase, _ in decisions):
+            curves = [_mean_stiffness(phase, stiffness) for phase, stiffness in decisions]
             means[speed] = np.stack([curves[group] for group in group_of], axis=1)
     if not means:
         raise SpringfootError(f"{name} walks no strides after {WARM_UP:g} s whose mean stiffness could be taken")

@@ -1,8 +1,4 @@
-"""Return a policy by its name, and its environment in an evaluation: the one place that understands names of policies.
-
-A name is a .safetensors or .onnx file, a run folder (its best policy), `pretrained`, `predicted`, `module:function`, a
-baseline (`springfoot.agents.policies.baselines`), or `frozen:POLICY`, the open-loop copy of a trained policy.
-"""
+"""Return a policy by its name, and settings to evaluate it with: the one place that understands names of policies."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -32,79 +28,85 @@ CONDITIONS = {name: getattr(BipedSettings, name) for name in CONDITION_SETTINGS}
 """Standard conditions of every evaluation: defaults that replace the settings of the policy's training."""
 
 
-def prepare(
+def policy_and_settings(
     name: str,
     given: dict[str, Any],
     seed: int = 0,
     threads: int = 2,
     watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """Return a policy by name, and its environment in an evaluation.
+    """Return the policy of that name, and the environment settings to evaluate it with.
 
     Args:
-        name: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, `module:function`, a
-            baseline of `agents.policies.baselines`, or `frozen:POLICY`, the mean K of one of the first four, which
-            first walks for it (`open_loop_copy`).
+        name: a trained policy: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, or
+            `module:function`; a table of stiffness over the stride in a .csv or .json file; a baseline of
+            `agents.policies.baselines`; or `frozen:POLICY`: the mean K over the stride of a trained policy, as an
+            open-loop policy (`open_loop_copy` walks with the trained one first to measure it).
         given: environment settings asked for. They replace `CONDITIONS`, and `CONDITIONS` replace the policy's own.
         seed: of the baseline `random`.
         threads: of the physics where a copy is made; any number gives the same bits.
-        watch: as for `open_loop_copy`.
+        watch: reports the progress of that walk, see `Watch`.
 
     Raises `SpringfootError` for an unknown name or a bad setting.
     """
-    wanted = CONDITIONS | given
+    overriding = CONDITIONS | given
     kind = name.partition(":")[0]
     if kind == FROZEN:
-        return _prepare_copy(name, given, threads, watch)
+        return _frozen_copy(name, given, threads, watch)
     if kind in BASELINES:
-        conditions = settings_from(**{key: wanted[key] for key in CONDITIONS})
-        settings = settings_from(**(own_settings(name, conditions) | wanted))
+        conditions = settings_from(**{key: overriding[key] for key in CONDITIONS})
+        settings = settings_from(**(own_settings(name, conditions) | overriding))
         return baseline(name, settings, seed), settings
     if is_schedule_file(name):
-        own, make = schedule_file(name, settings_from(**{key: wanted[key] for key in CONDITIONS}))
-        settings = settings_from(**(own | wanted))
+        schedule_settings, make = schedule_file(name, settings_from(**{key: overriding[key] for key in CONDITIONS}))
+        settings = settings_from(**(schedule_settings | overriding))
         return make(settings), settings
     if name not in SHIPPED and not Path(name).exists() and not is_function(name):
-        known = ", ".join(
+        names = ", ".join(
             [*(name for name in SHIPPED if name not in OF_FEET), f"{OF_FEET[0]} to {OF_FEET[-1]}", *BASELINES]
         )
         raise SpringfootError(
-            f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, module:function, or one of {known}, "
-            f"or {FROZEN}:POLICY"
+            f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
+            f"module:function, {FROZEN}:POLICY, or one of {names}"
         )
     policy = load_policy(name)
-    return policy, settings_from(**(settings_to_json(policy.settings) | wanted))
+    return policy, settings_from(**(settings_to_json(policy.settings) | overriding))
 
 
-def _prepare_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -> tuple[PolicyFunction, BipedSettings]:
-    """Prepare `frozen:POLICY`: its mean K comes from the policy's own decisions, at whatever rate the copy decides."""
-    other = name.partition(":")[2]
-    if not other:
+def _frozen_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -> tuple[PolicyFunction, BipedSettings]:
+    """Return the open-loop copy `frozen:POLICY` and its settings.
+
+    The setting `decisions` is the copy's alone: for the mean K the policy walks with its own.
+    """
+    copied = name.partition(":")[2]
+    if not copied:
         raise SpringfootError(f"{FROZEN} is the copy of a policy, as in {FROZEN}:pretrained, got {name!r}")
-    if other.partition(":")[0] == FROZEN:
-        raise SpringfootError(f"a copy has no copy of its own: give {other}, got {name!r}")
-    if not has_feedback(other):
-        raise SpringfootError(f"{other} has no feedback to leave out, it is its own copy: give {other}, got {name!r}")
-    policy, settings = prepare(other, {key: value for key, value in given.items() if key != "decisions"})
+    if copied.partition(":")[0] == FROZEN:
+        raise SpringfootError(f"a copy has no copy of its own: give {copied}, got {name!r}")
+    if not has_feedback(copied):
+        raise SpringfootError(f"{copied} has no feedback to leave out, it is its own copy: give {copied}, got {name!r}")
+    policy, settings = policy_and_settings(copied, {key: value for key, value in given.items() if key != "decisions"})
     decisions = given.get("decisions", settings.decisions)
-    copy, absolute = open_loop_copy(policy, settings, name=other, threads=threads, watch=watch)
+    copy, absolute = open_loop_copy(policy, settings, name=copied, threads=threads, watch=watch)
     return copy, replace(absolute, decisions=decisions)
 
 
 def policy_label(name: str) -> str:
-    """Return the name of a policy in results: its own, that of its run or that of its file, without folders.
+    """Return a policy's name for results: the baseline's, the run's or the file's, without folders.
 
-    The label can name a folder, whatever `name` is: printable, no path, not hidden, not too long.
+    The label can name a folder, whatever `name` is: it is printable, no path, not hidden and not too long.
     """
-    kind, _, other = name.partition(":")
-    label = f"{FROZEN}-{policy_label(other)}" if kind == FROZEN and other else _own_name(name)
+    kind, _, copied = name.partition(":")
+    label = f"{FROZEN}-{policy_label(copied)}" if kind == FROZEN and copied else _own_name(name)
     safe = "".join(letter if letter.isprintable() and letter not in "/\\" else "-" for letter in label)
     return safe.lstrip(".")[:LONGEST_LABEL] or "policy"
 
 
 def _own_name(name: str) -> str:
-    """Return the name of a policy's file without folder and suffix; for the best and last policy of a run with the
-    run's name."""
+    """Return the name of a policy without folder and suffix.
+
+    The best and last policy of a run have the run's name before theirs.
+    """
     path = Path(name)
     if path.suffix not in (".safetensors", ".onnx", *SCHEDULE_SUFFIXES):
         return path.resolve().name.replace(":", "-").replace(",", "-")

@@ -190,7 +190,7 @@ def record(
         threads: of the physics; any number gives the same bits.
         model: of the body, with other options, as for `envs.physics.simulation.Simulation`.
         legs: leg constants in place of the committed ones.
-        progress: called with the simulated time [s] of all episodes together after every step.
+        progress: called after every step with the seconds that it simulated, all episodes together.
 
     Raises `SpringfootError` for settings that draw body, speed or world anew for each episode.
     """
@@ -207,7 +207,7 @@ def record(
 def record_each(
     policy: PolicyFunction,
     settings: BipedSettings,
-    who: Mapping[str, ArrayLike],
+    walkers: Mapping[str, ArrayLike],
     *,
     name: str,
     seed: int = 0,
@@ -216,26 +216,26 @@ def record_each(
 ) -> list[Recording]:
     """Record, as `record` does, one episode for each of E bodies and speeds, side by side.
 
-    Returns a recording for each, with its own settings. `who` holds `height` [m], `mass` [kg] and `speed` [m/s], (E,)
-    each, within the ranges that the `settings` draw from. Raises `SpringfootError` for settings whose commanded speed
-    changes within an episode.
+    Returns a recording for each, with its own settings. `walkers` holds `height` [m], `mass` [kg] and `speed` [m/s],
+    (E,) each, within the ranges that the `settings` draw from. Raises `SpringfootError` for settings whose commanded
+    speed changes within an episode.
     """
     if settings.speed_interval is not None:
         raise SpringfootError(
             f"a recording is at one speed: speed_interval must be None, got {settings.speed_interval}"
         )
-    columns = np.broadcast_arrays(*(np.asarray(who[key], float) for key in DRAWN))
-    given = dict(zip(DRAWN, columns, strict=True))
+    columns = np.broadcast_arrays(*(np.asarray(walkers[key], float) for key in DRAWN))
+    drawn = dict(zip(DRAWN, columns, strict=True))
     episodes = len(columns[0])
     seeds = range(seed, seed + episodes)
-    kept = record_all(policy, settings, seeds, given=given, threads=threads, progress=progress)
+    kept = record_all(policy, settings, seeds, given=drawn, threads=threads, progress=progress)
     recordings = []
     for index in range(episodes):
-        body = {key: float(values[index]) for key, values in given.items()} | dict.fromkeys(DRAWN_SETTINGS)
-        alone = replace(settings, **body)
-        course: dict[str, Any] = planned_course(reference_walk_at(alone, alone.speed).plan)
+        fixed = {key: float(values[index]) for key, values in drawn.items()} | dict.fromkeys(DRAWN_SETTINGS)
+        own_settings = replace(settings, **fixed)
+        course: dict[str, Any] = planned_course(reference_walk_at(own_settings, own_settings.speed).plan)
         rows = slice(index, index + 1)
-        recordings.append(Recording(policy=name, settings=alone, seed=seed + index, **kept.of(rows), **course))
+        recordings.append(Recording(policy=name, settings=own_settings, seed=seed + index, **kept.of(rows), **course))
     return recordings
 
 
@@ -254,26 +254,30 @@ def record_feet(
 
     Returns a recording for each foot.
     """
-    each = [replace(settings, right_foot=foot) for foot in right_feet]
-    feet = [own.feet for own in each for _ in range(episodes)]
-    seeds = [seed + episode for _ in each for episode in range(episodes)]
-    planned: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
+    settings_by_foot = [replace(settings, right_foot=foot) for foot in right_feet]
+    feet = [foot_settings.feet for foot_settings in settings_by_foot for _ in range(episodes)]
+    seeds = [seed + episode for _ in settings_by_foot for episode in range(episodes)]
+    course: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
     kept = record_all(policy, settings, seeds, threads=threads, feet=feet, progress=progress)
     recordings = []
-    for index, own in enumerate(each):
+    for index, foot_settings in enumerate(settings_by_foot):
         rows = slice(index * episodes, (index + 1) * episodes)
-        recordings.append(Recording(policy=name, settings=own, seed=seed, **kept.of(rows), **planned))
+        recordings.append(Recording(policy=name, settings=foot_settings, seed=seed, **kept.of(rows), **course))
     return recordings
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Episodes:
-    """The ticks, returns, falls and series of E episodes, as in a `Recording`."""
+    """Room for E episodes while they are walked; fields as in a `Recording`."""
 
     ticks: NDArray
+    """(E,) samples of each episode so far."""
     returns: NDArray
+    """(E,) sum of the reward so far."""
     fall_reason: NDArray
+    """(E,) reason of a fall, "" without one."""
     series: dict[str, NDArray]
+    """Name -> (E, length, ...) float32, NaN beyond an episode's samples."""
     length: int
     """Most ticks of an episode."""
 
@@ -289,7 +293,7 @@ class Episodes:
         )
 
     def of(self, rows: slice) -> dict[str, Any]:
-        """Return the fields of a `Recording` of some of the episodes."""
+        """Return the fields of a `Recording` that belong to episodes, for the episodes `rows`."""
         return {
             "ticks": self.ticks[rows],
             "returns": self.returns[rows],
@@ -310,33 +314,34 @@ def record_walk(
     steps: int | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> None:
-    """Walk the episodes `rows` of `kept` in the reset batch `biped`, and keep every tick.
+    """Walk the episodes `rows` of `kept` in the batch `biped`, which has just been reset, and keep every tick.
 
     All measurements of walks start from these series. `act` and `steps` as for
-    `springfoot.envs.batch.walk.walked_steps`; `progress` is called with the simulated time [s] after every step.
+    `springfoot.envs.batch.walk.walked_steps`; `progress` is called after every step with the seconds that it simulated.
     """
     ticks = kept.ticks[rows]
 
     def keep(tick: Tick) -> None:
+        """Write the tick's values into all series, NaN for episodes that have ended."""
         index = int(ticks.max())
         for name, take in SERIES.items():
             value = take(tick)
             if name not in kept.series:
                 kept.series[name] = np.full((len(kept.ticks), kept.length, *value.shape[1:]), np.nan, np.float32)
-            shown = tick.active.reshape(-1, *[1] * (value.ndim - 1))
-            kept.series[name][rows, index] = np.where(shown, value, np.nan)
+            walking = tick.active.reshape(-1, *[1] * (value.ndim - 1))
+            kept.series[name][rows, index] = np.where(walking, value, np.nan)
         ticks[:] += tick.active
 
     biped.on_tick = keep
-    begun = 0
+    first = 0
     for active, result in walked_steps(biped, act, steps):
-        ended = int(ticks.max())
-        kept.series[REWARD][rows, begun:ended][active] = result.values[active, None, _TERMS]
+        last = int(ticks.max())
+        kept.series[REWARD][rows, first:last][active] = result.values[active, None, _TERMS]
         kept.returns[rows][active] += result.reward[active]
         fell = active & result.terminated
         kept.fall_reason[rows][fell] = result.reasons[fell]
         progress(float(active.sum()) * biped.dt)
-        begun = ended
+        first = last
     biped.on_tick = None
 
 
@@ -358,19 +363,20 @@ def record_all(
     """
     require_recordable(settings, len(seeds))
     step = settings.step_seconds
-    kept = Episodes.empty(len(seeds), round(step / TICK) * ceil(round(settings.episode_seconds / step, 6)))
+    steps = ceil(round(settings.episode_seconds / step, 6))  # rounded first: 2.0000000001 steps are 2
+    kept = Episodes.empty(len(seeds), round(step / TICK) * steps)
     for first in range(0, len(seeds), BATCH):
         rows = slice(first, min(first + BATCH, len(seeds)))
         count = rows.stop - first
-        worn = feet and feet[rows]
-        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs], feet=worn)
+        batch_feet = feet and feet[rows]
+        biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs], feet=batch_feet)
         biped.reset(np.arange(count), list(seeds[rows]), None, {k: v[rows] for k, v in given.items()})
         record_walk(biped, policy, kept, rows, progress=progress)
     return kept
 
 
 def planned_course(plan: ComPlan) -> dict[str, NDArray]:
-    """Return `plan_com` and `plan_zmp` of a `Recording`."""
+    """Return `plan_com` and `plan_zmp` of a `Recording`: the course of CoM and ZMP over percent of the step."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
     return {"plan_com": np.stack(plan.com(step_phase), -1), "plan_zmp": plan.zmp(step_phase)}

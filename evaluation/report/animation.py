@@ -13,7 +13,7 @@ from springfoot.envs.settings.settings import body_of
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW
 
-from ..numbers.per_leg import differ, kinds_of
+from ..numbers.per_leg import feet_differ, kinds_of
 from ..numbers.series import foot_contacts
 from ..recording.recording import TICK, WARM_UP, Recording
 
@@ -26,6 +26,8 @@ TICKS_PER_FRAME = 3
 STRIDES = 2
 LONGEST = 3.0
 """Longest clip [s], for gaits without strides."""
+MARKS_A_METRE = 4
+"""Marks on the ground [1/m]."""
 FORCE_LENGTH = 0.55
 """Length of an arrow of one body weight [m at 1.70 m]."""
 
@@ -56,7 +58,10 @@ def save_animation(path: Path, recording: Recording) -> None:
 
 
 def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
-    """Return episode, first and last tick of the clip."""
+    """Return the episode to show, and the first and last tick of the clip: two strides, or the walk's end.
+
+    The strides begin at a left heel strike after the warm-up; an episode that fell, or has too few, shows its end.
+    """
     episode = recording.example
     ticks = int(recording.ticks[episode])
     if not recording.fall_reason[episode]:
@@ -74,15 +79,15 @@ class _Canvas:
     def __init__(self, body: Body, series: dict[str, NDArray], recording: Recording):
         self._body = body
         self._series = series
-        self._scale = OVERSAMPLING * SIZE[1] / (1.30 * body.height)
-        self._floor = OVERSAMPLING * SIZE[1] * 0.865
+        self._scale = OVERSAMPLING * SIZE[1] / (1.30 * body.height)  # pixels a metre
+        self._floor = OVERSAMPLING * SIZE[1] * 0.865  # pixel row of the floor
         ticks = np.arange(len(series["com"]))
         slope, start = np.polyfit(ticks, series["com"][:, 0], 1) if len(ticks) > 1 else (0.0, series["com"][0, 0])
         self._camera = start + slope * ticks
         settings = recording.settings
         self._title = recording.policy
         self._subtitle = f"{settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s"
-        if differ(settings):
+        if feet_differ(settings):
             self._subtitle += " · feet: " + ", ".join(
                 f"{side} ({shade}) {kind}"
                 for (side, kind), shade in zip(kinds_of(settings).items(), ("dark", "light"), strict=True)
@@ -125,18 +130,22 @@ class _Canvas:
         self._disc(end, radius, fill=colour)
 
     def _ground(self) -> None:
+        """Draw the ground, with a mark every 0.25 m and its number every metre."""
         width = OVERSAMPLING * SIZE[0]
         height = OVERSAMPLING * SIZE[1]
         self._draw.rectangle((0, self._floor, width, height), fill=GROUND)
         self._draw.line((0, self._floor, width, self._floor), fill=FAINT, width=OVERSAMPLING)
         reach = 0.5 * width / self._scale
         middle = self._camera[self._tick]
-        for mark in range(int(np.floor((middle - reach) * 4)), int(np.ceil((middle + reach) * 4)) + 1):
-            x, _ = self._pixel(np.array([mark / 4, 0.0]))
-            long = 12 if mark % 4 == 0 else 6
-            self._draw.line((x, self._floor, x, self._floor + long * OVERSAMPLING), fill=FAINT, width=OVERSAMPLING)
-            if mark % 4 == 0:
-                self._text((x, self._floor + 13 * OVERSAMPLING), f"{mark // 4} m", 11, FAINT, "ma")
+        first = int(np.floor((middle - reach) * MARKS_A_METRE))
+        last = int(np.ceil((middle + reach) * MARKS_A_METRE))
+        for mark in range(first, last + 1):
+            x, _ = self._pixel(np.array([mark / MARKS_A_METRE, 0.0]))
+            whole_metre = mark % MARKS_A_METRE == 0
+            length = OVERSAMPLING * (12 if whole_metre else 6)
+            self._draw.line((x, self._floor, x, self._floor + length), fill=FAINT, width=OVERSAMPLING)
+            if whole_metre:
+                self._text((x, self._floor + 13 * OVERSAMPLING), f"{mark // MARKS_A_METRE} m", 11, FAINT, "ma")
 
     def _trunk(self) -> None:
         """Draw trunk, neck and head; sizes [m at 1.70 m] by eye."""
@@ -183,8 +192,8 @@ class _Canvas:
     def _stiffness_colour(self, side: int, joint: int) -> tuple[int, int, int]:
         """Return the colour of a joint by its K, from soft to stiff."""
         low, high = self._stiffness_range[joint]
-        share = np.clip((np.log(max(self._at("stiffness")[side, joint], 1.0)) - low) / (high - low), 0, 1)
-        red, green, blue = (SOFT + share * (STIFF - SOFT)).astype(int)
+        fraction = np.clip((np.log(max(self._at("stiffness")[side, joint], 1.0)) - low) / (high - low), 0, 1)
+        red, green, blue = (SOFT + fraction * (STIFF - SOFT)).astype(int)
         return int(red), int(green), int(blue)
 
     def _force(self, side: int, colour: tuple) -> None:
@@ -216,6 +225,7 @@ class _Canvas:
         self._disc(self._at("com"), 0.008 * size, fill=INK)
 
     def _words(self) -> None:
+        """Write title, subtitle and the legend below the picture."""
         unit = OVERSAMPLING
         width, height = SIZE
         self._text((14 * unit, 10 * unit), self._title, 15, INK, "la")
@@ -238,16 +248,16 @@ class _Canvas:
             draw.rectangle((x + step * unit, y - 4 * unit, x + (step + 1) * unit, y + 4 * unit), fill=colour)
         self._text((x + 66 * unit, y), "stiff", 11, FAINT, "lm")
 
-    def _text(self, place: tuple[float, float], words: str, size: int, colour: tuple, anchor: str) -> None:
-        self._draw.text(place, words, font=self._fonts[size], fill=colour, anchor=anchor)
+    def _text(self, position: tuple[float, float], words: str, size: int, colour: tuple, anchor: str) -> None:
+        self._draw.text(position, words, font=self._fonts[size], fill=colour, anchor=anchor)
 
 
 def _palette() -> Image.Image:
     """Return one palette for all frames: every colour drawn, and its blends with the paper where edges are smoothed."""
     drawn = np.array([INK, FAINT, TRUNK, NEAR, FAR, FORCE, FAR_FORCE, PLAN], float)
     drawn = np.concatenate([drawn, SOFT + np.linspace(0, 1, 24)[:, None] * (STIFF - SOFT)])
-    share = np.linspace(0, 1, 7)[:-1, None, None]  # the last blend is the paper itself
-    colours = np.unique((drawn + share * (np.array(PAPER) - drawn)).round().astype(np.uint8).reshape(-1, 3), axis=0)
+    fraction = np.linspace(0, 1, 7)[:-1, None, None]  # the last blend is the paper itself
+    colours = np.unique((drawn + fraction * (np.array(PAPER) - drawn)).round().astype(np.uint8).reshape(-1, 3), axis=0)
     image = Image.new("P", (1, 1))
     image.putpalette([*np.append(colours, [PAPER, GROUND]).astype(int).tolist()])
     return image

@@ -38,8 +38,7 @@ def write_every_stride(folder: Path, recording: Recording) -> None:
 
 
 def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]]:
-    """Yield the strides behind the mean curves, in order: the values of `STRIDE_KEYS` without percent, and the curves
-    (101, C).
+    """Yield each stride behind the mean curves: the values of `STRIDE_KEYS` without percent, and its curves (101, C).
 
     Curves are float32, in the order of `GAIT_CYCLE_COLUMNS`.
     """
@@ -53,9 +52,9 @@ def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]
         for side, foot in enumerate(foot_contacts(series["force"][..., 1].sum(axis=2), body)):
             strides = strides_within(foot, (begin + WARM_UP, end))
             curves = stride_curves(series, side, body, strides).astype(np.float32)
-            for stride, ((start, _, stop), own) in enumerate(zip(strides.tolist(), curves, strict=True)):
-                of = (episode, SIDES[side], stride, round(start, 6), round(stop - start, 6), fell)
-                yield dict(zip(STRIDE_KEYS, of, strict=False)), own
+            for stride, ((start, _, stop), curve) in enumerate(zip(strides.tolist(), curves, strict=True)):
+                key_values = (episode, SIDES[side], stride, round(start, 6), round(stop - start, 6), fell)
+                yield dict(zip(STRIDE_KEYS, key_values, strict=False)), curve
 
 
 def _write_parquet(path: Path, strides: Sequence[tuple[dict[str, Any], NDArray]]) -> None:
@@ -69,6 +68,6 @@ def _write_parquet(path: Path, strides: Sequence[tuple[dict[str, Any], NDArray]]
         for name, kind in zip(STRIDE_KEYS, kinds, strict=False)
     }
     columns["percent"] = pa.array(np.tile(PERCENT, len(strides)), pa.int8())
-    curves = np.concatenate([np.empty((0, len(GAIT_CYCLE_COLUMNS)), np.float32), *(own for _, own in strides)])
+    curves = np.concatenate([np.empty((0, len(GAIT_CYCLE_COLUMNS)), np.float32), *(curve for _, curve in strides)])
     columns |= {name: pa.array(curve) for name, curve in zip(GAIT_CYCLE_COLUMNS, curves.T, strict=True)}
     pq.write_table(pa.table(columns), path, compression="zstd")

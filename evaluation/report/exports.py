@@ -34,12 +34,12 @@ def write_opensim(folder: Path, recording: Recording) -> None:
 def opensim_coordinates(recording: Recording) -> dict[str, NDArray]:
     """Return column of `walk.mot` -> (T,): time at the end of each tick [s], angles [deg], positions [m]."""
     series = recording.shown()
-    x, above, pitch = series["base"].T
+    x, height, pitch = series["base"].T
     columns = {
         "time": TICK * np.arange(1, len(x) + 1),
         "pelvis_tilt": -np.degrees(pitch),
         "pelvis_tx": x,
-        "pelvis_ty": above + _slope(recording.settings) * x,
+        "pelvis_ty": height + _slope(recording.settings) * x,
     }
     for side, name in enumerate(SIDES):
         for joint, coordinate in enumerate(COORDINATES.values()):
@@ -59,11 +59,11 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
     columns = {"time": TICK * (np.arange(len(series["base"])) + 0.5)}
     for side, name in enumerate(SIDES):
         force = series["force"][:, side]
-        place = mid_tick(series["contact"][:, side, :, 0])
+        contact_x = mid_tick(series["contact"][:, side, :, 0])
         pressing = force[..., 1] - slope * force[..., 0]  # times the slope's cosine: what presses on the ground
         total = pressing.sum(axis=1)
         loaded = total > 0.0
-        centre = (pressing * place).sum(axis=1) / np.where(loaded, total, 1.0)
+        centre = (pressing * contact_x).sum(axis=1) / np.where(loaded, total, 1.0)
         centre = np.where(loaded, centre, mid_tick(series["ankle"][:, side, 0]))
         zero = np.zeros(len(centre))
         start = f"ground_force_{name[0]}"
@@ -86,32 +86,32 @@ def write_model(path: Path, recording: Recording) -> None:
 
 
 def sloping_spec(recording: Recording) -> MjSpec:
-    """Return the model's specification of the recorded body and feet, its ground with the walk's slope."""
+    """Return MuJoCo's specification of the recorded body and feet, its ground with the walk's slope."""
     settings = recording.settings
     spec = build_spec(body_of(settings), settings.friction, settings.feet)
-    half = radians(settings.slope_deg) / 2
+    half_angle = radians(settings.slope_deg) / 2
     for side in SIDES:
-        spec.body(ground_name(side)).quat = (cos(half), 0.0, -sin(half), 0.0)
+        spec.body(ground_name(side)).quat = (cos(half_angle), 0.0, -sin(half_angle), 0.0)
     return spec
 
 
 def postures(recording: Recording) -> NDArray:
-    """Return (T, 11) positions of that model's joints at the end of each tick."""
+    """Return the positions (T, 11) of the joints of `sloping_spec`'s model at the end of each tick."""
     series = recording.shown()
-    x, above, pitch = series["base"].T
-    place = np.stack([x, above + _slope(recording.settings) * x, pitch], axis=-1)
-    return np.concatenate([place, series["angle"].reshape(len(place), -1)], axis=-1)
+    x, height, pitch = series["base"].T
+    base = np.stack([x, height + _slope(recording.settings) * x, pitch], axis=-1)
+    return np.concatenate([base, series["angle"].reshape(len(base), -1)], axis=-1)
 
 
 def _slope(settings: BipedSettings) -> float:
     return tan(radians(settings.slope_deg))
 
 
-def _write_storage(path: Path, what: str, columns: Mapping[str, NDArray], in_degrees: bool) -> None:
+def _write_storage(path: Path, kind: str, columns: Mapping[str, NDArray], in_degrees: bool) -> None:
     """Write columns as a storage file of OpenSim."""
     rows = np.stack(list(columns.values()), axis=-1)
     head = [
-        f"springfoot {what}",
+        f"springfoot {kind}",
         "version=1",
         f"nRows={len(rows)}",
         f"nColumns={len(columns)}",

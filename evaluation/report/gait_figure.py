@@ -17,7 +17,7 @@ from springfoot.gait.people.contacts import PERCENT
 
 from ..numbers.curves import StrideCurves
 from ..numbers.metrics import MOMENT_CURVES, Gait
-from ..numbers.per_leg import ANGLE_COLUMNS, differ, kinds_of
+from ..numbers.per_leg import ANGLE_COLUMNS, feet_differ, kinds_of
 from ..recording.recording import Recording
 
 MODEL = "#0b6e8f"
@@ -50,7 +50,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
     metrics = gait.metrics
     human = reference_gait(settings)
     legs: Legs = ((gait.both, MODEL),)
-    if differ(settings):
+    if feet_differ(settings):
         legs = tuple(zip(gait.feet, (MODEL, OTHER_LEG), strict=True))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(12.5, 10.2), layout="constrained")
@@ -120,13 +120,15 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
         _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", numbers["z_r"] if name == "z" else None)
     low, high = axes[1].get_ylim()
     middle = (low + high) / 2
-    half = max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
-    axes[1].set_ylim(middle - half, middle + half)
+    half_height = max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
+    axes[1].set_ylim(middle - half_height, middle + half_height)
 
 
 def _springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
-    """Draw K of ankle and toe, the ankle's angle with its rest angle, and its power; people's angle and power behind
-    them."""
+    """Draw K of ankle and toe, the ankle's angle with its rest angle, and its power.
+
+    People's angle and power are behind them.
+    """
     for ax, name in zip(axes[:2], ("ankle", "toe"), strict=True):
         ax.set(title=f"{name.capitalize()} stiffness K", ylabel="N·m/rad")
         _model(ax, legs, f"{name}_stiffness_Nm_per_rad")
@@ -143,11 +145,13 @@ def _springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
 
 
 def _people(ax: Axes, mean: NDArray, sd: NDArray) -> None:
+    """Draw people's mean ± SD (101,)."""
     ax.fill_between(PERCENT, mean - sd, mean + sd, color=PEOPLE, alpha=0.25, lw=0)
     ax.plot(PERCENT, mean, color=PEOPLE, lw=1.3)
 
 
 def _model(ax: Axes, legs: Legs, name: str) -> None:
+    """Draw a curve's mean ± SD of each of the `legs`."""
     for curves, colour in legs:
         mean = curves.mean(name)
         sd = curves.sd(name)
@@ -163,6 +167,7 @@ def _note(ax: Axes, value: float | None, pattern: str, r: float | None) -> None:
 
 
 def _stride_axis(ax: Axes, toe_off: float | None, people_toe_off: float) -> None:
+    """Make percent of the stride the axis of a panel, and mark both toe-offs [%]."""
     ax.set(xlim=(0, 100), xticks=range(0, 101, 20), xlabel="% of stride")
     ax.grid(color="#ededed", lw=0.6)
     ax.axhline(0, color="#bbbbbb", lw=0.7, zorder=0.5)
@@ -186,10 +191,10 @@ def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) 
         fontsize=12,
         fontweight="bold",
     )
-    who = "people" if settings.human is None else human.condition
+    reference = "people" if settings.human is None else human.condition
     note = " (end of the measured range)" if human.clamped else ""
     names = {"model": MODEL}
-    if differ(settings):
+    if feet_differ(settings):
         kinds = kinds_of(settings)
         names = {f"left, {kinds['left']}": MODEL, f"right, {kinds['right']}": OTHER_LEG}
     handles: dict[str, Any] = {
@@ -197,7 +202,7 @@ def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) 
         for name, colour in names.items()
     }
     handles |= {
-        f"{who} at {human.speed:.2f} m/s{note}, mean ± SD": (
+        f"{reference} at {human.speed:.2f} m/s{note}, mean ± SD": (
             Patch(color=PEOPLE, alpha=0.25, lw=0),
             Line2D([], [], color=PEOPLE, lw=1.3),
         ),

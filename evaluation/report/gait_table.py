@@ -34,10 +34,10 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     )
     if metrics["per_leg"] is not None:
         console.print("feet: " + ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items()))
-    who = "people" if environment["human"] is None else "own"
+    reference = "people" if environment["human"] is None else "own"
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     narrow = console.width < NARROW
-    for name in ("", "model", who, "r", "in ±SD") if narrow else ("", "", "model", who, "r", "in ±SD"):
+    for name in ("", "model", reference, "r", "in ±SD") if narrow else ("", "", "model", reference, "r", "in ±SD"):
         table.add_column(
             name,
             justify="right" if name else "left",
@@ -60,8 +60,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         borrowed = ", ".join(people["borrowed"]) or "nothing"
         console.print(f"own: {people['condition']}; people's instead: {borrowed}", soft_wrap=not console.is_terminal)
     console.print(
-        f"{who} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean curves, "
-        "the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing; "
+        f"{reference} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean "
+        "curves, the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing; "
         "feedback: share of its variance that the phase does not explain / its SD at equal phase",
         soft_wrap=not console.is_terminal,
     )
@@ -80,7 +80,7 @@ def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
 
 
 def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return quantity, unit, left and right leg; empty if the feet are the same."""
+    """Return rows of quantity, unit, left leg and right leg; none if the feet are the same."""
     if metrics["per_leg"] is None:
         return []
     legs = metrics["per_leg"].values()
@@ -106,7 +106,7 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
 
 
 def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
-    """Return the rows of the table."""
+    """Return the table's rows one after another, for the page."""
     return [row for section in _sections(metrics) for row in section]
 
 
@@ -129,7 +129,7 @@ TableRow = tuple[str, str, str, str, str, str]
 
 
 def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
-    """Return the table's rows, in groups."""
+    """Return the table's rows in groups: gait, angles, forces, moments and work, energy, plan, stiffness."""
     people = people_metrics(settings_from(**metrics["environment"]))
     grf = metrics["grf"]
     their_grf = people["grf"]
@@ -139,17 +139,18 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     at_rest = [] if rest is None else [("came to rest", "", f"{rest} of {metrics['episodes']}", "", "", "")]
 
     def row(
-        label: str, unit: str, value: Any, pattern: str, their: Any = None, r: Any = None, inside: Any = None
+        label: str, unit: str, value: Any, pattern: str, of_people: Any = None, r: Any = None, inside: Any = None
     ) -> TableRow:
+        """Return a row: number or spread, people's number, r, and the percent of the stride inside people's SD."""
         text = plus_minus(value, pattern) if isinstance(value, dict) else text_of(value, pattern)
-        share = "" if inside is None else f"{inside:.0f} %"
+        inside_text = "" if inside is None else f"{inside:.0f} %"
         return (
             label,
             unit,
             text,
-            "" if their is None else text_of(their, pattern),
+            "" if of_people is None else text_of(of_people, pattern),
             "" if r is None else f"{r:.2f}",
-            share,
+            inside_text,
         )
 
     def percent(value: float | None) -> str:
@@ -243,7 +244,7 @@ def people_metrics(settings: BipedSettings) -> dict[str, Any]:
     return {
         "speed_m_s": human.speed,
         "step_length_m": human.step_length,
-        "cadence_steps_min": 120 / human.stride_time,
+        "cadence_steps_min": 2 * 60 / human.stride_time,
         "double_support_s": (human.toe_off - 0.5) * human.stride_time,
         "toe_off_percent": 100 * human.toe_off,
         "grf": {

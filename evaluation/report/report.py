@@ -83,7 +83,7 @@ def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) 
         "condition": metrics["policy"],
         "source": "springfoot",
         "n": curves.count,
-        "stride_time_s": 120 / cadence if cadence else None,
+        "stride_time_s": 2 * 60 / cadence if cadence else None,
         "step_length_m": metrics["step_length_m"],
         "toe_off_percent": metrics["toe_off_percent"],
     }

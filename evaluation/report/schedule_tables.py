@@ -17,12 +17,12 @@ from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import body_of, reference_gait
-from springfoot.files.digest import BLANK, SEAL, sealed
+from springfoot.files.digest import BLANK_DIGEST, DIGEST, with_digest
 from springfoot.files.writing import csv_text
 from springfoot.gait.people.contacts import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS
 
-from ..recording.open_loop import MEAN_KNOTS, alike_legs, decided, deciding_legs, mean_over_phase
+from ..recording.open_loop import MEAN_KNOTS, alike_legs, deciding_legs, decisions_of, mean_over_phase
 from ..recording.recording import TICK, WARM_UP, Recording
 
 STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "late push-off", "swing")
@@ -37,21 +37,21 @@ def write_schedules(folder: Path, recording: Recording) -> None:
     curves = schedule_curves(recording)
     settings = recording.settings
     body = body_of(recording.settings)
-    whose = {
+    origin = {
         "policy": recording.policy,
         "height_m": body.height,
         "mass_kg": body.total_mass,
         "speed_m_s": settings.speed,
         "equilibrium": settings.equilibrium,
     }
-    values = ([*whose.values(), *(curve[percent] for curve in curves.values())] for percent in PERCENT)
-    rows = ([int(percent), *row, BLANK] for percent, row in zip(PERCENT, values, strict=True))
-    text = sealed(csv_text(["percent", *whose, *curves, SEAL], rows))
+    values = ([*origin.values(), *(curve[percent] for curve in curves.values())] for percent in PERCENT)
+    rows = ([int(percent), *row, BLANK_DIGEST] for percent, row in zip(PERCENT, values, strict=True))
+    text = with_digest(csv_text(["percent", *origin, *curves, DIGEST], rows))
     (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
     groups = alike_legs(settings) if deciding_legs(settings) else []
     for legs in groups:
-        states = finite_states(recording, legs) | {SEAL: BLANK}
-        table = sealed(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+        states = finite_states(recording, legs) | {DIGEST: BLANK_DIGEST}
+        table = with_digest(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
         end = f"_{SIDES[legs[0]]}" if len(groups) > 1 else ""
         (folder / f"finite_states{end}.json").write_text(table, encoding="utf-8")
 
@@ -68,7 +68,7 @@ def schedule_curves(recording: Recording) -> dict[str, NDArray]:
             ("stiffness", "stiffness_Nm_per_rad", 1.0),
             ("equilibrium", "equilibrium_deg", np.degrees(1.0)),
         ):
-            phase, values = decided(recording, [side], series)
+            phase, values = decisions_of(recording, [side], series)
             mean, sd = _over_phase(phase, values * unit)
             for joint, spring in enumerate(SPRINGS):
                 curves[f"{spring}_{name}_{column}"] = mean[:, joint]
@@ -77,7 +77,8 @@ def schedule_curves(recording: Recording) -> dict[str, NDArray]:
 
 
 def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """Return mean and standard deviation (101, 2) at equal phase of `values` (n, 2) at `phase` (n,)."""
+    """Return mean and standard deviation over percent of the phase, (101, 2) each, of `values` (n, 2) at `phase`
+    (n,)."""
     if not len(phase):
         nothing = np.full((len(PERCENT), values.shape[1]), np.nan)
         return nothing, nothing
@@ -88,16 +89,17 @@ def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
-    at = np.arange(MEAN_KNOTS) / MEAN_KNOTS
-    return np.stack([np.interp(phase, at, curve, period=1.0) for curve in knots.T], -1)
+    knot_phases = np.arange(MEAN_KNOTS) / MEAN_KNOTS
+    return np.stack([np.interp(phase, knot_phases, curve, period=1.0) for curve in knots.T], -1)
 
 
 def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
-    """Return `finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`, of `legs` together.
+    """Return the content of `finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`.
 
-    K is the mean over the state; theta_eq is the angle at which the state's spring has its mean torque at its mean
-    angle and rate. None stands for a state that the walk does not have; times with slack muscles are left out. The
-    states begin at the gait events of the target (`gait_events`), the inner ones half-way between two.
+    They are of all `legs` together. K is the mean over the state; theta_eq is the rest angle with which the spring has
+    the state's mean torque at its mean angle and rate. None stands for a state that the walk does not have; times with
+    slack muscles are left out. The states begin at the gait events of the target (`gait_events`), the inner ones
+    half-way between two.
     """
     settings = recording.settings
     body = body_of(recording.settings)
@@ -107,11 +109,13 @@ def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
     begin, end = steady_walk(settings)
     ticks = slice(round((begin + WARM_UP) / TICK), round(end / TICK) if np.isfinite(end) else None)
     phase = recording.series["phase"][:, ticks, legs].ravel().astype(float)
-    of = {name: recording.series[name][:, ticks][:, :, legs] for name in ("stiffness", "angle", "velocity", "torque")}
-    walked = np.isfinite(phase) & (of["stiffness"] > 0.0).all(-1).ravel()
-    of |= {name: of[name][..., FEET] for name in ("angle", "velocity", "torque")}
-    springs = {name: values.reshape(-1, len(SPRINGS))[walked].astype(float) for name, values in of.items()}
-    phase = phase[walked] % 1.0
+    columns = {
+        name: recording.series[name][:, ticks][:, :, legs] for name in ("stiffness", "angle", "velocity", "torque")
+    }
+    usable = np.isfinite(phase) & (columns["stiffness"] > 0.0).all(-1).ravel()
+    columns |= {name: columns[name][..., FEET] for name in ("angle", "velocity", "torque")}
+    springs = {name: values.reshape(-1, len(SPRINGS))[usable].astype(float) for name, values in columns.items()}
+    phase = phase[usable] % 1.0
     beta = damping_times(body)[FEET]
     states = []
     for name, event, (start, stop) in zip(STATES, events, pairwise([*starts, 1.0]), strict=True):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.recording import policy_and_settings, record
 
 from .kept import Kept
 from .study import OnProgress
@@ -34,7 +34,7 @@ class PushedWalks:
         metrics = {}
         for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
             wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})
-            acting, settings = prepare(policy, wanted, self.seed)
+            acting, settings = policy_and_settings(policy, wanted, self.seed)
             names = ("episodes", "seed", "threads", "progress")
             how: dict[str, Any] = {name: getattr(self, name) for name in names} | {"legs": legs}
             metrics[condition] = measure(record(acting, settings, name=policy, **how)).metrics

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
@@ -93,7 +93,7 @@ class Controls(WalkingStudy):
 
     def walk(self, given: Mapping[str, Any], progress: OnProgress = lambda seconds: None) -> dict[str, float | None]:
         """Return falls, walked speed and prices of one condition at one commanded speed."""
-        act, settings = prepare(self.policy, {**given, "episode_seconds": self.seconds})
+        act, settings = policy_and_settings(self.policy, {**given, "episode_seconds": self.seconds})
         metrics = measure(record(act, settings, name=self.policy, progress=progress, **self.how)).metrics
         effort = metrics["effort"]
         return {

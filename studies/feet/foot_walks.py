@@ -9,7 +9,7 @@ import numpy as np
 from springfoot.envs.physics import JOINT_RANGE_DEG
 from springfoot.envs.settings import SPRING_NUMBERS
 from springfoot.evaluation.numbers import Gait, asymmetry, leg_numbers, measure
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, policy_and_settings, record
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS
 
 PUSH_NEWTON = 150.0
@@ -107,7 +107,7 @@ def walked(
     """
     found: dict[str, float | None] = {}
     for push in (0.0, push_newton):
-        acting, settings = prepare(policy, {**given, "push_newton": push})
+        acting, settings = policy_and_settings(policy, {**given, "push_newton": push})
         recording = record(acting, settings, name=policy, **how)
         if push:
             found["falls_pushed"] = float(np.mean(recording.fall_reason != ""))

@@ -25,7 +25,7 @@ from scipy.stats import rankdata
 from springfoot.envs.settings import ADAPTED, committed_feet, without_person
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import prepare, record_feet
+from springfoot.evaluation.recording import policy_and_settings, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
@@ -182,7 +182,7 @@ class Orthosis(WalkingStudy):
         """Return the numbers of a walk on each of the right `feet`, all on the same episodes."""
 
         def make() -> dict[str, Any]:
-            acting, settings = prepare(self.policy, {**given, "episode_seconds": self.seconds})
+            acting, settings = policy_and_settings(self.policy, {**given, "episode_seconds": self.seconds})
             recordings = record_feet(acting, settings, feet, name=self.policy, progress=progress, **self.how)
             return {"walks": [numbers_of(measure(recording)) for recording in recordings]}
 

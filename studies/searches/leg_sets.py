@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from springfoot.envs.control import LegConstants, constants_from, constants_name
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.evaluation.report import MODEL, STYLE
 from springfoot.files.markdown import table, text_of
 from springfoot.files.writing import csv_text
@@ -114,7 +114,7 @@ class LegSets(WalkingStudy):
         return Answer(text=f"{picture}\n\n{text}", files=files)
 
     def _walk(self, name: str, given: Mapping[str, Any], legs: LegConstants, progress: OnProgress) -> dict[str, Any]:
-        policy, settings = prepare(name, {"episode_seconds": self.seconds, **given})
+        policy, settings = policy_and_settings(name, {"episode_seconds": self.seconds, **given})
         return measure(record(policy, settings, name=name, legs=legs, progress=progress, **self.how)).metrics
 
     def _misses(self, given: Mapping[str, Any], legs: LegConstants) -> float | None:

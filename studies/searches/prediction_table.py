@@ -7,7 +7,7 @@ import numpy as np
 
 from springfoot.envs.control import reference_walk_at
 from springfoot.envs.settings import BipedSettings, reference_gait
-from springfoot.evaluation.numbers import NO_FALLS, Criterion, numbers
+from springfoot.evaluation.numbers import NO_FALLS, Criterion, with_derived
 from springfoot.files.markdown import MISSING, table
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.people import PERCENT, HumanGait, correlation, force_features, rmse, stride_work
@@ -51,7 +51,7 @@ PREDICTION = (
 
 def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers of `PREDICTION` from the metrics of a walk."""
-    found = numbers(dict(metrics))
+    found = with_derived(dict(metrics))
     settings = BipedSettings(speed=metrics["environment"]["speed"], height=metrics["environment"]["height"])
     support = found["double_support_s"]
     human = reference_gait(settings)

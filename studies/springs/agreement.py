@@ -23,8 +23,8 @@ from matplotlib.patches import Patch
 from springfoot.agents.policies import and_copy
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers import HUMAN_LIKE, Criterion, Gait, measure, number_text, numbers
-from springfoot.evaluation.recording import policy_label, prepare, record
+from springfoot.evaluation.numbers import HUMAN_LIKE, Criterion, Gait, measure, number_text, with_derived
+from springfoot.evaluation.recording import policy_and_settings, policy_label, record
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
@@ -140,7 +140,7 @@ def criteria_table(
     Bold numbers miss the loosened criterion, bracketed ones meet it alone; the row `missed` counts the misses. Falls
     and angles of the policies' open-loop `copies` follow, unless all are None.
     """
-    measured = [numbers(each) for each in metrics]
+    measured = [with_derived(each) for each in metrics]
     lines = []
     missed = [0] * len(measured)
     for criterion in HUMAN_LIKE:
@@ -249,5 +249,5 @@ class SeedAgreement(WalkingStudy):
         return Answer(text=text, files=files)
 
     def _walk(self, name: str, progress: OnProgress) -> Gait:
-        policy, settings = prepare(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
+        policy, settings = policy_and_settings(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
         return measure(record(policy, settings, name=policy_label(name), progress=progress, **self.how))

@@ -26,7 +26,7 @@ from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare, record
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, policy_and_settings, record
 from springfoot.files.markdown import table, text_of
 from springfoot.gait.body import TOE_STIFFNESS, Body
 from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
@@ -146,13 +146,13 @@ def any_stiffness(
     name.
 
     Args:
-        name: any policy of `policies.prepare`.
+        name: any policy of `policies.policy_and_settings`.
         given: environment settings that differ from the evaluation's standard conditions and the policy's own.
         stiffnesses: as in `STIFFNESSES`; values outside the action's range become its end.
         disturbances: further conditions, by name: settings that differ from the undisturbed condition's.
         progress, how: as for `recording.record`.
     """
-    policy, settings = prepare(name, given, how.get("seed", 0))
+    policy, settings = policy_and_settings(name, given, how.get("seed", 0))
     conditions = {"undisturbed": {}} | (disturbances or {})
 
     def walk(name: str, make: Callable[[BipedSettings], Any], settings: BipedSettings) -> dict[str, Recording]:

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from springfoot.agents.policies import has_feedback
 from springfoot.envs.settings import BipedSettings, reference_gait
 from springfoot.errors import SpringfootError, require_count, require_number
-from springfoot.evaluation.recording import WARM_UP, prepare
+from springfoot.evaluation.recording import WARM_UP, policy_and_settings
 from springfoot.evaluation.report import MODEL, PEOPLE, PLAN, STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
@@ -78,13 +78,13 @@ def walk_under(condition: str, policy: str, change: float, unevenness: float, se
         given["decisions"] = "100hz"
     if condition in BODIES:
         height, mass = BODIES[condition]
-        speed = prepare(name, {})[1].speed * sqrt(height / REFERENCE_HEIGHT)
+        speed = policy_and_settings(name, {})[1].speed * sqrt(height / REFERENCE_HEIGHT)
         given |= {"height": height, "mass": mass, "speed": speed}
     elif condition == "θ_eq neutral":
         given["equilibrium"] = "neutral"
     elif condition == "θ_eq by phase":
-        given |= {"equilibrium": "phase", "schedule": phase_schedule(prepare("schedule", {})[1]).to_json()}
-    return *prepare(name, given, seed), -change if condition == "opposite change" else change
+        given |= {"equilibrium": "phase", "schedule": phase_schedule(policy_and_settings("schedule", {})[1]).to_json()}
+    return *policy_and_settings(name, given, seed), -change if condition == "opposite change" else change
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from springfoot.envs.control import FEET, PLATEAUS
 from springfoot.envs.physics import ANKLE
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording, prepare
+from springfoot.evaluation.recording import TICK, WARM_UP, Recording, policy_and_settings
 from springfoot.gait.springs import SPRINGS, PhaseSpring, PushedSpring, identify, identify_pushed
 
 BOUNDS = (*PLATEAUS, 1.0)
@@ -42,9 +42,9 @@ REFLEX_DELAY = 0.02
 def prepare_pushed(
     name: str, given: dict[str, Any], seed: int = 0, threads: int = 2
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """Prepare a policy as `policies.prepare` does; without feedback it decides at `DECISIONS` unless `given` says
-    otherwise."""
-    return prepare(name, given if has_feedback(name) else {"decisions": DECISIONS} | given, seed, threads)
+    """Return policy and settings as `policy_and_settings` does; without feedback `decisions` is `DECISIONS`, if not
+    `given`."""
+    return policy_and_settings(name, given if has_feedback(name) else {"decisions": DECISIONS} | given, seed, threads)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -128,7 +128,7 @@ def paired_walks(
     """Walk without and with the change in each of `CELLS`, from the same start for each seed.
 
     Args:
-        policy, settings: from `springfoot.evaluation.recording.policies.prepare`.
+        policy, settings: from `springfoot.evaluation.recording.policies.policy_and_settings`.
         change: of K, as a fraction of it: 0.1 for 10 % more.
         seeds: S of them; each draws the phase at which the walk starts.
         strides: K, from the left foot's first heel strike after `WARM_UP` on.

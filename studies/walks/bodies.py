@@ -20,7 +20,7 @@ from springfoot.envs.control import DRAWN, Subjects, tabulated_speeds
 from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import BATCH, Recording, policy_label, prepare, record_each
+from springfoot.evaluation.recording import BATCH, Recording, policy_and_settings, policy_label, record_each
 from springfoot.files.markdown import table
 from springfoot.files.writing import csv_text
 
@@ -179,12 +179,12 @@ class Bodies(Study):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every pair."""
         conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
-        settings = prepare(self.policy, conditions, self.seed)[1]
+        settings = policy_and_settings(self.policy, conditions, self.seed)[1]
         who = draw_pairs(settings, self.pairs, self.seed)
         how = {"seed": self.seed, "threads": self.threads}
         walks = []
         for name in and_copy(self.policy):
-            prepared = prepare(name, conditions, self.seed, self.threads)
+            prepared = policy_and_settings(name, conditions, self.seed, self.threads)
             walks.append(walk_pairs(*prepared, who, name=policy_label(name), progress=progress, **how))
         clamped = sum(row["people_clamped"] for row in walks[0])
         text = (

@@ -19,7 +19,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.settings import BipedSettings, settings_to_json
 from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.gait.people import mean_sd
 
@@ -121,7 +121,7 @@ def contenders(
 
 def with_copy(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> list[Contender]:
     """Return the policy `name` and, for a policy with feedback, its open-loop copy."""
-    return [Contender(each, *prepare(each, given, seed, threads)) for each in and_copy(name)]
+    return [Contender(each, *policy_and_settings(each, given, seed, threads)) for each in and_copy(name)]
 
 
 def springs_beside(
@@ -137,13 +137,13 @@ def springs_beside(
     and the default one; people's quasi-stiffness as it is, and commanded `QUASI_SPEED`; the thesis's lines, completed
     and as printed; random actions. Each row pays for changes of its own action.
     """
-    _, settings = prepare(name, given, seed)
+    _, settings = policy_and_settings(name, given, seed)
     found = []
     for each in rivals(constant, factor):
         own = settings_to_json(settings) | own_settings(each, settings)
-        found.append(Contender(each, *prepare(each, own, seed)))
+        found.append(Contender(each, *policy_and_settings(each, own, seed)))
         if each == "quasi_stiffness" and settings.speed == BipedSettings.speed:
-            faster = prepare(each, own | {"speed": QUASI_SPEED}, seed)
+            faster = policy_and_settings(each, own | {"speed": QUASI_SPEED}, seed)
             found.append(Contender(f"{each}, commanded {QUASI_SPEED:g} m/s", *faster))
     return found
 
@@ -308,7 +308,7 @@ class Compare(WalkingStudy):
 
     def _with_copy_if_it_walks(self, name: str, conditions: dict[str, Any]) -> list[Contender]:
         """Return a policy and its open-loop copy; the policy alone if it falls too soon for a copy."""
-        alone = Contender(name, *prepare(name, conditions, self.seed))
+        alone = Contender(name, *policy_and_settings(name, conditions, self.seed))
         try:
             return [alone, *with_copy(name, conditions, self.seed, self.threads)[1:]]
         except SpringfootError:

@@ -17,7 +17,7 @@ from springfoot.agents.policies import RUN
 from springfoot.agents.training import read_record
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.evaluation.numbers import WALKS, measure, unmet
-from springfoot.evaluation.recording import prepare, record
+from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
@@ -83,7 +83,7 @@ class LearningCurves(WalkingStudy):
         lines = []
         walks = []
         for folder, (name, run) in zip(self.runs, runs.items(), strict=True):
-            policy, settings = prepare(str(folder), {"episode_seconds": self.seconds}, self.seed)
+            policy, settings = policy_and_settings(str(folder), {"episode_seconds": self.seconds}, self.seed)
             metrics = measure(record(policy, settings, name=name, progress=progress, **self.how)).metrics
             steady = first_without_falls(run["evaluations"])
             when = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else MISSING

@@ -17,9 +17,9 @@ from springfoot.envs.physics import SIDES
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.page import PAGE_PACKAGES, Grid, episodes_of, play_page
-from springfoot.evaluation.recording import BATCH, WARM_UP, Recording, prepare, record
+from springfoot.evaluation.recording import BATCH, WARM_UP, Recording, policy_and_settings, record
 from springfoot.files.markdown import table
-from springfoot.files.provenance import source
+from springfoot.files.provenance import versions_and_commit
 from springfoot.gait.springs import SPRINGS
 
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
@@ -90,10 +90,10 @@ class Play(WalkingStudy):
             f"{self.episodes} episode{'s' * (self.episodes > 1)} of {self.seconds:g} s each, on level ground, "
             "1.70 m and 63 kg."
         )
-        versions = (f"{name} {number}" for name, number in source(PAGE_PACKAGES)["versions"].items())
+        versions = (f"{name} {number}" for name, number in versions_and_commit(PAGE_PACKAGES)["versions"].items())
         how = "\n".join([f"command: {without_places(self.command)}", f"seeds from {self.seed} on", *versions])
         page = play_page(self.grid, recordings, words, how)
-        falls = np.array([each["falls"] for each in page.told]).reshape(len(self.feet), len(self.speed), -1)
+        falls = np.array([each["falls"] for each in page.numbers]).reshape(len(self.feet), len(self.speed), -1)
         rows = [
             [foot.replace("_", " "), *(f"{(own == 0).sum()} / {(own == self.episodes).sum()}" for own in of_foot)]
             for foot, of_foot in zip(self.feet, falls, strict=True)
@@ -108,7 +108,7 @@ class Play(WalkingStudy):
         """Yield a recording of each pair of factors, the ankle's changing fastest, as many side by side as a batch
         takes."""
         conditions = {"right_foot": foot, "speed": speed, "episode_seconds": self.seconds}
-        policy, settings = prepare(self.policy, conditions, self.seed, self.threads)
+        policy, settings = policy_and_settings(self.policy, conditions, self.seed, self.threads)
         if settings.action_mode != "absolute":
             raise SpringfootError(f"policy must set K itself (action_mode absolute), got {self.policy}")
         pairs = np.array([(ankle, toe) for toe, ankle in product(self.toe, self.ankle)])

@@ -11,11 +11,11 @@ import pytest
 from springfoot.agents.policies.schedules import schedule_file
 from springfoot.envs import BipedSettings
 from springfoot.envs.control.constants import leg_constants
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import load_recording, record
 from springfoot.evaluation.report.schedule_tables import write_schedules
 from springfoot.files.array_file import read_arrays
-from springfoot.files.digest import BLANK, require_whole, sealed
+from springfoot.files.digest import BLANK_DIGEST, require_unchanged, with_digest
 from springfoot.files.json_file import MOST_JSON_BYTES, read_object
 from springfoot.files.text_table import LONGEST_LINE, MOST_CELLS, MOST_TEXT_BYTES, read_csv
 from springfoot.gait import SpringfootError
@@ -35,7 +35,7 @@ GIGABYTES = 3 * 2**30
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("sealed")
-    walk = record(*prepare("schedule", {"episode_seconds": 5.0}), name="schedule", episodes=1)
+    walk = record(*policy_and_settings("schedule", {"episode_seconds": 5.0}), name="schedule", episodes=1)
     write_schedules(path, walk)
     walk.save(path / "strides.npz")
     return path
@@ -83,15 +83,15 @@ def test_a_schedule_changed_by_hand_says_how_it_is_taken_as_it_is(folder, tmp_pa
 
 
 def test_a_seal_is_of_every_byte_and_neither_name_nor_digits_can_hide(tmp_path):
-    text = sealed(f'{{"a": 1, "sha256": "{BLANK}"}}\n').encode()
-    require_whole(tmp_path, text)
+    text = with_digest(f'{{"a": 1, "sha256": "{BLANK_DIGEST}"}}\n').encode()
+    require_unchanged(tmp_path, text)
     for place in range(len(text)):
         for bit in range(8):
             flipped = bytearray(text)
             flipped[place] ^= 1 << bit
             with pytest.raises(SpringfootError, match="is damaged or was changed"):
-                require_whole(tmp_path, bytes(flipped))
-    require_whole(tmp_path, b"of somebody else")
+                require_unchanged(tmp_path, bytes(flipped))
+    require_unchanged(tmp_path, b"of somebody else")
 
 
 # Sizes, shapes and counts ------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from springfoot.cli.main import main
-from springfoot.evaluation import prepare
+from springfoot.evaluation import policy_and_settings
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RUNS = {
@@ -64,7 +64,7 @@ def test_example_does_what_it_says(name, tmp_path, monkeypatch):
     assert done.returncode == 0, done.stderr
     assert said in done.stdout
     if name == "train_with_sb3.py":
-        assert prepare(str(tmp_path / "mine.safetensors"), {})[1].action_mode == "absolute"
+        assert policy_and_settings(str(tmp_path / "mine.safetensors"), {})[1].action_mode == "absolute"
     if name == "plot_schedule.py":
         with Image.open(tmp_path / "schedule.png") as picture:
             assert len(picture.convert("RGB").getcolors(1 << 20) or []) > 50  # curves, no blank page

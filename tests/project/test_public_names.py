@@ -66,7 +66,7 @@ def test_readers_import_from_rooms_only(name, code):
             "from springfoot.agents import baseline, load_policy; load_policy('pretrained')",
             {"stable_baselines3", "torch"},
         ),
-        ("from springfoot.evaluation import measure, prepare, record", {"matplotlib", "PIL", "torch"}),
+        ("from springfoot.evaluation import measure, policy_and_settings, record", {"matplotlib", "PIL", "torch"}),
         (
             "from springfoot.agents import TrainingConfig; from springfoot.envs import BipedSettings",
             {"mujoco", "numba"},

@@ -32,9 +32,9 @@ from springfoot.envs.physics.timing import ACTION_STEP
 from springfoot.envs.settings.settings import settings_to_json
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.errors import SpringfootError, require_count
-from springfoot.files.json_file import read_object, sealed_object
+from springfoot.files.json_file import object_with_digest, read_object
 from springfoot.files.locks import owned
-from springfoot.files.provenance import source
+from springfoot.files.provenance import versions_and_commit
 from springfoot.files.writing import remove_temporary, require_new, write_atomically
 
 from ..config import TrainingConfig, config_from_json, config_to_json, processors
@@ -170,7 +170,7 @@ class _Run:
                 self._algorithm.restore_from_path(str(self._found.absolute()))
                 if (self._found / BEST).is_file():
                     shutil.copyfile(self._found / BEST, self._out / BEST)
-            self._record["sessions"].append({"from_timesteps": self._trained, **source(PACKAGES)})
+            self._record["sessions"].append({"from_timesteps": self._trained, **versions_and_commit(PACKAGES)})
             self._write_record("running")
             self._writer = stack.enter_context(SummaryWriter(str(self._out), purge_step=self._trained or None))
             self._progress = Progress(self._config.timesteps, self._trained)
@@ -315,7 +315,7 @@ class _Run:
         self._algorithm.save_to_path(str(part.absolute()))
         told = {name: self._record[name] for name in ("sessions", "evaluations")}
         told |= {"timesteps": self._trained, "seconds": self._seconds()}
-        write_atomically(part / _TOLD, sealed_object(told))
+        write_atomically(part / _TOLD, object_with_digest(told))
         if (self._out / BEST).is_file():
             shutil.copyfile(self._out / BEST, part / BEST)
         shutil.rmtree(kept, ignore_errors=True)

@@ -18,7 +18,7 @@ from springfoot.agents.policies.policy import ACTIVATIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.errors import SpringfootError
-from springfoot.evaluation import prepare, record
+from springfoot.evaluation import policy_and_settings, record
 
 D = len(OBSERVATION)
 LOW, HIGH = np.array([(entry.low, entry.high) for entry in OBSERVATION]).T
@@ -124,7 +124,7 @@ def test_what_never_varied_is_ignored_if_asked():
 def test_evaluate_judges_the_file(tmp_path):
     model = MODELS["PPO and VecNormalize"]().learn(512)
     save_policy(tmp_path / "mine.safetensors", policy_from_sb3(model))
-    policy, settings = prepare(str(tmp_path / "mine.safetensors"), {"episode_seconds": 1.0})
+    policy, settings = policy_and_settings(str(tmp_path / "mine.safetensors"), {"episode_seconds": 1.0})
     assert settings.action_mode == "absolute" and settings.push_newton == 0.0
     assert record(policy, settings, name="mine", episodes=1).returns[0] > 0
 

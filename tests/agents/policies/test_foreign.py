@@ -15,7 +15,7 @@ from springfoot.cli.evaluate import evaluate_main
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.errors import SpringfootError
-from springfoot.evaluation import prepare, record
+from springfoot.evaluation import policy_and_settings, record
 from springfoot.evaluation.recording.policies import policy_label
 
 D = len(OBSERVATION)
@@ -57,7 +57,7 @@ def test_a_contract_beside_the_file_brings_its_settings(tmp_path):
     path = save_linear(tmp_path / "mine.onnx")
     (tmp_path / "mine.onnx.json").write_text(json.dumps({"settings": {"action_mode": "residual", "speed": 1.0}}))
     assert load_policy(path).settings == BipedSettings(action_mode="residual", speed=1.0)
-    _, settings = prepare(str(path), {"push_newton": 100.0})
+    _, settings = policy_and_settings(str(path), {"push_newton": 100.0})
     assert (settings.action_mode, settings.speed, settings.push_newton) == ("residual", 1.2, 100.0)
 
 
@@ -410,8 +410,8 @@ def test_evaluate_walks_an_onnx_file_and_a_function(module, tmp_path, capsys):
     capsys.readouterr()
     metrics = [json.loads((tmp_path / name / "metrics.json").read_text()) for name in ("one", "two")]
     assert [each["policy"] for each in metrics] == ["mine", "my_policies-batch"]
-    untrained, settings = prepare("untrained", {"episode_seconds": 1.0})
-    walked = record(*prepare(str(path), {"episode_seconds": 1.0}), name="mine", episodes=2)
+    untrained, settings = policy_and_settings("untrained", {"episode_seconds": 1.0})
+    walked = record(*policy_and_settings(str(path), {"episode_seconds": 1.0}), name="mine", episodes=2)
     assert np.array_equal(walked.returns, record(untrained, settings, name="untrained", episodes=2).returns)
 
 

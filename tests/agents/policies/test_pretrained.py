@@ -6,13 +6,13 @@ import pytest
 from springfoot.agents.policies.policy import find_policy
 from springfoot.evaluation.numbers.criteria import WALKS, unmet
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 
 
 def walked(name, **settings):
     """The gait of a few episodes."""
-    policy, environment = prepare(name, {"episode_seconds": 10.0} | settings)
+    policy, environment = policy_and_settings(name, {"episode_seconds": 10.0} | settings)
     return measure(record(policy, environment, name=name, episodes=4))
 
 

@@ -12,8 +12,8 @@ from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import settings_from
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.open_loop import decided
-from springfoot.evaluation.recording.policies import policy_label, prepare
+from springfoot.evaluation.recording.open_loop import decisions_of
+from springfoot.evaluation.recording.policies import policy_and_settings, policy_label
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.schedule_tables import STATES, schedule_curves, write_schedules
 from springfoot.gait import SpringfootError
@@ -21,7 +21,7 @@ from springfoot.gait.springs.stiffness import SPRINGS
 
 
 def walked(name, episodes=4, **given):
-    policy, settings = prepare(str(name), {"episode_seconds": 8.0} | given)
+    policy, settings = policy_and_settings(str(name), {"episode_seconds": 8.0} | given)
     return record(policy, settings, name=str(name), episodes=episodes)
 
 
@@ -59,14 +59,14 @@ def test_what_a_schedule_says_is_what_it_plays_on_each_side(folder, tmp_path):
     played = walked(tmp_path / "limp.csv", episodes=1)
     percent = [float(row["percent"]) / 100 for row in rows]
     for side, name in enumerate(SIDES):
-        phase, stiffness = decided(played, [side])
+        phase, stiffness = decisions_of(played, [side])
         for joint, spring in enumerate(SPRINGS):
             said = [float(row[f"{spring}_{name}_stiffness_Nm_per_rad"]) for row in rows]
             assert stiffness[:, joint] == pytest.approx(np.interp(phase, percent, said), rel=1e-3)
 
 
 def test_mean_and_spread_of_a_schedule_are_those_put_in():
-    policy, settings = prepare("constant", {"episode_seconds": 12.0})
+    policy, settings = policy_and_settings("constant", {"episode_seconds": 12.0})
     random = np.random.default_rng(1)
     scatter = np.array([0.05, 0.02, 0.05, 0.02])
 
@@ -115,9 +115,11 @@ def test_a_finite_state_has_the_mean_stiffness_and_the_mean_torque_of_the_walk(f
 def test_schedules_scale_with_the_body_and_go_with_flags(folder):
     for name in ("stiffness_schedule.csv", "finite_states.json"):
         observation = np.zeros((3, 43), np.float32)
-        small, large = (prepare(str(folder / name), {"height": h, "mass": m}) for h, m in ((1.6, 55.0), (1.9, 95.0)))
+        small, large = (
+            policy_and_settings(str(folder / name), {"height": h, "mass": m}) for h, m in ((1.6, 55.0), (1.9, 95.0))
+        )
         assert np.array_equal(small[0](observation), large[0](observation))  # actions are of the body's own range
-        assert prepare(str(folder / name), {"equilibrium": "neutral"})[1].equilibrium == "neutral"
+        assert policy_and_settings(str(folder / name), {"equilibrium": "neutral"})[1].equilibrium == "neutral"
     schedules = [settings.schedule for _, settings in (small, large)]
     springs = [schedule.ankle[0] for schedule in schedules if schedule is not None]
     assert springs[1].stiffness / springs[0].stiffness == pytest.approx(95.0 * 1.9 / (55.0 * 1.6))
@@ -137,8 +139,8 @@ def test_a_table_of_two_columns_is_a_schedule_of_both_legs_of_the_reference_body
     (tmp_path / "mine.csv").write_text(
         "percent,ankle_stiffness_Nm_per_rad,toe_stiffness_Nm_per_rad\n0,100,20\n50,300,40\n", encoding="utf-8"
     )
-    policy, settings = prepare(str(tmp_path / "mine.csv"), {})
-    same, _ = prepare("constant:200,30", {})
+    policy, settings = policy_and_settings(str(tmp_path / "mine.csv"), {})
+    same, _ = policy_and_settings("constant:200,30", {})
     quarter = np.zeros((1, 43), np.float32)
     names = [entry.name for entry in OBSERVATION]
     quarter[0, names.index("phase_sin")] = 1.0
@@ -231,7 +233,7 @@ def test_a_file_that_is_no_schedule_is_refused_in_one_line(name, text, said, tmp
     if text is not None:
         (tmp_path / name).write_text(text, encoding="utf-8")
     with pytest.raises(SpringfootError) as error:
-        prepare(name, {})
+        policy_and_settings(name, {})
     assert str(error.value).startswith(said)
     assert evaluate_main([name]) == 2
     assert capsys.readouterr().err.splitlines() == [f"evaluate.py: error: {error.value}"]
@@ -243,4 +245,4 @@ def test_a_walk_without_decisions_has_empty_tables_that_are_refused(tmp_path):
     assert "nan" not in (tmp_path / "stiffness_schedule.csv").read_text(encoding="utf-8")
     for name in ("stiffness_schedule.csv", "finite_states.json"):
         with pytest.raises(SpringfootError, match="must be a"):
-            prepare(str(tmp_path / name), {})
+            policy_and_settings(str(tmp_path / name), {})

@@ -19,7 +19,7 @@ from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.files.json_file import read_object
 
 SHORT = TrainingConfig(
@@ -67,7 +67,7 @@ def test_a_policy_of_any_body_reads_speed_and_height_and_is_evaluated_on_one_bod
     config = dataclasses.replace(SHORT, timesteps=1_024, environment=environment)
     record = training.train(config, tmp_path / "run")
     assert [entry["episodes"] for entry in record["evaluations"]] == [2, 2]
-    policy, settings = prepare(str(tmp_path / "run"), {"height": 1.85, "mass": 95.0, "speed": 1.4})
+    policy, settings = policy_and_settings(str(tmp_path / "run"), {"height": 1.85, "mass": 95.0, "speed": 1.4})
     assert (settings.height, settings.mass, settings.speed) == (1.85, 95.0, 1.4)
     assert settings.height_range is settings.mass_range is settings.speed_range is settings.speed_interval is None
     assert load_policy(tmp_path / "run").settings == environment

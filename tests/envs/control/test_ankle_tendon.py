@@ -9,7 +9,7 @@ from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.physics.model import ANKLE, KNEE, SIDES
 from springfoot.envs.settings.settings import settings_from
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.gait.body.tissue import (
     RELAXED_STIFFNESS,
     STIFFNESS_PER_TORQUE,
@@ -47,7 +47,7 @@ def test_k_is_at_most_that_of_tendon_and_tissue_in_every_window_on_any_action(ma
 
 @pytest.mark.parametrize("name", ["pretrained", "predicted"])
 def test_k_stays_below_tendon_and_tissue_at_every_step_of_five_walks(name):
-    act, settings = prepare(name, {"ankle_tendon": 400.0, "episode_seconds": 5.0})
+    act, settings = policy_and_settings(name, {"ankle_tendon": 400.0, "episode_seconds": 5.0})
     biped = Biped(settings, 5)
     biped.reset(np.arange(5), list(range(5)))
     observation = biped.observe()
@@ -61,7 +61,7 @@ def test_k_stays_below_tendon_and_tissue_at_every_step_of_five_walks(name):
 def test_without_a_tendon_or_with_a_stiff_one_nothing_changes():
     walked = []
     for tendon in (None, 2000.0):
-        act, settings = prepare("schedule", {"ankle_tendon": tendon, "episode_seconds": 2.0})
+        act, settings = policy_and_settings("schedule", {"ankle_tendon": tendon, "episode_seconds": 2.0})
         biped = Biped(settings, 1)
         biped.reset(np.array([0]), [0])
         observation = biped.observe()

@@ -32,7 +32,7 @@ from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import WARM_UP, record
 from springfoot.gait.body.body import GRAVITY, Body
 from springfoot.gait.people import scores as score
@@ -96,7 +96,7 @@ def test_stiffness_while_standing_is_the_springs_own_and_info_tells_it():
 
 
 def test_it_sets_off_walks_steadily_and_comes_to_rest():
-    policy, settings = prepare("schedule", {"start": "standing", "stop_at": 9.0, "episode_seconds": 15.0})
+    policy, settings = policy_and_settings("schedule", {"start": "standing", "stop_at": 9.0, "episode_seconds": 15.0})
     recording = record(policy, settings, name="schedule", episodes=4, threads=1)
     metrics = measure(recording).metrics
     assert metrics["falls"] == 0 and metrics["came_to_rest"] == 4

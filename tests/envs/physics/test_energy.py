@@ -8,7 +8,7 @@ from springfoot.envs import Biped
 from springfoot.envs.physics.energy import LEDGER, StepRecord, parts_of, window_work
 from springfoot.envs.physics.model import ANKLE, JOINTS, SIDES, build_model
 from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.gait import GRAVITY, Body
 
 BODIES = (Body(), Body(height=1.9, mass=100.0, carried_ratio=0.2), Body(height=1.5, mass=45.0, leg_ratio=1.04))
@@ -22,7 +22,7 @@ def steps_at_rest(num, velocity=0.0):
 
 def walk(name, seconds, num=1, **given):
     """Ticks of a walk from seed 0 on, and the batch after it."""
-    policy, settings = prepare(name, {"episode_seconds": seconds + 1.0} | given)
+    policy, settings = policy_and_settings(name, {"episode_seconds": seconds + 1.0} | given)
     biped, ticks = Biped(settings, num), []
     biped.reset(np.arange(num), list(range(num)))
     biped.on_tick = ticks.append
@@ -49,7 +49,7 @@ def test_mechanical_energy_is_that_of_the_compiled_model(body):
 
 @pytest.mark.parametrize("name", ["pretrained", "schedule"])
 def test_torque_and_work_equal_a_replay_step_by_step(name):
-    policy, settings = prepare(name, {"episode_seconds": 3.0, "push_newton": 150.0, "push_interval": 0.5})
+    policy, settings = policy_and_settings(name, {"episode_seconds": 3.0, "push_newton": 150.0, "push_interval": 0.5})
     biped, ticks, controls, pushes = Biped(settings, 1), [], [], []
     biped.reset(np.array([0]), [0])
     replay = biped.data(0)  # the state at the start
@@ -111,7 +111,9 @@ def test_energy_closes_over_ten_strides(name, given):
 @pytest.mark.parametrize(("way", "angle"), [("dorsiflexion", -5.7), ("plantarflexion", 0.0)])
 def test_energy_closes_with_springs_that_act_one_way_and_they_give_back_what_they_take(way, angle, sides):
     spring = {"ankle_stiffness": 200.0, "ankle_deg": angle, "toe_stiffness": 10.0, "engages": way}
-    policy, settings = prepare("pretrained", {f"{side}_foot": {"kind": "intact", "orthosis": spring} for side in sides})
+    policy, settings = policy_and_settings(
+        "pretrained", {f"{side}_foot": {"kind": "intact", "orthosis": spring} for side in sides}
+    )
     biped, ticks, controls = Biped(settings, 1), [], []
     biped.reset(np.array([0]), [0])
     replay = biped.data(0)
@@ -162,7 +164,7 @@ def test_energy_closes_with_springs_that_act_one_way_and_they_give_back_what_the
 
 
 def test_changes_of_springs_are_those_that_every_step_reports():
-    policy, settings = prepare("schedule", {"episode_seconds": 3.0})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 3.0})
     biped, ticks, reported = Biped(settings, 2), [], {}
     biped.reset(np.arange(2), [0, 1])
     biped.on_tick = ticks.append
@@ -214,7 +216,7 @@ def potential(body):
 
 
 def test_watching_changes_no_bit_and_who_stands_still_does_nothing():
-    policy, settings = prepare("schedule", {"episode_seconds": 3.0})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 3.0})
     runs = []
     for watched in (False, True):
         biped, ticks = Biped(settings, 3), []

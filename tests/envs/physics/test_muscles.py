@@ -11,7 +11,7 @@ from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDO
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import TICK, record
 from springfoot.gait import GRAVITY, Body
 from springfoot.gait.body.tissue import passive_moments
@@ -62,7 +62,7 @@ def replayed(biped, act, windows):
 
 @pytest.mark.parametrize("name", ["schedule", "predicted"])
 def test_windows_price_a_walk_as_every_physics_step_does(name):
-    act, settings = prepare(name, {"episode_seconds": 7.0})
+    act, settings = policy_and_settings(name, {"episode_seconds": 7.0})
     biped, windows = Biped(settings, 1), 600
     biped.reset(np.array([0]), [0])
     torque, angle, ticks = replayed(biped, act, windows)
@@ -90,7 +90,7 @@ def test_windows_price_a_walk_as_every_physics_step_does(name):
 
 
 def test_the_reward_pays_what_a_recording_measures():
-    act, settings = prepare("schedule", {"episode_seconds": 4.0, "push_newton": 100.0})
+    act, settings = policy_and_settings("schedule", {"episode_seconds": 4.0, "push_newton": 100.0})
     recording = record(act, settings, name="schedule", episodes=2, seed=3)
     body = body_of(settings)
     for episode in range(2):
@@ -111,7 +111,7 @@ def test_the_reward_pays_what_a_recording_measures():
 
 @pytest.mark.parametrize(("name", "given"), WALKS, ids=str)
 def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
-    act, settings = prepare(name, {"episode_seconds": 14.0} | given)
+    act, settings = policy_and_settings(name, {"episode_seconds": 14.0} | given)
     recording = record(act, settings, name=name, episodes=1)
     assert recording.fall_reason[0] == ""
     body = body_of(settings)
@@ -140,7 +140,7 @@ def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
 
 @pytest.mark.parametrize(("name", "foot", "joints"), DEVICES, ids=[name for name, *_ in DEVICES])
 def test_a_planted_device_costs_its_muscles_nothing(name, foot, joints):
-    act, settings = prepare("schedule", {"episode_seconds": 1.5, "right_foot": foot})
+    act, settings = policy_and_settings("schedule", {"episode_seconds": 1.5, "right_foot": foot})
     recording = record(act, settings, name=name, episodes=2)
     moment = recording.series["fibre_moment"][:, :, RIGHT]
     for joint in range(len(JOINTS)):
@@ -150,7 +150,7 @@ def test_a_planted_device_costs_its_muscles_nothing(name, foot, joints):
 
 def test_a_brace_that_carries_the_whole_moment_leaves_nothing_to_slack_muscles():
     foot = {"kind": "drop", "orthosis": {"ankle_stiffness": 20.0}}
-    act, settings = prepare("schedule", {"episode_seconds": 3.0, "right_foot": foot})
+    act, settings = policy_and_settings("schedule", {"episode_seconds": 3.0, "right_foot": foot})
     series = record(act, settings, name="drop", episodes=1).series
     slack = series["stiffness"][0, :, RIGHT, 0] == 0.0
     carried, fibres = (series[name][0, :, RIGHT, ANKLE] for name in ("joint_torque", "fibre_moment"))
@@ -171,7 +171,7 @@ def test_effort_per_kg_does_not_depend_on_mass_if_devices_scale_with_it():
     def effort(mass):
         scale = mass / 63.0
         brace = {"kind": "intact", "orthosis": {"ankle_stiffness": 150.0 * scale}}
-        act, settings = prepare("schedule", {"episode_seconds": 6.0, "mass": mass, "right_foot": brace})
+        act, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, "mass": mass, "right_foot": brace})
         return measure(record(act, settings, name="schedule", episodes=1)).metrics["effort"]
 
     own, other = effort(63.0), effort(63.0 * 1.3)

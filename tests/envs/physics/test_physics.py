@@ -9,7 +9,7 @@ from benchmarks import physics
 from benchmarks.walking import record_walk
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.physics.timing import CONTROL_WINDOW
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 
 
@@ -24,7 +24,7 @@ def test_a_row_differs_from_the_default_in_one_thing_and_its_steps_fill_a_window
 
 
 def test_a_finer_timestep_walks_the_same_windows_a_little_otherwise():
-    policy, settings = prepare("schedule", {"episode_seconds": 0.2, "start": 0.2})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 0.2, "start": 0.2})
     fine = physics.edited(physics.ROWS["0.5 ms"])
     coarse, walked = (record(policy, settings, name="", episodes=1, model=model) for model in (None, fine))
     assert walked.ticks == coarse.ticks == round(0.2 / CONTROL_WINDOW)

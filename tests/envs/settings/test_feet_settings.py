@@ -15,7 +15,7 @@ from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings.feet import KINDS
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.studies.base.flags import SettingsFlags, given
 
 PASSIVE = {"kind": "passive", "ankle_stiffness": 400}
@@ -205,9 +205,9 @@ def test_an_exported_policy_returns_the_stiffness_of_the_joints_it_controls():
 
 
 def test_an_evaluation_takes_the_feet_it_is_told_and_else_the_policys_own():
-    assert prepare("pretrained", {"right_foot": "rigid"})[1].right_foot.plain == "rigid"
-    assert prepare("pretrained", {})[1].right_foot.plain == "intact"
-    assert prepare("constant", {"left_foot": PASSIVE})[1].left_foot.plain == {
+    assert policy_and_settings("pretrained", {"right_foot": "rigid"})[1].right_foot.plain == "rigid"
+    assert policy_and_settings("pretrained", {})[1].right_foot.plain == "intact"
+    assert policy_and_settings("constant", {"left_foot": PASSIVE})[1].left_foot.plain == {
         "kind": "passive",
         "ankle_stiffness": 400.0,
     }

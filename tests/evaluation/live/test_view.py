@@ -81,8 +81,8 @@ def test_in_a_browser_sliders_set_the_k_that_acts_and_buttons_push_and_restart(c
 def test_the_body_is_seen_beside_its_panels_on_screen_and_telephone(chromium, view, size, free, dark):
     """`free` is the part of the picture without panels: left, top, right, bottom."""
     told = []
-    view._asked.put({"ankle_source": "policy"})
-    view._asked.put(view._session.restart)
+    view._requests.put({"ankle_source": "policy"})
+    view._requests.put(view._session.restart)
     tab = chromium.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
     tab.on("pageerror", lambda error: told.append(str(error)))
     tab.on("console", lambda message: told.append(message.text) if message.type == "error" else None)

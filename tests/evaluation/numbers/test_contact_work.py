@@ -15,7 +15,7 @@ from springfoot.envs.settings.settings import body_of
 from springfoot.evaluation.numbers.criteria import GROUND_GIVES_NOTHING, WALKS, fault, unmet
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.page.report_page import spoken_verdict
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.gait_table import print_table
 
@@ -29,7 +29,7 @@ def person_on(name):
 
 def walked(policy, given, episodes=2, seconds=8.0, step=PHYSICS_STEP, lock=LOCK):
     """The numbers of a walk with another physics step [s], or another lock in place of the rigid foot's."""
-    acting, settings = prepare(policy, {"episode_seconds": seconds, **given})
+    acting, settings = policy_and_settings(policy, {"episode_seconds": seconds, **given})
     left, right = settings.feet
     if right.ankle.device == LOCK:
         right = replace(right, ankle=replace(right.ankle, device=lock))

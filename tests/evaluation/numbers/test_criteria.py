@@ -6,9 +6,9 @@ import pytest
 
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.settings.settings import BipedSettings, settings_to_json
-from springfoot.evaluation.numbers.criteria import HUMAN_LIKE, WALKS, Criterion, fault, numbers, unmet
+from springfoot.evaluation.numbers.criteria import HUMAN_LIKE, WALKS, Criterion, fault, unmet, with_derived
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 
 PLAN = reference_walk_at(BipedSettings(), 1.2).plan
@@ -73,9 +73,9 @@ def test_a_loosened_limit_is_wider_at_each_of_its_ends():
 
 
 def test_every_limit_finds_its_number_in_an_evaluation():
-    policy, settings = prepare("schedule", {"episode_seconds": 6.0})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0})
     metrics = measure(record(policy, settings, name="schedule", episodes=2)).metrics
-    values = numbers(metrics)
+    values = with_derived(metrics)
     assert all(limit.value(values) is not None for limit in (*WALKS, *HUMAN_LIKE))
     assert values["double_support_percent"] == pytest.approx(11, abs=4)
     assert values["off"]["cadence_percent"] < 5

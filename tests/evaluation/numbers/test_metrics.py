@@ -12,7 +12,7 @@ from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
 from springfoot.evaluation.numbers.tally import tally_strides
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
 from springfoot.gait import GRAVITY, Body, human_gait
 from springfoot.gait.body.tissue import passive_moments
@@ -311,10 +311,12 @@ def test_numbers_can_be_recomputed_from_the_saved_series(tmp_path):
 
 def test_bodies_side_by_side_are_measured_each_in_its_own_units():
     ranges = {"height_range": (1.5, 1.9), "mass_range": (50.0, 100.0), "speed_range": (1.0, 1.3)}
-    policy, settings = prepare("quasi_stiffness", ranges | {"episode_seconds": 5.0})
+    policy, settings = policy_and_settings("quasi_stiffness", ranges | {"episode_seconds": 5.0})
     who = {"height": [1.7, 1.9], "mass": [63.0, 100.0], "speed": [1.2, 1.2 * np.sqrt(1.9 / 1.7)]}
     own, other = record_each(policy, settings, who, name="quasi_stiffness", seed=3)
-    alone = record(*prepare("quasi_stiffness", {"episode_seconds": 5.0}), name="quasi_stiffness", episodes=1, seed=3)
+    alone = record(
+        *policy_and_settings("quasi_stiffness", {"episode_seconds": 5.0}), name="quasi_stiffness", episodes=1, seed=3
+    )
     for key, values in alone.series.items():
         np.testing.assert_array_equal(own.series[key], values, err_msg=key)
     assert measure(own).metrics == measure(alone).metrics

@@ -12,7 +12,7 @@ from rich.console import Console
 from springfoot.agents.policies.baselines import follow
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.settings.settings import body_of, settings_from
-from springfoot.evaluation import measure, prepare, record
+from springfoot.evaluation import measure, policy_and_settings, record
 from springfoot.evaluation.numbers.per_leg import asymmetry, leg_numbers
 from springfoot.evaluation.recording.open_loop import deciding_legs, feedback, open_loop_copy
 from springfoot.evaluation.report.animation import FAR, NEAR, save_animation
@@ -23,7 +23,7 @@ from springfoot.gait.people.contacts import PERCENT
 
 
 def walked(**feet):
-    policy, settings = prepare("schedule", {"episode_seconds": 6.0, **feet})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, **feet})
     return record(policy, settings, name="schedule", episodes=2, threads=1)
 
 
@@ -72,7 +72,7 @@ def test_with_the_same_feet_there_are_no_legs_apart_and_they_are_alike(recording
 
 
 def test_a_walk_without_strides_has_no_numbers():
-    policy, settings = prepare("schedule", {"episode_seconds": 1.0, "right_foot": "rigid"})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 1.0, "right_foot": "rigid"})
     gait = measure(record(policy, settings, name="schedule", episodes=1, threads=1))
     left, right = gait.metrics["per_leg"].values()
     assert left == right and left["strides"] == 0 and left["joint_work_J_kg"]["ankle"]["positive"] is None
@@ -146,7 +146,7 @@ def test_legs_with_different_feet_have_states_and_feedback_of_their_own(recordin
     for name, toe in zip(tables, (30.0, 60.0), strict=True):
         states = json.loads((tmp_path / name).read_text(encoding="utf-8"))["states"]
         assert {state["toe"]["stiffness_Nm_per_rad"] for state in states} == {toe}
-        assert prepare(str(tmp_path / name), {})[1].equilibrium == "phase"  # a policy again
+        assert policy_and_settings(str(tmp_path / name), {})[1].equilibrium == "phase"  # a policy again
 
 
 def test_a_copy_open_loop_keeps_the_stiffness_of_legs_with_different_feet():

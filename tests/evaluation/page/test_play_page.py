@@ -13,7 +13,7 @@ from springfoot.cli.main import main
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.page.play_data import LARGEST, MOMENTS, PLAY_COLUMNS, walk_of
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.studies.walks.play import Play
 
@@ -42,7 +42,7 @@ def page(tmp_path_factory):
 
 
 def walked(name, **given):
-    policy, settings = prepare(name, {"episode_seconds": 8.0} | given)
+    policy, settings = policy_and_settings(name, {"episode_seconds": 8.0} | given)
     return record(policy, settings, name=name, episodes=2)
 
 

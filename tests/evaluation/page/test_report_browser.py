@@ -4,7 +4,7 @@ import pytest
 
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.page.report_page import write_page
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 
 CUT_OFF = """() => [...document.querySelectorAll("svg text")].filter(text => {
@@ -27,7 +27,7 @@ BROKEN = """() => [...document.querySelectorAll("td.number")].filter(cell => {
 
 
 def walked(name, **given):
-    policy, settings = prepare(name, {"episode_seconds": 8.0} | given)
+    policy, settings = policy_and_settings(name, {"episode_seconds": 8.0} | given)
     recording = record(policy, settings, name=name, episodes=2)
     return recording, measure(recording)
 

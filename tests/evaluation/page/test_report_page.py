@@ -15,12 +15,12 @@ from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.page.page_figure import foot_words, walker_words
 from springfoot.evaluation.page.report_page import spoken_verdict, write_page
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 
 
 def walked(name, label=None, **given):
-    policy, settings = prepare(name, {"episode_seconds": 8.0} | given)
+    policy, settings = policy_and_settings(name, {"episode_seconds": 8.0} | given)
     recording = record(policy, settings, name=label or name, episodes=2)
     return recording, measure(recording)
 

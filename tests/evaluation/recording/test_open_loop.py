@@ -15,8 +15,14 @@ from springfoot.envs.control.equilibrium import fixed_stiffness
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.open_loop import MEAN_KNOTS, decided, feedback, mean_over_phase, open_loop_copy
-from springfoot.evaluation.recording.policies import policy_label, prepare
+from springfoot.evaluation.recording.open_loop import (
+    MEAN_KNOTS,
+    decisions_of,
+    feedback,
+    mean_over_phase,
+    open_loop_copy,
+)
+from springfoot.evaluation.recording.policies import policy_and_settings, policy_label
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
 from springfoot.studies.springs.agreement import criteria_table
@@ -28,7 +34,7 @@ PUSHED = {"push_newton": 150.0, "push_interval": 2.0, "episode_seconds": 5.0}
 
 @cache
 def walked(name, **given):
-    return record(*prepare(name, {"episode_seconds": 6.0} | given), name=name, episodes=4)
+    return record(*policy_and_settings(name, {"episode_seconds": 6.0} | given), name=name, episodes=4)
 
 
 def of_feedback(recording, joint, key) -> float:
@@ -51,7 +57,7 @@ def most_in_a_knot(settings):
 
 
 def test_the_open_loop_copy_of_a_schedule_is_that_schedule_with_its_equilibrium():
-    policy, settings = prepare("schedule", {"episode_seconds": 5.0})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 5.0})
     copy, same = open_loop_copy(policy, settings, name="schedule")
     assert same == settings
     played, own = (record(each, settings, name="", episodes=3) for each in (copy, policy))
@@ -65,7 +71,7 @@ def test_the_open_loop_copy_of_a_schedule_is_that_schedule_with_its_equilibrium(
 @pytest.mark.slow
 def test_a_copy_follows_speed_and_body_as_the_schedule_does():
     ranges: dict[str, Any] = {"speed_range": (1.1, 1.25), "height_range": (1.6, 1.75), "mass_range": (50.0, 80.0)}
-    policy, settings = prepare("schedule", ranges)
+    policy, settings = policy_and_settings("schedule", ranges)
     copy, same = open_loop_copy(policy, settings, name="schedule")
     assert same == settings
     alone = settings_from(height=1.62, mass=55.0, speed=1.15, episode_seconds=1.0)
@@ -89,14 +95,14 @@ def _observed(settings):
 
 @pytest.mark.slow
 def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_the_phase_alone():
-    own, settings = prepare("pretrained", {})
-    copy, absolute = prepare("frozen:pretrained", {})
+    own, settings = policy_and_settings("pretrained", {})
+    copy, absolute = policy_and_settings("frozen:pretrained", {})
     assert absolute == dataclasses.replace(settings, action_mode="absolute")
     policy, pushed = walked("pretrained"), walked("frozen:pretrained", **PUSHED | {"episode_seconds": 12.0})
     assert pushed.series["stiffness"].shape[-1] == 2 and own is not copy
     for joint in ("ankle", "toe"):
         assert of_feedback(pushed, joint, "spread") < 0.02 < of_feedback(policy, joint, "spread")
-    means = [mean_over_phase(*decided(each)) for each in (policy, walked("frozen:pretrained"))]
+    means = [mean_over_phase(*decisions_of(each)) for each in (policy, walked("frozen:pretrained"))]
     assert means[1][1:31] == pytest.approx(means[0][1:31], rel=0.1)  # in stance; of other episodes
     at = np.linspace(0.05, 0.95, 40)
     rest = [
@@ -108,7 +114,9 @@ def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_t
 
 @pytest.mark.slow
 def test_a_copy_decides_when_it_is_told_and_keeps_the_stiffness_of_the_policys_own_decisions():
-    (one, at_50), (other, at_100) = (prepare("frozen:pretrained", {"decisions": each}) for each in ("50hz", "100hz"))
+    (one, at_50), (other, at_100) = (
+        policy_and_settings("frozen:pretrained", {"decisions": each}) for each in ("50hz", "100hz")
+    )
     assert (at_50.decisions, at_100.decisions) == ("50hz", "100hz")
     observation = _observed(settings_from(episode_seconds=1.0))
     assert np.array_equal(one(observation), other(observation))
@@ -138,7 +146,7 @@ def test_what_follows_the_phase_alone_has_no_feedback_pushed_or_not(name):
 
 
 def test_feedback_is_the_variance_that_was_put_in():
-    policy, settings = prepare("constant", {"episode_seconds": 10.0})
+    policy, settings = policy_and_settings("constant", {"episode_seconds": 10.0})
     random = np.random.default_rng(1)
 
     def scattered(observation):  # actions are on a log scale
@@ -178,9 +186,9 @@ ERRORS = [
     ),
     (
         "frozen:nobody",
-        "no policy 'nobody': give a .safetensors or .onnx file, a run folder, module:function, or one of "
-        f"pretrained, medium, predicted, passive-1-0 to adaptive-2-4, {', '.join(BASELINES)}, "
-        "or frozen:POLICY",
+        "no policy 'nobody': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
+        "module:function, frozen:POLICY, or one of pretrained, medium, predicted, passive-1-0 to adaptive-2-4, "
+        f"{', '.join(BASELINES)}",
     ),
 ]
 
@@ -188,7 +196,7 @@ ERRORS = [
 @pytest.mark.parametrize(("name", "said"), ERRORS)
 def test_a_copy_that_cannot_be_is_one_line_exit_code_2_and_nothing_written(name, said, tmp_path, monkeypatch, capsys):
     with pytest.raises(SpringfootError) as error:
-        prepare(name, {})
+        policy_and_settings(name, {})
     assert str(error.value) == said
     monkeypatch.chdir(tmp_path)
     assert evaluate_main([name]) == study_main(["compare", name]) == study_main(["bodies", name]) == 2
@@ -200,7 +208,7 @@ def test_a_copy_that_cannot_be_is_one_line_exit_code_2_and_nothing_written(name,
 
 
 def test_a_policy_that_walks_no_strides_has_no_copy():
-    policy, settings = prepare("thesis_printed", {})
+    policy, settings = policy_and_settings("thesis_printed", {})
     with pytest.raises(
         SpringfootError, match=r"^nobody walks no strides after 3 s whose mean stiffness could be taken$"
     ):

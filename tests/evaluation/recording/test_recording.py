@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import BATCH, load_recording, record
 from springfoot.gait import SpringfootError
 
 
 def test_every_episode_has_its_own_seed_in_every_batch():
-    policy, settings = prepare("untrained", {"episode_seconds": 0.1})
+    policy, settings = policy_and_settings("untrained", {"episode_seconds": 0.1})
     many = record(policy, settings, name="untrained", episodes=BATCH + 2, seed=3)
     second = record(policy, settings, name="untrained", episodes=2, seed=3 + BATCH)
     for name, values in second.series.items():
@@ -18,7 +18,7 @@ def test_every_episode_has_its_own_seed_in_every_batch():
 
 
 def test_a_recording_is_of_one_body_at_one_speed():
-    policy, settings = prepare("untrained", {"mass_range": (50.0, 80.0)})
+    policy, settings = policy_and_settings("untrained", {"mass_range": (50.0, 80.0)})
     with pytest.raises(SpringfootError, match="mass_range"):
         record(policy, settings, name="untrained", episodes=1)
 

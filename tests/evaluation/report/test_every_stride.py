@@ -7,13 +7,13 @@ import pytest
 
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.every_stride import STRIDE_KEYS, each_stride, write_every_stride
 
 
 def walked(name, **given):
-    policy, settings = prepare(name, {"episode_seconds": 6.0} | given)
+    policy, settings = policy_and_settings(name, {"episode_seconds": 6.0} | given)
     return record(policy, settings, name=name, episodes=3)
 
 

@@ -9,7 +9,7 @@ from springfoot.envs.physics.model_file import model_text
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import TICK, record
 from springfoot.evaluation.report.exports import opensim_coordinates, opensim_forces, write_model, write_opensim
 from springfoot.gait import GRAVITY, Body
@@ -19,7 +19,7 @@ SLOPE = 3.0
 
 
 def walked(name="schedule", **given):
-    policy, settings = prepare(name, {"episode_seconds": 8.0} | given)
+    policy, settings = policy_and_settings(name, {"episode_seconds": 8.0} | given)
     return record(policy, settings, name=name, episodes=1)
 
 

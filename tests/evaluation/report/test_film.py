@@ -13,10 +13,10 @@ FILM = """
 import sys
 from pathlib import Path
 from springfoot.evaluation.report.film import film_seconds, save_film
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
-policy, settings = prepare("schedule", {"episode_seconds": 1.0, "slope_deg": 3.0})
+policy, settings = policy_and_settings("schedule", {"episode_seconds": 1.0, "slope_deg": 3.0})
 recording, told = record(policy, settings, name="schedule", episodes=1), []
 try:
     save_film(Path("walk.mp4"), recording, told.append)

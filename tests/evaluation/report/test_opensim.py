@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.exports import opensim_coordinates, opensim_forces, write_opensim
 
@@ -11,7 +11,7 @@ from springfoot.evaluation.report.exports import opensim_coordinates, opensim_fo
 @pytest.mark.parametrize("given", [{}, {"slope_deg": 3.0, "right_foot": "passive"}])
 def test_opensim_reads_every_number_that_was_written(given, tmp_path):
     opensim = pytest.importorskip("opensim", reason="needs OpenSim's own reader: pip install opensim")
-    policy, settings = prepare("schedule", {"episode_seconds": 2.0} | given)
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 2.0} | given)
     recording = record(policy, settings, name="schedule", episodes=1)
     write_opensim(tmp_path, recording)
     for file, columns, degrees in (

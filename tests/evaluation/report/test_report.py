@@ -18,7 +18,7 @@ from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.settings.settings import reference_gait, settings_from
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import load_recording, record
 from springfoot.evaluation.report.gait_table import people_metrics, print_table
 from springfoot.evaluation.report.report import write_report
@@ -44,7 +44,7 @@ PARQUET = {"every_stride.parquet"}  # where pyarrow is installed
 
 
 def walked(episodes=2, name="schedule", **settings):
-    policy, environment = prepare(name, {"episode_seconds": 6.0} | settings)
+    policy, environment = policy_and_settings(name, {"episode_seconds": 6.0} | settings)
     return record(policy, environment, name=name, episodes=episodes)
 
 
@@ -143,9 +143,9 @@ def test_every_tick_is_recorded_and_what_a_constant_sets_arrives_in_the_curves()
 
 
 def test_conditions_are_the_same_for_every_policy_and_flags_win():
-    _, standard = prepare("schedule", {})
+    _, standard = policy_and_settings("schedule", {})
     assert (standard.height, standard.mass, standard.speed, standard.push_newton) == (1.70, 63.0, 1.2, 0.0)
-    _, flagged = prepare("thesis", {"speed": 1.0, "equilibrium": "angle"})
+    _, flagged = policy_and_settings("thesis", {"speed": 1.0, "equilibrium": "angle"})
     assert (flagged.speed, flagged.equilibrium) == (1.0, "angle")
 
 
@@ -161,7 +161,7 @@ def test_a_policy_file_with_no_weight_walks_as_the_untrained_in_the_same_conditi
         observation_variance=np.ones(size),
     )
     save_policy(tmp_path / "zero.safetensors", zero)
-    policy, settings = prepare(str(tmp_path / "zero.safetensors"), {"episode_seconds": 2.0})
+    policy, settings = policy_and_settings(str(tmp_path / "zero.safetensors"), {"episode_seconds": 2.0})
     assert (settings.speed, settings.push_newton) == (1.2, 0.0)
     untrained = walked(1, "untrained", episode_seconds=2.0)
     assert np.array_equal(record(policy, settings, name="zero", episodes=1).returns, untrained.returns)
@@ -242,7 +242,7 @@ def test_an_existing_folder_is_refused_before_anything_runs(command, tmp_path):
 
 def test_a_foreign_policy_name_lists_what_is_allowed():
     with pytest.raises(SpringfootError, match=r"run folder.*pretrained.*thesis"):
-        prepare("nonsense", {})
+        policy_and_settings("nonsense", {})
 
 
 # The page of metrics says what all of it means ----------------------------------------------------------------------
@@ -285,6 +285,6 @@ def test_every_column_and_array_is_documented_and_nothing_else(folder):
 
 
 def test_every_column_of_a_pair_is_documented_and_nothing_else():
-    policy, settings = prepare("schedule", {"episode_seconds": 0.1})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 0.1})
     pairs = walk_pairs(policy, settings, draw_pairs(settings, 1), name="schedule")
     assert documented("### `pairs.csv`") == list(pairs[0])

@@ -6,7 +6,7 @@ from drawn import has_line, kept_figures
 from PIL import Image, ImageSequence
 
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.animation import save_animation
 from springfoot.evaluation.report.gait_figure import save_gait_figure
@@ -16,7 +16,7 @@ from springfoot.gait.people.contacts import PERCENT
 
 @pytest.fixture(scope="module")
 def recording():
-    policy, settings = prepare("schedule", {"episode_seconds": 6.0})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0})
     return record(policy, settings, name="schedule", episodes=2)
 
 

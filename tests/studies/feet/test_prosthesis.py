@@ -13,7 +13,7 @@ from springfoot.envs.physics.model import JOINT_RANGE_DEG, KNEE, RIGHT
 from springfoot.envs.settings.adapted import ADAPTED, committed_feet
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.per_leg import leg_numbers
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import TICK, WARM_UP, record, record_feet
 from springfoot.studies.base.intervals import t_interval
 from springfoot.studies.base.kept import Kept
@@ -35,7 +35,7 @@ SHORT = {"episode_seconds": 6.0}
 
 
 def test_numbers_are_those_of_the_evaluation():
-    acting, settings = prepare("pretrained", {**SHORT, "right_foot": "passive"})
+    acting, settings = policy_and_settings("pretrained", {**SHORT, "right_foot": "passive"})
     gait = measure(record(acting, settings, name="pretrained", episodes=2))
     own, legs = numbers_of(gait), gait.metrics["per_leg"]
     assert own["sound_peak_bw"] == legs["left"]["vertical_max_mean_bw"]
@@ -50,10 +50,10 @@ def test_numbers_are_those_of_the_evaluation():
 
 def test_feet_side_by_side_walk_as_alone_and_the_same_episodes():
     feet = ["intact", {"kind": "weak", "strength": 0.3}]
-    acting, settings = prepare("pretrained", {**SHORT, "unevenness_m": 0.01})
+    acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01})
     together = record_feet(acting, settings, feet, name="x", episodes=2, seed=5)
     for foot, recording in zip(feet, together, strict=True):
-        acting, settings = prepare("pretrained", {**SHORT, "unevenness_m": 0.01, "right_foot": foot})
+        acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01, "right_foot": foot})
         alone = record(acting, settings, name="x", episodes=2, seed=5)
         assert recording.settings == alone.settings
         assert recording.returns.tobytes() == alone.returns.tobytes()
@@ -70,7 +70,7 @@ def test_a_walk_that_falls_has_its_falls_and_no_other_numbers():
 def test_who_holds_the_toe_leans_on_the_stop_of_a_knee(name, least, most):
     right = {"kind": "rigid", ADAPTED: name}
     given = {**SHORT, **SCHEDULE[1], "right_foot": right, "speed": 1.05 if name == TOE_HELD else 1.2}
-    acting, settings = prepare(SCHEDULE[0], given)
+    acting, settings = policy_and_settings(SCHEDULE[0], given)
     recording = record(acting, settings, name=name, episodes=1, seed=500)
     share = beyond_stop(recording)
     assert share is not None and least <= share <= most

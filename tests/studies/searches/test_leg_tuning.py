@@ -13,7 +13,7 @@ from springfoot.cli.main import study_main
 from springfoot.envs.control.constants import constants_from, leg_constants
 from springfoot.envs.control.legs import KNOTS
 from springfoot.envs.settings.settings import BipedSettings
-from springfoot.evaluation import measure, prepare, record
+from springfoot.evaluation import measure, policy_and_settings, record
 from springfoot.evaluation.numbers import series as numbers_series
 from springfoot.gait.people.human import human_gait
 from springfoot.studies.searches import leg_cost
@@ -87,7 +87,7 @@ def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_le
 def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
     """A measurer that finds heel strikes late and toe-offs early moves an evaluation, a search and a study alike."""
     settings = BipedSettings(episode_seconds=SECONDS + 1)
-    policy, walked = prepare("schedule", {"episode_seconds": SECONDS})
+    policy, walked = policy_and_settings("schedule", {"episode_seconds": SECONDS})
 
     def three():
         paid = leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0)

@@ -8,7 +8,7 @@ import pytest
 from springfoot.cli.main import study_main
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.model import damping_times
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
 from springfoot.studies.springs import any_stiffness as identified
@@ -23,7 +23,7 @@ from springfoot.studies.springs.any_stiffness import (
 
 @pytest.fixture(scope="module")
 def walked():
-    policy, settings = prepare("schedule", {"episode_seconds": 8.0})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 8.0})
     return record(policy, settings, name="schedule", episodes=4)
 
 
@@ -76,7 +76,7 @@ def test_the_command_writes_table_and_schedules(capsys, tmp_path):
     assert (tmp_path / "springs" / "report.md").read_text().startswith("| K |")
     numbers = (tmp_path / "springs" / "stiffness.csv").read_text().splitlines()
     assert numbers[0].startswith("stiffness,condition,work_by_stiffness_J_kg,") and len(numbers) == 1 + 2 * 3
-    _, settings = prepare(
+    _, settings = policy_and_settings(
         "schedule",
         {"equilibrium": "phase", "schedule": json.loads((tmp_path / "springs/times-0.9.json").read_text())},
     )
@@ -90,6 +90,6 @@ def test_unknown_stiffnesses_are_refused_with_one_line(walked, name):
 
 
 def test_a_policy_that_falls_at_once_has_no_springs_to_rebuild():
-    policy, settings = prepare("thesis", {"episode_seconds": 2.0})
+    policy, settings = policy_and_settings("thesis", {"episode_seconds": 2.0})
     with pytest.raises(SpringfootError, match="thesis walks no strides"):
         mean_springs(record(policy, settings, name="thesis", episodes=1))

@@ -10,7 +10,7 @@ from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings.settings import body_of
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
 from springfoot.gait.springs.identification_by_pushes import REACTS, SPRING
@@ -112,6 +112,6 @@ def test_bad_input_gets_one_line(words, said, capsys, tmp_path):
 
 
 def test_a_policy_that_falls_at_once_is_refused():
-    policy, settings = prepare("thesis", {"episode_seconds": 2.0})
+    policy, settings = policy_and_settings("thesis", {"episode_seconds": 2.0})
     with pytest.raises(SpringfootError, match="thesis walks no strides"):
         samples(record(policy, settings, name="thesis", episodes=2))

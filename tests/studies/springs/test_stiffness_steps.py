@@ -13,7 +13,7 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
 from springfoot.envs.physics.model import JOINTS, SIDES, damping_times
 from springfoot.envs.settings.settings import BipedSettings
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.gait import Body, SpringfootError
 from springfoot.studies.springs.stiffness_steps import (
     CELLS,
@@ -34,7 +34,7 @@ CHANGE = 0.1
 @pytest.fixture(scope="module")
 def states():
     """Model, leg phases and data of a level walk, a state each 60 ms over more than a stride."""
-    policy, settings = prepare("schedule", {})
+    policy, settings = policy_and_settings("schedule", {})
     biped = Biped(settings, 1, 1)
     biped.reset(np.zeros(1, int), [0])
     observation, found = biped.observe(), []
@@ -47,7 +47,10 @@ def states():
 
 @pytest.fixture(scope="module")
 def pairs():
-    return {change: paired_walks(*prepare("schedule", {}), change, range(2), strides=4) for change in (0.0, CHANGE)}
+    return {
+        change: paired_walks(*policy_and_settings("schedule", {}), change, range(2), strides=4)
+        for change in (0.0, CHANGE)
+    }
 
 
 def control(data):
@@ -131,7 +134,7 @@ def test_a_step_of_the_action_multiplies_stiffness():
 
 
 def test_stiffness_changes_in_its_joint_phase_leg_and_strides_alone():
-    _, settings = prepare("schedule", {"decisions": "100hz"})
+    _, settings = policy_and_settings("schedule", {"decisions": "100hz"})
     copies = 1 + len(CELLS) * len(DURATIONS)
     biped = Biped(settings, copies, 1)
     biped.reset(np.arange(copies), [0] * copies)
@@ -203,6 +206,6 @@ def test_steps_as_long_as_strides_are_fast(pairs):
 
 
 def test_walks_that_fall_cannot_be_compared():
-    policy, settings = prepare("random", {})
+    policy, settings = policy_and_settings("random", {})
     with pytest.raises(SpringfootError, match="of 2 unchanged walks fewer than two stay up"):
         paired_walks(policy, settings, CHANGE, range(2), strides=4)

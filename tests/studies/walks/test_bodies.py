@@ -11,7 +11,7 @@ from springfoot.cli.main import study_main
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.studies.base.columns import COMPARED_JOINTS
 from springfoot.studies.walks import bodies as bodies
@@ -32,11 +32,13 @@ def test_pairs_fill_the_ranges_of_the_preset_independently():
 
 
 def test_a_pair_is_measured_as_if_alone_in_blocks_of_any_size():
-    policy, settings = prepare("schedule", SOME | {"episode_seconds": 5.0})
+    policy, settings = policy_and_settings("schedule", SOME | {"episode_seconds": 5.0})
     who = {"height": np.array([1.7, 1.62]), "mass": np.array([63.0, 110.0]), "speed": np.array([1.2, 1.16])}
     rows = bodies.walk_pairs(policy, settings, who, name="schedule", seed=3)
     assert rows == bodies.walk_pairs(policy, settings, who, name="schedule", seed=3, block=1)
-    alone = measure(record(*prepare("schedule", {"episode_seconds": 5.0}), name="", episodes=1, seed=3)).metrics
+    alone = measure(
+        record(*policy_and_settings("schedule", {"episode_seconds": 5.0}), name="", episodes=1, seed=3)
+    ).metrics
     first, second = rows
     assert first["measured_speed_m_s"] == pytest.approx(alone["speed_m_s"]["mean"], rel=1e-4)
     assert first["knee_rmse_deg"] == pytest.approx(alone["joints"]["knee"]["rmse_deg"], rel=1e-2)
@@ -78,7 +80,7 @@ def test_the_command_prints_a_table_and_writes_a_row_for_each_pair(capsys, tmp_p
 
 
 def test_a_speed_that_changes_within_an_episode_is_refused():
-    policy, settings = prepare("schedule", SOME | {"speed_interval": 2.0})
+    policy, settings = policy_and_settings("schedule", SOME | {"speed_interval": 2.0})
     with pytest.raises(SpringfootError, match="speed_interval must be None"):
         bodies.walk_pairs(policy, settings, bodies.draw_pairs(settings, 1), name="schedule")
 

@@ -12,7 +12,7 @@ from springfoot.agents.policies.baselines import BASELINES, constant
 from springfoot.cli.main import study_main
 from springfoot.envs.settings.settings import settings_from
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.recording.policies import prepare
+from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.studies.base import columns, intervals
 from springfoot.studies.base.flags import SettingsFlags
@@ -60,7 +60,7 @@ def test_a_baseline_earns_the_reward_of_the_policy_it_is_held_against():
 
 
 def test_a_row_is_what_evaluate_would_find(rows):
-    policy, settings = prepare("schedule", SHORT)
+    policy, settings = policy_and_settings("schedule", SHORT)
     assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3).returns)
 
 
@@ -185,7 +185,7 @@ def test_elsewhere_every_condition_is_a_row_of_what_evaluate_would_find(monkeypa
     files = study.ask(lambda seconds: None).files
     lines = list(csv.DictReader(files["world.csv"].splitlines()))
     assert [line["conditions"] for line in lines] == ["", "slope_deg 5.0"]
-    policy, settings = prepare("schedule", {"slope_deg": 5.0, "episode_seconds": 4.5})
+    policy, settings = policy_and_settings("schedule", {"slope_deg": 5.0, "episode_seconds": 4.5})
     uphill = measure(record(policy, settings, name="", episodes=1)).metrics
     assert float(lines[1]["speed_m_s_mean"]) == pytest.approx(uphill["speed_m_s"]["mean"], rel=1e-5)
     assert lines[0] != lines[1]
