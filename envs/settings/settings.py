@@ -158,7 +158,7 @@ class BipedSettings:
     ankle_tendon: float | None = field(default=None, metadata=_SPRINGS)
     """Stiffness of the Achilles tendon about the ankle, for 1.70 m and 63 kg, [100..2000 N m/rad], such as 400. In
     walking K then stays below that of tendon and passive tissue, and the term `stiffness` charges the calf's own K
-    beyond what its torque brings. None for no bound."""
+    beyond what its torque brings. By default there is no bound."""
     schedule: StiffnessSchedule | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""

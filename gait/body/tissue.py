@@ -38,7 +38,7 @@ an angle (Loram, Maganaris & Lakie, J. Physiol. 584 (2007) 677-692)."""
 STIFFNESS_PER_TORQUE = 5.0
 """Rise of a muscle's stiffness with its torque [1/rad]; chosen. That it is proportional is Weiss, Hunter & Kearney's,
 J. Biomech. 21 (1988) 539-544; readings of the slope lie between 2.5 and 14."""
-DEGREES = 180.0 / np.pi
+_PER_RADIAN = 180.0 / np.pi
 
 
 def passive_moments(body: Body, angle: NDArray) -> NDArray:
@@ -54,9 +54,9 @@ def tissue_moments(hip: Any, knee: Any, ankle: Any, toe: Any) -> Any:
 
     The angles [rad] are numbers or arrays: the environment's kernels compile this function.
     """
-    hip = DEGREES * hip
-    knee = DEGREES * knee
-    ankle = DEGREES * ankle
+    hip = _PER_RADIAN * hip
+    knee = _PER_RADIAN * knee
+    ankle = _PER_RADIAN * ankle
     of_hip = -np.exp(1.4655 - 0.0034 * knee - 0.0750 * hip) + np.exp(1.3403 - 0.0226 * knee + 0.0305 * hip) - 8.072
     of_knee = (
         -np.exp(1.800 + 0.0460 * ankle - 0.0352 * knee + 0.0217 * hip)
@@ -75,10 +75,10 @@ def ankle_tissue_stiffness(knee: Any, ankle: Any) -> Any:
 
     The angles [rad] are numbers or arrays.
     """
-    knee = DEGREES * knee
-    ankle = DEGREES * ankle
+    knee = _PER_RADIAN * knee
+    ankle = _PER_RADIAN * ankle
     rising = 0.0843 * np.exp(2.1016 + 0.0843 * ankle - 0.0176 * knee)
-    return DEGREES * (rising + 0.1949 * np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee))
+    return _PER_RADIAN * (rising + 0.1949 * np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee))
 
 
 def muscle_in_series(stiffness: Any, tendon: Any) -> Any:

@@ -17,13 +17,13 @@ from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .walked_speeds import PRICES, Row, at_walked_speeds
+from .walked_speeds import TWO_PRICES, Row, at_walked_speeds
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
 """Commanded speeds [m/s]."""
 WALKED_SPEEDS = (0.8, 1.0, 1.2)
 """Walked speeds at which prices are compared [m/s]."""
-SOUND = "sound"
+UNCHANGED = "sound"
 SLACK = "slack device, both ankles"
 STIFFEST = "spring 500 N·m/rad, right ankle"
 """The condition whose spring once "saved" 13 %, when net joint work was the price."""
@@ -39,17 +39,17 @@ def _both(foot: dict[str, Any]) -> dict[str, Any]:
     return {"left_foot": foot, "right_foot": foot}
 
 
-SPRINGS = (50.0, 100.0, 150.0, 250.0, 500.0)
+BOTH_ANKLES = (50.0, 100.0, 150.0, 250.0, 500.0)
 """Stiffness of springs at both ankles [N m/rad]: those of Nuckols & Sawicki (2020), and twice their stiffest."""
 CONDITIONS: dict[str, dict[str, Any]] = {
-    SOUND: {},
+    UNCHANGED: {},
     SLACK: _both(_brace(ankle_stiffness=0.0)),
-    **{f"spring {k:g} N·m/rad, both ankles": _both(_brace(ankle_stiffness=k)) for k in SPRINGS},
+    **{f"spring {k:g} N·m/rad, both ankles": _both(_brace(ankle_stiffness=k)) for k in BOTH_ANKLES},
     **{
         f"one-way spring {k:g} N·m/rad, both ankles": _both(
             _brace(ankle_stiffness=k, ankle_deg=-5.73, engages="dorsiflexion")
         )
-        for k in SPRINGS[:4]
+        for k in BOTH_ANKLES[:4]
     },
     STIFFEST: {"right_foot": _brace(ankle_stiffness=500.0)},
     "feet of twice the mass": _both({"kind": "intact", "foot_mass_ratio": 2.0, "foot_inertia_ratio": 2.0}),
@@ -117,7 +117,7 @@ def controls_table(even: Sequence[Row]) -> str:
     prices = {(row["condition"], row["speed_m_s"]): row for row in even}
     lines = []
     for name in dict.fromkeys(row["condition"] for row in even):
-        cells = [_cell(prices[name, speed], prices[SOUND, speed]) for speed in speeds]
+        cells = [_cell(prices[name, speed], prices[UNCHANGED, speed]) for speed in speeds]
         lines.append([name, *cells])
     head = ["", *(f"walking {speed:g} m/s" for speed in speeds)]
     return f"{table(head, lines)}\n\nFibre work [J/kg/m] / all of effort [-], in brackets against the sound walk."
@@ -127,8 +127,8 @@ def _cell(own: Row, sound: Row) -> str:
     """Return both prices of a walk with their differences from the sound one."""
     if own["falls"] or sound["falls"]:
         return MISSING
-    differences = [own[price] / sound[price] - 1.0 for price in PRICES]
-    shown = " / ".join(text_of(own[price], ".2f") for price in PRICES)
+    differences = [own[price] / sound[price] - 1.0 for price in TWO_PRICES]
+    shown = " / ".join(text_of(own[price], ".2f") for price in TWO_PRICES)
     return f"{shown} ({differences[0]:+.0%} / {differences[1]:+.0%})"
 
 

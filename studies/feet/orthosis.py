@@ -34,7 +34,7 @@ from ..base.intervals import share_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_walks import ABOUT_STOPS, NAMES, SCHEDULE, TOLD, UNSEARCHED, numbers_of, walked
-from .walked_speeds import PRICES, Row, at_walked_speeds
+from .walked_speeds import TWO_PRICES, Row, at_walked_speeds
 
 PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
@@ -203,8 +203,8 @@ SPRING_OF_A_BODY = ("mass_kg", "strength", "spring_Nm_deg")
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#555555")
 
 
-def best_springs(rows: Sequence[Row], price: str = PRICES[0]) -> list[dict[str, Any]]:
-    """Return the best spring without a fall for each body, speed and strength, by one of `PRICES`.
+def best_springs(rows: Sequence[Row], price: str = TWO_PRICES[0]) -> list[dict[str, Any]]:
+    """Return the best spring without a fall for each body, speed and strength, by one of `TWO_PRICES`.
 
     A row has the spring of the least price, the percentage that the worst one costs more, and the spring that slows the
     walk least.

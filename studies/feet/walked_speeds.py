@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 
 Row = Mapping[str, Any]
-PRICES = ("fibre_J_kg_m", "effort")
+TWO_PRICES = ("fibre_J_kg_m", "effort")
 """Columns of the two prices of a walk: fibre work, and all of the effort."""
 
 
 def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[float]) -> list[dict[str, Any]]:
-    """Return a row for each case and each of the walked `speeds` [m/s], with `PRICES` and `falls`.
+    """Return a row for each case and each of the walked `speeds` [m/s], with `TWO_PRICES` and `falls`.
 
     Prices are linear between two neighbouring commanded speeds without a fall. A case that reaches a speed nowhere
     counts as falling there (`falls` 1, prices None).
 
     Args:
-        rows: walks with `keys`, `PRICES`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
+        rows: walks with `keys`, `TWO_PRICES`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
         keys: columns that tell one case from another.
         speeds: at which cases are compared.
     """
@@ -30,7 +30,7 @@ def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[
             between = [prices for pair in pairwise(walks) if (prices := _prices_at(speed, *pair)) is not None]
             line: dict[str, Any] = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
             line["falls"] = 0.0 if between else 1.0
-            line |= between[0] if between else dict.fromkeys(PRICES)
+            line |= between[0] if between else dict.fromkeys(TWO_PRICES)
             compared.append(line)
     return compared
 
@@ -38,11 +38,11 @@ def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[
 def _prices_at(speed: float, slow: Row, fast: Row) -> dict[str, float] | None:
     """Return the prices at a walked `speed` [m/s], linear between two walks; None unless it lies between them, without
     falls."""
-    unmeasured = any(walk[price] is None for walk in (slow, fast) for price in PRICES)
+    unmeasured = any(walk[price] is None for walk in (slow, fast) for price in TWO_PRICES)
     if slow["falls"] or fast["falls"] or unmeasured:
         return None
     low = slow["walked_m_s"]
     high = fast["walked_m_s"]
     if not low <= speed <= high:
         return None
-    return {price: float(np.interp(speed, [low, high], [slow[price], fast[price]])) for price in PRICES}
+    return {price: float(np.interp(speed, [low, high], [slow[price], fast[price]])) for price in TWO_PRICES}
