@@ -41,7 +41,7 @@ def test_every_example_is_run_and_short():
 def test_examples_are_copied_out_of_the_package_into_a_new_folder(tmp_path, capsys):
     copy = tmp_path / "mine"
     assert main(["examples", "--copy", str(copy)]) == 0
-    known = {path.relative_to(EXAMPLES) for path in EXAMPLES.rglob("*.*") if path.suffix in (".py", ".txt")}
+    known = {path.relative_to(EXAMPLES) for path in EXAMPLES.rglob("*.*") if path.suffix in (".py", ".txt", ".ipynb")}
     copied = {path.relative_to(copy): path.read_bytes() for path in copy.rglob("*.*")}
     assert copied == {path: (EXAMPLES / path).read_bytes() for path in known - {Path("__init__.py")}}
     assert f"{copy / 'one_walk.py'}: One walk, step by step" in capsys.readouterr().out
