@@ -270,6 +270,13 @@ def test_the_lock_has_the_pinned_version_and_the_hashes_of_all_but_torch(pins):
     assert names - versions.keys() == {"torch", "springfoot"}
 
 
+def test_the_citation_names_the_pinned_versions(pins):
+    software = re.findall(r"type: software\n    title: (.+)\n    version: (.+)\n", (ROOT / "CITATION.cff").read_text())
+    assert {title.lower(): number for title, number in software} == {
+        name: pins[name] for name in ("mujoco", "gymnasium", "stable-baselines3")
+    }
+
+
 def test_the_backend_that_builds_is_the_pinned_one(pins):
     assert PROJECT["build-system"]["requires"] == [f"setuptools=={pins['setuptools']}"]
 
