@@ -79,8 +79,10 @@ def main() -> None:
 
 
 def commands_in(readme: str) -> list[list[str]]:
-    """Return README's commands of the package, as words, shortened; a training that trains again has a new folder."""
-    lines = [line.partition("#")[0] for line in readme.splitlines()] + re.findall(r"`([^`]+)`", readme)
+    """Return README's commands of the package, as words, shortened."""
+    blocks = re.findall(r"```sh\n(.*?)```", readme, re.DOTALL)
+    lines = [line.partition("#")[0] for block in blocks for line in block.splitlines()]
+    lines += re.findall(r"`([^`\n]+)`", readme)
     commands = [shlex.split(line) for line in lines if line.startswith("springfoot ")]
     for words in commands:
         for flag, value in SHORTER.items():

@@ -133,7 +133,7 @@ def test_the_conda_recipe_needs_what_the_wheel_needs():
     lines = map(Requirement, [*project["dependencies"], *project["optional-dependencies"]["evaluate"]])
     needed = {theirs.get(one.name, one.name): one.specifier for one in lines}
     needed["python"] = SpecifierSet(project["requires-python"])
-    run = re.findall(r"- (\S+) (\S+)\n", RECIPE.partition("\n  run:")[2].partition("\ntests:")[0])
+    run = re.findall(r"- (\S+) (\S+)\n", RECIPE.partition("\n  run:")[2].partition("tests:")[0])
     assert {name: SpecifierSet(versions) for name, versions in run} == needed
     assert f"setuptools {PROJECT['build-system']['requires'][0].removeprefix('setuptools')}\n" in RECIPE
 
