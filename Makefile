@@ -10,14 +10,17 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-all test-wheel test-sdist test-learners test-rllib test-kills fuzz extremes mutants check format bench feet docs lock clean
+.PHONY: help install walk predict test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench feet docs lock clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
 	@echo "make test     run the quick tests, in four minutes on two cores"
 	@echo "make test-all run all tests, those marked slow too (trainings, kills, studies twice): ten minutes on two cores"
-	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: evaluate, study, train"
+	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: all commands of README, examples, policies"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
+	@echo "make test-lowest run the quick tests with the lowest versions that pyproject.toml allows"
+	@echo "make notebooks  run examples/notebooks in a Jupyter kernel, in an environment of its own"
+	@echo "make licences  licences and SBOM of what is installed: build/licences.md, build/sbom.json"
 	@echo "make test-learners  train with every library of docs/how-to/learners.md, each outside $(VENV); goes on after a stop"
 	@echo "make test-rllib  train with RLlib on several Ray nodes of this machine, kill some, in an environment of its own"
 	@echo "make test-kills   end 20 trainings several times each, resume them, and compare them with uninterrupted ones"
@@ -76,23 +79,24 @@ git archive HEAD | tar -x -C "$$folder/git"; make_sdist='from setuptools import 
 endef
 
 # As users get it: in an empty folder, first with what the environments need alone; then each extra is missed, and comes.
+# benchmarks/wheel.py follows README, and runs the examples and every policy.
 test-wheel: install
-	@$(PACK); constraints=$$PWD/constraints.txt; $(PYTHON) -m venv "$$folder/venv"; PATH="$$folder/venv/bin:$$PATH"; \
+	@$(PACK); clone=$$PWD; $(PYTHON) -m venv "$$folder/venv"; PATH="$$folder/venv/bin:$$PATH"; \
 	pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$$folder" "$$folder"/*.tar.gz; \
-	add() { pip install --quiet --disable-pip-version-check --constraint "$$constraints" \
+	add() { pip install --quiet --disable-pip-version-check --constraint "$$clone/constraints.txt" \
 	  "springfoot$$1 @ file://$$(echo "$$folder"/*.whl)"; }; \
 	cd "$$folder/empty"; set -x; \
 	add; pip list --disable-pip-version-check; \
 	springfoot --version; python -W error -c 'import gymnasium as gym; \
 	  env = gym.make("springfoot.envs:SegmentedFootBiped-v0"); env.reset(seed=0); env.step(env.action_space.sample()); \
 	  envs = gym.make_vec("springfoot.envs:SegmentedFootBiped-v0", num_envs=4); envs.reset(seed=0)'; \
-	springfoot --help; springfoot study --help; \
+	springfoot; springfoot --help; springfoot study --help; \
 	springfoot evaluate pretrained 2>&1 | grep -F "pip install 'springfoot[evaluate]'"; \
 	add "[evaluate]"; \
 	springfoot evaluate pretrained --episodes 1; springfoot study compare schedule --quick; \
 	springfoot train --out runs/walk 2>&1 | grep -F "pip install 'springfoot[train]'"; \
-	add "[train]"; \
-	springfoot train --timesteps 20000 --out runs/walk; springfoot evaluate runs/walk --episodes 1; ls runs/*; \
+	add "[train,live,minari]"; \
+	MINARI_DATASETS_PATH=$$PWD python "$$clone/benchmarks/wheel.py" "$$clone/README.md"; ls runs/*; \
 	add "[onnx]"; \
 	springfoot export runs/walk --out walk.onnx; springfoot evaluate walk.onnx --episodes 1
 
@@ -100,6 +104,40 @@ test-wheel: install
 # --dry-run, which a test gives, that line would run.
 test-sdist: install
 	@$(PACK); tar -xf "$$folder"/*.tar.gz -C "$$folder/empty"; cd "$$folder"/empty/*; make test-all VENV=.venv
+
+# Of torch, of which old CPU builds are not to be had everywhere, the pinned version. Old libraries use what newer ones
+# have deprecated; NumPy 2.0 makes an error of its own of a signal while it is imported.
+test-lowest: build/lowest/installed
+	build/lowest/bin/python -m pytest --numprocesses auto --dist worksteal -m "not slow" -W ignore::DeprecationWarning \
+	  --deselect tests/files/test_locks.py::test_a_signal_at_the_start_is_one_line_and_leaves_nothing \
+	  tests/files tests/gait tests/envs tests/agents tests/evaluation tests/cli
+
+build/lowest/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv build/lowest
+	build/lowest/bin/pip install --disable-pip-version-check --constraint constraints.txt uv
+	build/lowest/bin/uv pip install --python build/lowest/bin/python --resolution lowest-direct \
+	  --override <(echo "torch ; sys_platform == 'never'") --editable ".[train,dev]"
+	build/lowest/bin/pip install --disable-pip-version-check --constraint <(grep '^torch==' constraints.txt) torch
+	@touch $@
+
+# Executed, never stored: notebooks stay without outputs.
+notebooks: build/notebooks/installed
+	build/notebooks/bin/jupyter-execute examples/notebooks/*.ipynb
+
+build/notebooks/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv build/notebooks
+	build/notebooks/bin/pip install --disable-pip-version-check --constraint constraints.txt --editable ".[evaluate]" \
+	  nbclient ipykernel
+	@touch $@
+
+licences: install build/licences/installed
+	build/licences/bin/pip-licenses --python $(BIN)/python --with-urls --format markdown --output-file build/licences.md
+	build/licences/bin/cyclonedx-py environment --pyproject pyproject.toml --output-file build/sbom.json $(BIN)/python
+
+build/licences/installed: constraints.txt
+	$(PYTHON) -m venv build/licences
+	build/licences/bin/pip install --disable-pip-version-check --constraint constraints.txt pip-licenses cyclonedx-bom
+	@touch $@
 
 test-learners: install build/learners/many/installed
 	$(BIN)/python -m benchmarks.learners

@@ -13,6 +13,7 @@ import tyro
 from springfoot.command_line import exit_code
 from springfoot.command_line import parse as parse_flags
 from springfoot.errors import SpringfootError
+from springfoot.files.json_file import read_object
 from springfoot.files.text_table import read_bytes
 from springfoot.files.writing import is_taken, whole_folder
 
@@ -34,7 +35,8 @@ def examples_main(arguments: Sequence[str], program: str = "springfoot examples"
 def run_examples(flags: ExamplesFlags) -> None:
     """Print the name and the first line of each example, of the copies if they are asked for."""
     source = Path(str(resources.files("springfoot.examples")))
-    programs = [path for path in sorted(source.rglob("*.py")) if path.name != "__init__.py"]
+    found = (path for ending in ("py", "ipynb") for path in source.rglob(f"*.{ending}"))
+    programs = [path for path in sorted(found) if path.name != "__init__.py"]
     if flags.copy is not None:
         if is_taken(flags.copy):
             raise SpringfootError(f"{flags.copy} exists already; give --copy a new folder")
@@ -45,5 +47,11 @@ def run_examples(flags: ExamplesFlags) -> None:
                 shutil.copyfile(path, copied)
     shown = flags.copy or Path("examples")
     for path in programs:
-        words = get_docstring(parse(read_bytes(path))) or ""
-        print(f"{shown / path.relative_to(source)}: {words.splitlines()[0]}")
+        print(f"{shown / path.relative_to(source)}: {_first_line(path)}")
+
+
+def _first_line(path: Path) -> str:
+    """Return the first line of a program's docstring, or the title of a notebook."""
+    if path.suffix == ".ipynb":
+        return read_object(path, "notebook")["cells"][0]["source"][0].strip("# \n")
+    return (get_docstring(parse(read_bytes(path))) or "").partition("\n")[0]

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springfoot import __version__
@@ -24,7 +25,7 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-HELP = """usage: springfoot {train,evaluate,live,export,study,datasets,examples,completion} ...
+HELP = f"""usage: springfoot {{train,evaluate,live,export,study,datasets,examples,completion}} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
@@ -35,7 +36,8 @@ HELP = """usage: springfoot {train,evaluate,live,export,study,datasets,examples,
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
   springfoot completion SHELL       print the tab completion of all flags for bash, zsh or tcsh
 
-Each takes --help; springfoot --version says which this is."""
+Each takes --help; springfoot --version says which this is.
+Pages that help names, docs/results/..., lie in {Path(__file__).parents[1]}."""
 
 STUDIES = {
     "compare": (

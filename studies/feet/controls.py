@@ -41,7 +41,7 @@ def _both(foot: dict[str, Any]) -> dict[str, Any]:
 
 BOTH_ANKLES = (50.0, 100.0, 150.0, 250.0, 500.0)
 """Stiffness of springs at both ankles [N m/rad]: those of Nuckols & Sawicki (2020), and twice their stiffest."""
-CONDITIONS: dict[str, dict[str, Any]] = {
+CONTROLS: dict[str, dict[str, Any]] = {
     UNCHANGED: {},
     SLACK: _both(_brace(ankle_stiffness=0.0)),
     **{f"spring {k:g} N·m/rad, both ankles": _both(_brace(ankle_stiffness=k)) for k in BOTH_ANKLES},
@@ -76,13 +76,13 @@ class Controls(WalkingStudy):
     @property
     def total(self) -> float:
         """Simulated seconds without falls."""
-        return len(CONDITIONS) * len(self._asked()) * self.episodes * self.seconds
+        return len(CONTROLS) * len(self._asked()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk under every condition."""
         walks = [
             {"condition": name, "speed_m_s": speed, **self.walk({**given, "speed": speed}, progress)}
-            for name, given in CONDITIONS.items()
+            for name, given in CONTROLS.items()
             for speed in self._asked()
         ]
         even = at_walked_speeds(walks, ("condition",), (0.9,) if self.quick else WALKED_SPEEDS)

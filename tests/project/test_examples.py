@@ -1,5 +1,6 @@
 """The examples run as their own words say, with short settings."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -38,13 +39,22 @@ def test_every_example_is_run_and_short():
     assert all(len(path.read_text().splitlines()) <= 60 for path in EXAMPLES.glob("*.py"))
 
 
+def test_notebooks_hold_no_results():
+    books = [json.loads(path.read_bytes()) for path in (EXAMPLES / "notebooks").iterdir()]
+    code = [cell for book in books for cell in book["cells"] if cell["cell_type"] == "code"]
+    assert len(books) == 2 and len(code) > 4
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
+
+
 def test_examples_are_copied_out_of_the_package_into_a_new_folder(tmp_path, capsys):
     copy = tmp_path / "mine"
     assert main(["examples", "--copy", str(copy)]) == 0
-    known = {path.relative_to(EXAMPLES) for path in EXAMPLES.rglob("*.*") if path.suffix in (".py", ".txt")}
+    known = {path.relative_to(EXAMPLES) for path in EXAMPLES.rglob("*.*") if path.suffix in (".py", ".txt", ".ipynb")}
     copied = {path.relative_to(copy): path.read_bytes() for path in copy.rglob("*.*")}
     assert copied == {path: (EXAMPLES / path).read_bytes() for path in known - {Path("__init__.py")}}
-    assert f"{copy / 'one_walk.py'}: One walk, step by step" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"{copy / 'one_walk.py'}: One walk, step by step" in said
+    assert f"{copy / 'notebooks' / 'first_walk.ipynb'}: A first walk\n" in said
     assert main(["examples", "--copy", str(copy)]) == 2
     error = f"springfoot examples: error: {copy} exists already; give --copy a new folder\n"
     assert capsys.readouterr().err == error

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 import setup
@@ -27,6 +28,7 @@ from springfoot.extras import EXTRA_OF
 ROOT = Path(__file__).parents[2]
 ROOMS = ("files", "gait", "envs", "agents", "evaluation", "studies", "cli", "examples")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+RECIPE = (ROOT / "recipes" / "recipe.yaml").read_text()
 EXTRAS = ("evaluate", "train", "dev")
 """Extras of `make install`."""
 
@@ -50,6 +52,7 @@ def run(code, cwd=None):
 def test_every_package_folder_is_listed():
     folders = {path.parent.as_posix() for path in files(*ROOMS) if path.name == "__init__.py"}
     expected = {"springfoot": "package"} | {"springfoot." + folder.replace("/", "."): folder for folder in folders}
+    expected["springfoot.docs.results"] = "docs/results"  # pages, no code
     listed = PROJECT["tool"]["setuptools"]
     assert listed["package-dir"] == expected
     assert sorted(listed["packages"]) == sorted(expected)
@@ -111,6 +114,7 @@ def test_source_distribution_holds_all_that_git_knows(sdist, known):
 def test_wheel_holds_every_file_of_the_rooms(wheel, known):
     packed = [name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name]
     ours = [name.removeprefix("package/") for name in known if name.partition("/")[0] in ("package", *ROOMS)]
+    ours += [name for name in known if re.fullmatch(r"docs/results/\w+\.md", name)]
     assert sorted(packed) == sorted(f"springfoot/{name}" for name in ours)
     assert "springfoot/py.typed" in packed
 
@@ -120,6 +124,18 @@ def test_the_version_stands_once(metadata, capsys):
     assert version("springfoot") == metadata["Version"] == springfoot.__version__
     assert main(["--version"]) == 0 and capsys.readouterr().out == f"springfoot {springfoot.__version__}\n"
     assert f"\nversion: {springfoot.__version__}\n" in (ROOT / "CITATION.cff").read_text()  # a format without imports
+    assert f"\n  version: {springfoot.__version__}\n" in RECIPE
+
+
+def test_the_conda_recipe_needs_what_the_wheel_needs():
+    theirs = {"matplotlib": "matplotlib-base", "mujoco": "mujoco-python"}
+    project = PROJECT["project"]
+    lines = map(Requirement, [*project["dependencies"], *project["optional-dependencies"]["evaluate"]])
+    needed = {theirs.get(one.name, one.name): one.specifier for one in lines}
+    needed["python"] = SpecifierSet(project["requires-python"])
+    run = re.findall(r"- (\S+) (\S+)\n", RECIPE.partition("\n  run:")[2].partition("tests:")[0])
+    assert {name: SpecifierSet(versions) for name, versions in run} == needed
+    assert f"setuptools {PROJECT['build-system']['requires'][0].removeprefix('setuptools')}\n" in RECIPE
 
 
 def test_a_release_has_an_address_and_says_what_changed():
@@ -252,6 +268,13 @@ def test_the_lock_has_the_pinned_version_and_the_hashes_of_all_but_torch(pins):
     lines = [*PROJECT["project"]["dependencies"], *(line for extra in EXTRAS for line in extras[extra])]
     names = {canonicalize_name(Requirement(line).name) for line in lines}
     assert names - versions.keys() == {"torch", "springfoot"}
+
+
+def test_the_citation_names_the_pinned_versions(pins):
+    software = re.findall(r"type: software\n    title: (.+)\n    version: (.+)\n", (ROOT / "CITATION.cff").read_text())
+    assert {title.lower(): number for title, number in software} == {
+        name: pins[name] for name in ("mujoco", "gymnasium", "stable-baselines3")
+    }
 
 
 def test_the_backend_that_builds_is_the_pinned_one(pins):

@@ -89,7 +89,8 @@ print(sum(whole.stats.cache_hits.values()), len(said))
 
 
 def alone(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    (folder / "alone.py").write_text(ALONE, encoding="utf-8")
+    if not (folder / "alone.py").exists():  # old numba takes a file written anew for a changed one
+        (folder / "alone.py").write_text(ALONE, encoding="utf-8")
     variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"} | environment
     command = [sys.executable, "-B", "-c", "import alone", *words]
     return subprocess.run(command, cwd=folder, env=variables, check=True, capture_output=True, text=True)

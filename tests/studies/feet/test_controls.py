@@ -3,7 +3,7 @@
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.studies.feet.controls import CONDITIONS, SLACK, STIFFEST, UNCHANGED, Controls, controls_table
+from springfoot.studies.feet.controls import CONTROLS, SLACK, STIFFEST, UNCHANGED, Controls, controls_table
 from springfoot.studies.feet.walked_speeds import at_walked_speeds
 
 
@@ -21,14 +21,14 @@ def test_differences_are_from_the_sound_walk_at_the_same_speed():
 @pytest.mark.slow
 def test_a_slack_device_costs_nothing_to_the_bit():
     study = Controls(episodes=2, seconds=8.0)
-    assert study.walk(CONDITIONS[SLACK]) == study.walk(CONDITIONS[UNCHANGED])
+    assert study.walk(CONTROLS[SLACK]) == study.walk(CONTROLS[UNCHANGED])
 
 
 @pytest.mark.slow
 def test_the_stiffest_spring_beside_a_sound_calf_saves_nothing():
     study = Controls(episodes=1, seconds=12.0)
     walks = [
-        {"condition": name, "speed_m_s": speed, **study.walk({**CONDITIONS[name], "speed": speed})}
+        {"condition": name, "speed_m_s": speed, **study.walk({**CONTROLS[name], "speed": speed})}
         for name in (UNCHANGED, STIFFEST)
         for speed in (0.8, 1.0, 1.2, 1.4, 1.6)
     ]
