@@ -35,12 +35,12 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
             print(HELP)
             return 0
         case [shell] if shell in get_args(Shell):
-            own_names = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
+            unprefixed = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
             tyro.cli(
                 _all_commands(installed_studies()),
                 prog="springfoot",
                 args=["--tyro-print-completion", shell],
-                config=own_names,
+                config=unprefixed,
             )
         case _:
             words = " ".join(arguments)
@@ -53,17 +53,17 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
 
 
 def _all_commands(studies: dict[str, Any]) -> Any:
-    """Return the type, a union for tyro, of all commands."""
+    """Return the type, a union for tyro, of all commands and studies."""
     commands = {}
-    for name, place in COMMANDS.items():
-        module, _, flags = place.partition(".")
+    for name, path in COMMANDS.items():
+        module, _, flags = path.partition(".")
         commands[name] = getattr(import_module(f"springfoot.cli.{module}"), flags)
     commands["study"] = make_dataclass("StudyCommand", [("study", _one_of(studies))])
     return _one_of(commands)
 
 
 def _one_of(commands: dict[str, Any]) -> Any:
-    """Return the union of types in which each is a command of its name."""
+    """Return the union of the flags' types, in which each is a command of its name."""
     return Union[  # noqa: UP007  (made at run time)
         tuple(Annotated[flags, tyro.conf.subcommand(name, prefix_name=False)] for name, flags in commands.items())
     ]

@@ -34,7 +34,7 @@ def datasets_main(arguments: Sequence[str] | None = None, program: str = "spring
 
 
 def run_datasets(flags: DatasetsFlags) -> None:
-    """Write the sets, and print what is in them."""
+    """Write the sets; print the number of episodes, steps and falls in each, and its mean return."""
     from springfoot.evaluation.recording.minari_sets import set_id, write_sets  # not above: help needs no simulator
 
     require_count("episodes", flags.episodes, 1, MOST_EPISODES)
@@ -42,10 +42,10 @@ def run_datasets(flags: DatasetsFlags) -> None:
     if not flags.sets or len(set(flags.sets)) < len(flags.sets):
         raise SpringfootError("give --sets each set once, of expert, medium and random")
     end_in_order()
-    told = write_sets(flags.sets, flags.episodes, flags.seed)
+    summaries = write_sets(flags.sets, flags.episodes, flags.seed)
     rows = [
         [set_id(name), str(row["episodes"]), f"{row['steps']:,}", f"{row['return_mean']:.0f}", str(row["falls"])]
-        for name, row in told.items()
+        for name, row in summaries.items()
     ]
     print(table(["set", "episodes", "steps", "mean return", "falls"], rows))
     print(f'\nNext:    python -c "import minari; print(minari.load_dataset({set_id(flags.sets[0])!r}))"')

@@ -73,7 +73,10 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
 
 
 def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> None:
-    """Evaluate, write the results, and print the tables and the folder of the results; the report names `command`."""
+    """Evaluate the policies one after another, write their results into one new folder, and print tables and folder.
+
+    `program` is the name in messages, `command` the command line that the report shows.
+    """
     for name, least, most in (("episodes", 1, MOST_COUNT), ("seed", 0, MOST_COUNT), ("threads", 1, MOST_THREADS)):
         require_count(name, getattr(flags, name), least, most)
     if not flags.policies:
@@ -104,8 +107,8 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     for _, environment in prepared:
         recording.require_recordable(environment, flags.episodes)
 
-    free = Path("runs", f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
-    with whole_folder(flags.out, free) as (folder, out):
+    default_out = Path("runs", f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
+    with whole_folder(flags.out, default_out) as (folder, out):
         walks = []
         written = set[str]()
         for label, (policy, environment) in zip(labels, prepared, strict=True):
@@ -119,16 +122,16 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                     threads=flags.threads,
                     progress=bar.update,
                 )
-            own = folder if len(labels) == 1 else folder / label
-            own.mkdir(exist_ok=own == folder)
+            policy_folder = folder if len(labels) == 1 else folder / label
+            policy_folder.mkdir(exist_ok=policy_folder == folder)
             with _bar(f"{label}, files", 1.0, delay=0.5) as bar:
                 gait = metrics.measure(episodes)
-                report.write_report(own, episodes, gait, bar.update)
+                report.write_report(policy_folder, episodes, gait, bar.update)
             if flags.film:
                 with _bar(f"{label}, film", film.film_seconds(episodes)) as bar:
-                    film.save_film(own / "walk.mp4", episodes, bar.update)
+                    film.save_film(policy_folder / "walk.mp4", episodes, bar.update)
             walks.append((episodes, gait))
-            written |= {path.name for path in own.iterdir()}
+            written |= {path.name for path in policy_folder.iterdir()}
         if flags.report:
             report_page.write_page(folder / "report.html", walks, command)
     if flags.json:
@@ -138,15 +141,15 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
         gait_table.print_table(gait.metrics)
     for name in flags.policies:
         if has_feedback(name):
-            walk_again = f"{program} {shlex.quote(f'{FROZEN}:{name}')}"
+            open_loop = f"{program} {shlex.quote(f'{FROZEN}:{name}')}"
             print()
-            gait_table.print_words(f"Its mean stiffness alone, open loop: {walk_again}, with the same flags")
+            gait_table.print_words(f"Its mean stiffness alone, open loop: {open_loop}, with the same flags")
     files = ", ".join(name for name in ("walk.mp4", *report.FILES) if name in written)
     if not any(name.startswith("finite_states") for name in written):
         print()
         gait_table.print_words("No finite_states.json: both feet have a device, whose stiffness no policy sets")
-    each = files if len(labels) == 1 else f"in each of the folders {', '.join(labels)}: {files}"
-    gait_table.print_results(out, [*["report.html"] * flags.report, each])
+    per_policy = files if len(labels) == 1 else f"in each of the folders {', '.join(labels)}: {files}"
+    gait_table.print_results(out, [*["report.html"] * flags.report, per_policy])
 
 
 def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
@@ -176,17 +179,17 @@ def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """Return names of the policies for the results: all different, in capitals or not, and different from the
-    page's."""
+    """Return a label for each policy, which names its folder: no two are equal, nor equal to the report's name, also
+    where capitals do not count."""
     from springfoot.evaluation.recording.policies import policy_label
 
     labels: list[str] = []
     taken = {"report.html"}
     for label in map(policy_label, names):
         number = 2
-        free = label
-        while free.casefold() in taken:
-            number, free = number + 1, f"{label}-{number}"
-        taken.add(free.casefold())
-        labels.append(free)
+        numbered = label
+        while numbered.casefold() in taken:
+            number, numbered = number + 1, f"{label}-{number}"
+        taken.add(numbered.casefold())
+        labels.append(numbered)
     return labels

@@ -33,7 +33,7 @@ def examples_main(arguments: Sequence[str], program: str = "springfoot examples"
 
 
 def run_examples(flags: ExamplesFlags) -> None:
-    """Print the name and the first line of each example, of the copies if they are asked for."""
+    """Copy the examples if a folder is given; print the path and the first line of each example or copy."""
     source = Path(str(resources.files("springfoot.examples")))
     found = (path for ending in ("py", "ipynb") for path in source.rglob(f"*.{ending}"))
     programs = [path for path in sorted(found) if path.name != "__init__.py"]

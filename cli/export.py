@@ -35,7 +35,7 @@ def export_main(arguments: Sequence[str] | None = None, program: str = "springfo
 
 
 def run_export(flags: ExportFlags) -> None:
-    """Export, and print the names of the files."""
+    """Export the policy, and print the names of the new files."""
     from springfoot.agents.policies.baselines import has_feedback
     from springfoot.agents.policies.export import export_policy, planned_files
     from springfoot.agents.policies.foreign import is_function

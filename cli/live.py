@@ -48,7 +48,7 @@ def live_main(arguments: Sequence[str], program: str = "springfoot live") -> int
 
 
 def run_live(flags: LiveFlags) -> None:
-    """Print the address, walk until the time is over, and print the shown pictures a second."""
+    """Print the page's address, walk until the time is over, and print how many pictures a second were shown."""
     require_count("seed", flags.seed, 0, MOST_COUNT)
     require_count("port", flags.port, 0, MOST_PORT)
     if flags.seconds is not None:

@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    """Run the command whose name comes first, or print help."""
+    """Run the command that the first word names, or print help; return the exit code."""
     try:
         match words:
             case ["train", *rest]:
@@ -124,7 +124,7 @@ def _run(words: list[str]) -> int:
             case ["--version"]:
                 print(f"springfoot {__version__}")
                 return 0
-    except KeyboardInterrupt:  # while it imports; the commands themselves end in good order
+    except KeyboardInterrupt:  # during imports; the commands handle it themselves
         return 130
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
@@ -141,7 +141,7 @@ def _run(words: list[str]) -> int:
 
 
 def study_main(arguments: Sequence[str]) -> int:
-    """Run the study whose name comes first; return 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143
+    """Run the study that the first argument names; return 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143
     SIGTERM."""
     name, *words = arguments or ["--help"]
     if name in ("-h", "--help"):
@@ -165,24 +165,24 @@ def study_main(arguments: Sequence[str]) -> int:
 
 def study_class(name: str) -> "type[Study]":
     """Return the class of one of `STUDIES`."""
-    module, _, found = STUDIES[name][0].rpartition(".")
-    return getattr(import_module(f"springfoot.studies.{module}"), found)
+    module, _, class_name = STUDIES[name][0].rpartition(".")
+    return getattr(import_module(f"springfoot.studies.{module}"), class_name)
 
 
 def _installed_studies() -> "dict[str, type[Study]]":
     """Return name -> class of the studies whose packages are installed."""
-    found = {}
+    classes = {}
     for name in STUDIES:
         try:
-            found[name] = study_class(name)
+            classes[name] = study_class(name)
         except ModuleNotFoundError as error:
             if error.name not in EXTRA_OF:
                 raise
-    return found
+    return classes
 
 
 def study_help() -> str:
-    """Return the help text of the studies."""
+    """Return the help text of `springfoot study`: usage, and each study with its question."""
     width = max(map(len, STUDIES))
     lines = (f"  {name:<{width}}  {question}" for name, (_, question) in STUDIES.items())
     return "\n".join(

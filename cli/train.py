@@ -69,7 +69,7 @@ def train_main(arguments: Sequence[str] | None = None, program: str = "train.py"
 
 
 def run_training(flags: TrainFlags) -> int:
-    """Train or continue a run, then print the folder of the results."""
+    """Check the flags, train or continue a run, and print its result and folder; return the exit code."""
     settings = given(flags.training) | given(flags.environment)
     from springfoot.agents.policies.policy import RUN  # here, as below: help and bad flags need no simulator
     from springfoot.agents.training.run_record import runs_within
@@ -81,8 +81,8 @@ def run_training(flags: TrainFlags) -> int:
             require_new(flags.out)
         except SpringfootError as error:
             runs = [flags.out] if (flags.out / RUN).is_file() else runs_within(flags.out)
-            further = f"; to continue a run, give {_likewise('--resume', runs)}" if runs else ""
-            raise SpringfootError(f"{error}{further}") from None
+            hint = f"; to continue a run, give {_for_folders('--resume', runs)}" if runs else ""
+            raise SpringfootError(f"{error}{hint}") from None
     if flags.num_env_runners is not None:
         if flags.engine != "rllib" and flags.out is not None:
             raise SpringfootError("--num-env-runners is of --engine rllib; give that, or drop it")
@@ -99,14 +99,14 @@ def run_training(flags: TrainFlags) -> int:
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
     if flags.resume:
         folder = flags.resume
-        record = _continued(flags, settings)
+        record = _resume(flags, settings)
     else:
         assert flags.out is not None
         config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
         if flags.seeds is not None:
             return run_seeds(config, flags.out, flags.seeds)
         folder = flags.out
-        record = _trained(flags, config)
+        record = _train(flags, config)
     interrupted = record["status"] == "interrupted"
     best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
@@ -114,21 +114,21 @@ def run_training(flags: TrainFlags) -> int:
         falls = f"{best['falls']} of {best['episodes']} episodes fell"
         print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
     print(f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard)")
-    print(f"Next:    springfoot evaluate {_word(folder)}")
+    print(f"Next:    springfoot evaluate {_quoted(folder)}")
     if interrupted:
-        print(f"Or:      springfoot train --resume {_word(folder)}")
+        print(f"Or:      springfoot train --resume {_quoted(folder)}")
     return stopped_by(record) if interrupted else 0
 
 
-def _trained(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
+def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
     """Train a new run with the engine asked for; return its record."""
     assert flags.out is not None
     if flags.engine == "rllib":
-        return _engine(of_rllib=True).train(config, flags.out, flags.num_env_runners)
-    return _engine(of_rllib=False).train(config, flags.out)
+        return _engine(rllib=True).train(config, flags.out, flags.num_env_runners)
+    return _engine(rllib=False).train(config, flags.out)
 
 
-def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
+def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
     """Continue a run with the engine that began it; return its record."""
     from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training.run_record import is_of_rllib, read_record
@@ -137,18 +137,18 @@ def _continued(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
     if (flags.resume / RUN).is_file() and is_of_rllib(read_record(flags.resume)):
         if "reward_weights" in settings:
             raise SpringfootError("--resume of a run of RLlib goes on with its reward; drop --reward-weights")
-        return _engine(of_rllib=True).resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
+        return _engine(rllib=True).resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
     if flags.num_env_runners is not None or flags.engine != "sb3":
         raise SpringfootError(f"{flags.resume} is no run of RLlib; drop --engine and --num-env-runners")
-    return _engine(of_rllib=False).resume(flags.resume, **settings)
+    return _engine(rllib=False).resume(flags.resume, **settings)
 
 
-def _engine(of_rllib: bool) -> Any:
-    """Import and return the module that trains, on Ray or here; from then on signals end it in good order.
+def _engine(rllib: bool) -> Any:
+    """Import and return the module that trains, with RLlib or stable-baselines3; let signals end it in good order.
 
     Not imported above: torch takes seconds, and bad flags need not wait for it.
     """
-    if of_rllib:
+    if rllib:
         with naming_extras():
             from springfoot.agents.training.cluster import rllib_training as module
     else:
@@ -158,7 +158,7 @@ def _engine(of_rllib: bool) -> Any:
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
-    """Train from several seeds, then print their agreement and the folders of the results."""
+    """Train from `count` seeds, and print a table with their spread and the folders; return the exit code."""
     from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training import multi_seed
 
@@ -167,25 +167,25 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     print(f"\n{multi_seed.training_table(record)}\n")
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
     print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
-    print(f"Next:    springfoot study compare {_word(out)}/seed-* --no-springs")
+    print(f"Next:    springfoot study compare {_quoted(out)}/seed-* --no-springs")
     folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
     if begun := [folder for folder in folders if (folder / RUN).is_file()]:
-        print(f"Or:      {_likewise('springfoot train --resume', begun)}")
+        print(f"Or:      {_for_folders('springfoot train --resume', begun)}")
     return {"finished": 0, "interrupted": stopped_by(record)}.get(record["status"], 1)
 
 
-def _likewise(words: str, folders: Sequence[Path]) -> str:
-    """Return a command for the first of several folders, and the names of the others."""
+def _for_folders(command: str, folders: Sequence[Path]) -> str:
+    """Return `command` for the first of several folders, followed by the names of the others."""
     others = ", ".join(folder.name for folder in folders[1:])
-    return f"{words} {_word(folders[0])}" + (f", then so with {others}" if others else "")
+    return f"{command} {_quoted(folders[0])}" + (f", then so with {others}" if others else "")
 
 
-def _word(folder: Path) -> str:
+def _quoted(folder: Path) -> str:
     """Return the name of a folder quoted for a shell."""
     return shlex.quote(str(folder))
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
-    """Return the preset, with the values given on the command line in place of its own."""
+    """Return the preset with values of the command line, `training` and `environment`, in place of its own."""
     settings = settings_from(**settings_to_json(preset.environment) | environment)
     return dataclasses.replace(preset, **training, environment=settings)

@@ -44,7 +44,8 @@ def leg_phase(observation: NDArray) -> NDArray:
 
 
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
-    """Hold one `stiffness` (ankle, toe) [N m/rad], given for 1.70 m and 63 kg and scaled with the body."""
+    """Return the policy of one constant `stiffness` (ankle, toe) [N m/rad], given for 1.70 m and 63 kg and scaled with
+    the body."""
     body = body_of(settings)
     require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
@@ -53,18 +54,20 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
 
 
 def untrained(settings: BipedSettings) -> PolicyFunction:
-    """Act as training starts: mean action 0, mid-range on the log scale, or in residual mode the fixed schedule."""
+    """Return the policy with which training starts: action 0, the middle of the stiffness range on its log scale, or
+    in residual mode the fixed schedule."""
     return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
 
 
 def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
-    """Draw every action from the whole range; one generator, seeded with `seed`, serves all calls."""
+    """Return the policy that draws every action from the whole range; one generator, seeded with `seed`, serves all
+    calls."""
     generator = np.random.default_rng(seed)
     return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
 
 
 def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
-    """Return a fixed stiffness over the stride, times `factor`: `settings.schedule`, or the schedule of the leg tuning.
+    """Return the policy of a stiffness schedule times `factor`: `settings.schedule`, else that of the leg tuning.
 
     The tuned schedule depends on the momentary commanded speed, and differs between the legs of a person who has
     adapted to a foot. Both scale with the body.
@@ -85,7 +88,8 @@ def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
-    """Return people's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and `TOE_STIFFNESS`, as K."""
+    """Return the policy whose K is people's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and
+    `TOE_STIFFNESS` at the toes."""
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)
     stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
@@ -100,17 +104,19 @@ def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: B
     """
     require_absolute(settings)
     froude = np.array([body.froude_speed(speed) for speed in speeds])
-    own = np.arange(len(SIDES))
-    each = stiffness if stiffness.ndim == 4 else np.stack([stiffness] * len(SIDES), 2)
-    table = PhaseTable(each.reshape(*each.shape[:2], -1))
+    legs = np.arange(len(SIDES))
+    of_legs = stiffness if stiffness.ndim == 4 else np.stack([stiffness] * len(SIDES), 2)
+    joints = of_legs.shape[-1]
+    table = PhaseTable(of_legs.reshape(*of_legs.shape[:2], -1))
 
     def policy(observation: NDArray) -> NDArray:
-        spot = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
-        place = np.zeros(len(spot), PLACE)
-        place["row"] = spot
-        place["weight"] = spot % 1.0
-        curves = table.at(leg_phase(observation), place).reshape(-1, *2 * [len(SIDES)], each.shape[-1])
-        action = action_of(curves[:, own, own], settings, body)
+        position = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))  # between the tabulated speeds
+        place = np.zeros(len(position), PLACE)
+        place["row"] = position
+        place["weight"] = position % 1.0
+        # (N, leg of the phase, leg of the stiffness, joint): each leg takes its own stiffness at its own phase.
+        curves = table.at(leg_phase(observation), place).reshape(-1, len(SIDES), len(SIDES), joints)
+        action = action_of(curves[:, legs, legs], settings, body)
         return action.reshape(len(observation), -1).astype(np.float32)
 
     return policy
@@ -155,7 +161,7 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
 
 
 def has_feedback(name: str) -> bool:
-    """Tell whether the named policy may decide by more than the phase.
+    """Return True if the named policy may decide by more than the phase.
 
     Baselines, open-loop copies and schedules in files have no feedback.
     """
@@ -163,12 +169,12 @@ def has_feedback(name: str) -> bool:
 
 
 def is_schedule_file(name: str) -> bool:
-    """Tell whether the name is that of a schedule file (`springfoot.agents.policies.schedules`)."""
+    """Return True if the name is that of a schedule file (`springfoot.agents.policies.schedules`)."""
     return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
 
 
 def and_copy(name: str) -> tuple[str, ...]:
-    """Return the policies of a table: the policy and, unless it has no feedback, its open-loop copy."""
+    """Return the name of a policy and, if it has feedback, of its open-loop copy (see `FROZEN`)."""
     return (name, f"{FROZEN}:{name}") if has_feedback(name) else (name,)
 
 

@@ -31,13 +31,14 @@ def policy_card(name: str) -> str:
         raise SpringfootError(f"no policy {name!r} in the package; there are {', '.join(SHIPPED)}")
     policy = read_policy(name)
     purpose, command, page = MADE.get(name) or _of_a_foot(name)
-    usual = settings_to_json(BipedSettings())
-    own = {key: value for key, value in settings_to_json(policy.settings).items() if value != usual[key]}
+    defaults = settings_to_json(BipedSettings())
+    changed = {key: value for key, value in settings_to_json(policy.settings).items() if value != defaults[key]}
+    differences = ", ".join(f"{key} {value}" for key, value in changed.items())
     lines = [
         f"made by: `{command}`",
         f"results and falls: docs/results/{page}.md",
         f"network: {' - '.join(map(str, policy.layer_sizes))}, {policy.activation}; observations to four stiffnesses",
-        f"settings of its training, where not the defaults: {', '.join(f'{key} {own[key]}' for key in own) or 'none'}",
+        f"settings of its training, where not the defaults: {differences or 'none'}",
         f"limits: {SHARED_LIMITS}",
         f"SHA-256: `{sha256(read_bytes(find_policy(name))).hexdigest()}`",
     ]
@@ -45,7 +46,7 @@ def policy_card(name: str) -> str:
 
 
 def _of_a_foot(name: str) -> tuple[str, str, str]:
-    """Return purpose, command and page of a policy KIND-SEARCH-SEED."""
+    """Return purpose, command and page (as in `MADE`) of a policy KIND-SEARCH-SEED, one of `OF_FEET`."""
     kind, search, seed = name.split("-")
     purpose = f"Walks with a {kind} right foot, found by search {search}, to which the person has adapted; seed {seed}."
     return purpose, "springfoot study prosthesis --train --policies FOLDER", "feet"

@@ -26,7 +26,7 @@ NEVER_VARIED = 1e-6
 """Variance below which an entry of the observation counts as constant in training [unit squared]; entries that vary
 have more than 1e-5."""
 IGNORED = 1e12
-"""Variance that a constant entry gets in the policy, so that it does not reach the network."""
+"""Variance that a constant entry gets in the policy: it is divided by the root and so has no effect."""
 
 Layers = Sequence[tuple[Any, Any]]
 """Weight (outputs, inputs) and bias (outputs,) or None of each layer, from the observation to the action: arrays, or
@@ -48,9 +48,9 @@ def policy_from_mlp(
 
     Args:
         layers: weight (outputs, inputs) and bias (outputs,) of each layer, in torch's orientation; a bias may be None.
-        settings: of the training's environment, as its `settings` or as keyword arguments.
-        activation: between the layers: tanh, relu, leaky_relu (slope 0.01), elu (alpha 1) or silu.
-        output: bounds the last layer's output to [-1, 1]: clip (as PPO) or tanh (as SAC).
+        settings: settings of the training's environment, as its `settings` or as keyword arguments.
+        activation: function between the layers: tanh, relu, leaky_relu (slope 0.01), elu (alpha 1) or silu.
+        output: function that bounds the last layer's output to [-1, 1]: clip (as PPO) or tanh (as SAC).
         observation_mean: (D,) mean subtracted from observations in training; None if they were not normalised.
         observation_variance: (D,) variance whose root divided observations in training.
         observation_clip: largest magnitude of a normalised observation; None for no limit.
@@ -107,8 +107,8 @@ def policy_from_sb3(
     """Return the mean action of a stable-baselines3 model with an MLP policy: of PPO, A2C, TRPO, SAC, TQC, TD3 or DDPG.
 
     Args:
-        model: the model; its environment, if it has one, knows `settings` and `normalizer`.
-        settings: of the training's environment, if the model has no environment of springfoot's.
+        model: the model; from its environment, if it has one, come `settings` and `normalizer` unless given.
+        settings: settings of the training's environment, needed if the model has no environment of springfoot's.
         normalizer: the `VecNormalize` of the training, if the model's environment is not inside it.
         ignore_unvaried: leave entries of the observation that never varied in training (body, commanded speed) out of
             the action, as train.py does; their weights are still random, and other bodies and speeds would meet them.
@@ -141,15 +141,16 @@ def policy_from_sb3(
 
 
 def ignoring_unvaried(policy: Policy) -> Policy:
-    """Return the policy without the entries of the observation that never varied in training."""
+    """Return the policy with the observation entries that never varied in training left out of its action."""
     variance = np.where(policy.observation_variance < NEVER_VARIED, IGNORED, policy.observation_variance)
     return replace(policy, observation_variance=variance)
 
 
 def actor_of(network: Any) -> tuple[Layers, str, Output]:
-    """Return layers, activation and output of the actor in a stable-baselines3 policy.
+    """Return the layers, the activation between them and the output function of a stable-baselines3 policy's actor.
 
-    Raises `SpringfootError` for other networks than a plain MLP.
+    The flattened actor must read Linear, activation, Linear, …, Linear, with one kind of activation. Raises
+    `SpringfootError` for any other network.
     """
     if hasattr(network, "lstm_actor"):
         raise SpringfootError("a recurrent policy has a memory; a policy of springfoot sees one observation only")
@@ -165,24 +166,23 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
     leaves = [leaf for part in parts for leaf in part.modules() if not list(leaf.children())]
     kinds = [type(leaf).__name__ for leaf in leaves]
     if not hasattr(actor, "latent_pi") and output == "tanh" and kinds[-1:] == ["Tanh"]:
-        leaves = leaves[:-1]
-        kinds = kinds[:-1]  # the output, a module of its own there
+        leaves = leaves[:-1]  # in TD3 and DDPG the output function is a module too
+        kinds = kinds[:-1]
     names = {kind: name for name, kind in TORCH_NAMES.items()}
-    linear = kinds[::2]
-    between = set(kinds[1::2]) or {"Tanh"}
-    if len(kinds) % 2 == 0 or set(linear) != {"Linear"} or len(between) > 1 or not between <= set(names):
+    activations = set(kinds[1::2]) or {"Tanh"}  # a single layer has none: any name does
+    if len(kinds) % 2 == 0 or set(kinds[::2]) != {"Linear"} or len(activations) > 1 or not activations <= set(names):
         raise SpringfootError(
             f"its actor is {', '.join(kinds)}: no layers with one activation between them, of {', '.join(ACTIVATIONS)}"
         )
     for leaf in leaves[1::2]:
         if (getattr(leaf, "negative_slope", 0.01), getattr(leaf, "alpha", 1.0)) != (0.01, 1.0):
             raise SpringfootError(f"its activation {leaf} is not of the default slope")
-    return [(layer.weight, layer.bias) for layer in leaves[::2]], names[between.pop()], output
+    return [(layer.weight, layer.bias) for layer in leaves[::2]], names[activations.pop()], output
 
 
 def statistics_of(normalizer: Any) -> dict[str, Any]:
-    """Return the normalisation of a `VecNormalize` as keyword arguments of `policy_from_mlp`; {} if it does not
-    normalise."""
+    """Return the statistics of a `VecNormalize` as keyword arguments of `policy_from_mlp`; {} for None, or if it does
+    not normalise observations."""
     if normalizer is None or not normalizer.norm_obs:
         return {}
     return {
@@ -202,8 +202,8 @@ def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDA
         name = f"layer {index}"
         w = _array(f"{name}: weight", weight)
         if w.ndim != 2 or w.shape[1] != inputs:
-            what = "the observation's entries" if index == 0 else "the outputs of the layer before"
-            raise SpringfootError(f"{name}: weight must be (outputs, {inputs}), {what}, is {w.shape}")
+            source = "the observation's entries" if index == 0 else "the outputs of the layer before"
+            raise SpringfootError(f"{name}: weight must be (outputs, {inputs}), {source}, is {w.shape}")
         b = np.zeros(len(w), w.dtype) if bias is None else _array(f"{name}: bias", bias)
         if b.shape != (len(w),):
             raise SpringfootError(f"{name}: bias must be ({len(w)},), is {b.shape}")
@@ -216,7 +216,7 @@ def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDA
 
 
 def _array(name: str, value: Any) -> NDArray:
-    """Return a copy of an array or of a torch tensor, float32 or float64; `SpringfootError` if it is not finite."""
+    """Return a copy of an array or torch tensor as float32 or float64; raise `SpringfootError` if it is not finite."""
     try:
         array = np.array(value.detach().cpu().numpy() if hasattr(value, "detach") else value)
         array = array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)

@@ -1,7 +1,6 @@
 """Export policies: one ONNX file that runs without springfoot, and its contract in JSON.
 
-The contract describes inputs and outputs, with names, units, order and bounds; its scale, `scale_of`, is part of the
-graph too. Neither file tells where or when it was made.
+The contract describes inputs and outputs: names, units, order and bounds. Neither file tells where or when it was made.
 """
 
 import json
@@ -38,7 +37,7 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
     """Write a policy as an ONNX file for use without springfoot; return the new files.
 
     Args:
-        policy: of this version (`read_policy`).
+        policy: policy of this version, from `read_policy`.
         out: new file, ending in .onnx. Beside it appears its contract, OUT.json.
 
     The graph takes the raw observation (N, D) and returns the action (N, 4) and the stiffness it sets (`Scale`) in
@@ -74,7 +73,7 @@ PACKAGES = ("springfoot", "mujoco", "numpy")
 
 
 class Scale(NamedTuple):
-    """Scale of the second output of an exported policy: middle x factor^action, of the deciding actions.
+    """Second output of an exported policy, the meaning of its actions: middle x factor^action for each set joint.
 
     In absolute mode the output is `stiffness` [N m/rad] of the body of 1.70 m and 63 kg; in residual mode, where an
     action is a factor on the schedule, `stiffness_factor` [-].
@@ -85,7 +84,8 @@ class Scale(NamedTuple):
     unit: str
     """Its unit."""
     joints: list[int]
-    """Indices of the deciding actions: without a joint that `stiffness_joints` leaves out, and without devices."""
+    """Indices of the actions that have an effect: none of a joint that `stiffness_joints` leaves out, or of a
+    device."""
     middle: NDArray
     """(joints,) output at action 0."""
     factor: NDArray
@@ -93,7 +93,7 @@ class Scale(NamedTuple):
 
 
 def scale_of(settings: BipedSettings) -> Scale:
-    """Return the scale that the actions of a policy with these settings set."""
+    """Return the `Scale` by which a policy's actions become stiffnesses in an environment of these settings."""
     joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
         return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
@@ -102,7 +102,7 @@ def scale_of(settings: BipedSettings) -> Scale:
 
 
 def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
-    """Return two float32 numbers whose sum is `value` to twice their precision.
+    """Return two float32 arrays whose sum is the float64 `value` to twice float32's precision.
 
     float32 alone is too coarse: an observation's mean can be 1,000 times its standard deviation.
     """
@@ -113,7 +113,7 @@ def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
 def contract_of(policy: Policy) -> dict[str, Any]:
     """Return the contract of a policy, as plain JSON values; docs/how-to/policies.md explains its entries."""
     settings = policy.settings
-    scale = scale_of(policy.settings)
+    scale = scale_of(settings)
     header = policy.header
     bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
     contract = {
@@ -156,20 +156,20 @@ def contract_of(policy: Policy) -> dict[str, Any]:
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
-    """Return the schedule that a residual action multiplies, at each percent of the leg's stride, by speed.
+    """Return the schedule that a residual action multiplies, for each speed at each percent of the leg's stride.
 
-    It is of the body of the contract. For a person who has adapted to a foot, `right` is the right leg's schedule.
+    It is that of the body of the contract. For a person who has adapted to a foot, `right` is the right leg's schedule.
     """
     left, right = walks_of_legs(settings)
-    found = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
-    return found | {"right": _curves(settings, right)} if right else found
+    schedule = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
+    return schedule | {"right": _curves(settings, right)} if right else schedule
 
 
 def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str, list[list[float]]]:
     """Return ankle and toe K [N m/rad] of the body of 1.70 m and 63 kg, at each percent of the stride, for each
     speed."""
-    unit = body_of(settings).stiffness_scale
-    curves = [foot_curves(settings, constants, walk)[1][::SCHEDULE_STEP] / unit for constants, walk in rows(walks)]
+    scale = body_of(settings).stiffness_scale
+    curves = [foot_curves(settings, constants, walk)[1][::SCHEDULE_STEP] / scale for constants, walk in rows(walks)]
     table = np.round(np.stack(curves), 6)
     return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}
 
@@ -181,9 +181,9 @@ OPERATORS = {"tanh": "Tanh", "relu": "Relu", "leaky_relu": "LeakyRelu", "elu": "
 
 
 def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
-    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, 4) and that of `scale`.
+    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, 4) and `scale.name`.
 
-    The metadata holds `contract`.
+    The graph computes `Policy.__call__` in float32, then `scale`. The metadata holds `contract`.
     """
     import onnx  # an extra of its own
     from onnx import helper, numpy_helper
@@ -191,6 +191,7 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     nodes: list[Any] = []
     constants: list[Any] = []
 
+    # Each of the three adds to the graph and returns the name of its output.
     def constant(value: ArrayLike, dtype: type = np.float32) -> str:
         constants.append(numpy_helper.from_array(np.array(value, dtype, order="C"), f"constant_{len(constants)}"))
         return constants[-1].name
@@ -202,8 +203,8 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     def clip(x: str, limit: float, name: str = "") -> str:
         return node("Clip", x, constant(-limit), constant(limit), name=name)
 
-    mean, rest = two_floats(policy.observation_mean)
-    x = node("Sub", node("Sub", "observation", constant(mean)), constant(rest))
+    mean, mean_remainder = two_floats(policy.observation_mean)
+    x = node("Sub", node("Sub", "observation", constant(mean)), constant(mean_remainder))
     x = node("Div", x, constant(policy.observation_deviation))
     if policy.observation_clip is not None:
         x = clip(x, policy.observation_clip)
@@ -219,11 +220,12 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     power = node("Pow", constant(scale.factor), node("Gather", action, constant(scale.joints, np.int64), axis=1))
     node("Mul", constant(scale.middle), power, name=scale.name)
 
-    def value(name: str, width: int) -> Any:
+    def float_rows(name: str, width: int) -> Any:
         return helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, ["N", width])
 
-    outputs = [value("action", policy.layer_sizes[-1]), value(scale.name, len(scale.joints))]
-    graph = helper.make_graph(nodes, "springfoot", [value("observation", policy.layer_sizes[0])], outputs, constants)
+    inputs = [float_rows("observation", policy.layer_sizes[0])]
+    outputs = [float_rows("action", policy.layer_sizes[-1]), float_rows(scale.name, len(scale.joints))]
+    graph = helper.make_graph(nodes, "springfoot", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "springfoot"
     helper.set_model_props(model, {CONTRACT_KEY: contract})

@@ -20,29 +20,32 @@ _MODEL_NUMBERS = (
     *("dof_armature", "geom_size", "geom_pos", "pair_friction", "pair_solref", "pair_solreffriction", "pair_solimp"),
     "actuator_gainprm",
 )
+"""Arrays of the compiled model that decide how the body moves."""
+_EVERY = 50
+"""Samples of a curve between two that are digested."""
 
 
 def fingerprint(biped: Biped) -> dict[str, str]:
     """Return SHA-256 digests of the `observation`, the `action`, the compiled `model`, and the `legs`.
 
-    The legs are the constants of hips, knees and foot springs, and the target curves, at every tabulated speed; the
+    `legs` digests the constants of hips, knees and foot springs, and the target curves, at every tabulated speed; the
     planned position of the CoM counts if a gain reads it. Numbers count to six significant digits, so that compilers
     and processors agree.
     """
     model = biped.model
-    probe = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
-    numbers: list[Any] = []
-    for legs, walk in (*rows(biped.walks), *rows(biped.right_walks)):
-        read = slice(None) if legs.swing_place_gain else slice(PLANNED_PLACE)
-        curves = (leg_curves(legs, walk)[:, read], *foot_curves(biped.settings, legs, walk))
-        numbers += [*_used(legs).values(), *(curve[::50] for curve in curves)]
-        if (feed := foot_feed(biped.settings, legs, walk)) is not None:
-            numbers.append(feed[::50])
+    actions = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
+    of_legs: list[Any] = []
+    for constants, walk in (*rows(biped.walks), *rows(biped.right_walks)):
+        columns = slice(None) if constants.swing_place_gain else slice(PLANNED_PLACE)  # from there the CoM's position
+        curves = (leg_curves(constants, walk)[:, columns], *foot_curves(biped.settings, constants, walk))
+        of_legs += [*_used(constants).values(), *(curve[::_EVERY] for curve in curves)]
+        if (feed := foot_feed(biped.settings, constants, walk)) is not None:
+            of_legs.append(feed[::_EVERY])
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
-        "action": _digest(biped.action_names, stiffness_of(probe, biped.settings, biped.body)),
+        "action": _digest(biped.action_names, stiffness_of(actions, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
-        "legs": _digest(_used(biped.constants[0]), *numbers),
+        "legs": _digest(_used(biped.constants[0]), *of_legs),
     }
 
 

@@ -62,17 +62,17 @@ class ForeignPolicy:
     name: str
     """Name in errors."""
     settings: BipedSettings
-    """Settings of its task: of its contract, of the function's attribute `settings`, or the defaults."""
+    """Settings of its task: from its contract or the function's attribute `settings`, else the defaults."""
     width: int
     """Entries D of an observation."""
     act: Callable[[NDArray], Any]
     """Function of float32 observations (N, D) that returns actions (N, 4), which are clipped to [-1, 1]."""
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Actions (N, 4) in [-1, 1] for observations (N, D)."""
+        """Return actions (N, 4) in [-1, 1] for observations (N, D)."""
         rows = observation_rows(observation, self.width).astype(np.float32)
         batch = np.atleast_2d(rows)
-        with _ending_nothing(self.name):
+        with _only_ordinary_errors(self.name):
             returned = self.act(batch)
         if np.iscomplexobj(returned):
             raise SpringfootError(f"{self.name} must return real actions, returned complex ones")
@@ -90,13 +90,13 @@ class ForeignPolicy:
 
 
 def onnx_policy(path: Path) -> ForeignPolicy:
-    """Return the policy in an ONNX file, run by onnxruntime: one input, the raw observation; `action` or the first
-    output.
+    """Return the policy in an ONNX file, run by onnxruntime.
 
-    The input is (N, D), (1, D) or (D,), of float32 or float64. Its settings are those of the contract beside it, else
-    of the contract inside it (exported policies carry one), else the defaults. Raises `SpringfootError`, one line,
-    without onnxruntime, for a file that it does not run within the bounds of `onnx_process`, for other widths, and for
-    a contract that is wrong or of another version of the environment.
+    The file has one input, the raw observation (N, D), (1, D) or (D,) in float32 or float64; the output `action`, else
+    the first one, is the action. The policy's settings are those of the contract beside the file, else of the contract
+    inside it (exported policies carry one), else the defaults. Raises `SpringfootError`, one line, if onnxruntime is
+    missing, for a file that it does not run within the bounds of `onnx_process`, for other widths, and for a contract
+    that is malformed or of another version of the environment.
     """
     try:
         import onnx  # noqa: F401  # not above: an extra
@@ -107,32 +107,32 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     inputs = session.get_inputs()
     outputs = [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
-        names = ", ".join(each.name for each in inputs) or "none"
+        names = ", ".join(node.name for node in inputs) or "none"
         raise SpringfootError(f"{path} has the inputs {names}; a policy has one, the observation")
-    (given,) = inputs
-    if given.type not in INPUT_TYPES:
-        raise SpringfootError(f"{path}: its input must be of float32 or float64, is {given.type}")
-    biped = _asked_by(path, session.get_modelmeta().custom_metadata_map.get(CONTRACT_KEY))
+    (node,) = inputs
+    if node.type not in INPUT_TYPES:
+        raise SpringfootError(f"{path}: its input must be of float32 or float64, is {node.type}")
+    biped = _environment_of(path, session.get_modelmeta().custom_metadata_map.get(CONTRACT_KEY))
     width = len(biped.observation_names)
-    if len(given.shape) not in (1, 2) or (isinstance(given.shape[-1], int) and given.shape[-1] != width):
-        raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, given.shape))})")
+    if len(node.shape) not in (1, 2) or (isinstance(node.shape[-1], int) and node.shape[-1] != width):
+        raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, node.shape))})")
     if len(failed) < len(FORMS):
         session, failed = onnx_session(path, _first_observations(biped))
     if len(failed) == len(FORMS):
         raise SpringfootError(f"{path} fails on observations (2, {width}): {failed[FORMS[0]]}")
     output = "action" if "action" in outputs else outputs[0]
-    dtype = INPUT_TYPES[given.type]
+    dtype = INPUT_TYPES[node.type]
 
     def act(observation: NDArray) -> Any:
         if (reason := failed.get(form(observation))) is not None:
             raise SpringfootError(reason)
-        return session.run([output], {given.name: np.ascontiguousarray(observation, dtype)})[0]
+        return session.run([output], {node.name: np.ascontiguousarray(observation, dtype)})[0]
 
-    return _probed(str(path), act, biped)
+    return _accepted(str(path), act, biped)
 
 
 def is_function(name: str) -> bool:
-    """Tell whether a policy's name has the form `module:function` and is not a file's."""
+    """Return True if a policy's name has the form `module:function` and is not that of a file."""
     return re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name) is not None and not Path(name).exists()
 
 
@@ -146,7 +146,7 @@ def function_policy(name: str) -> ForeignPolicy:
     module_name, _, function_name = name.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
-    with _ending_nothing(name):
+    with _only_ordinary_errors(name):
         try:
             module = import_module(module_name)
         except Exception as error:  # whatever the user's module raises
@@ -159,16 +159,16 @@ def function_policy(name: str) -> ForeignPolicy:
         except Exception as error:  # whatever the user's properties raise
             raise SpringfootError(f"{name}: its settings: {one_line(error)}") from None
         if not callable(function):
-            place = getattr(module, "__file__", None) or "it"
-            raise SpringfootError(f"{name}: module {module_name} has no function {function_name} ({place})")
-        return _probed(name, function, Biped(settings or BipedSettings(), 1))
+            file = getattr(module, "__file__", None) or "it"
+            raise SpringfootError(f"{name}: module {module_name} has no function {function_name} ({file})")
+        return _accepted(name, function, Biped(settings or BipedSettings(), 1))
 
 
 @contextmanager
-def _ending_nothing(name: str) -> Iterator[None]:
-    """Raise `SpringfootError` where a user's code ends Python, or raises what is no `Exception`.
+def _only_ordinary_errors(name: str) -> Iterator[None]:
+    """Raise `SpringfootError` if a user's code calls `sys.exit` or raises another error that is no `Exception`.
 
-    Either would end our command without a word.
+    Either would end our command without a message. Ctrl-C passes.
     """
     try:
         yield
@@ -180,8 +180,9 @@ def _ending_nothing(name: str) -> Iterator[None]:
         raise SpringfootError(f"{name} raises {type(error).__name__}: a policy must return actions") from None
 
 
-def _asked_by(path: Path, inside: str | None) -> Biped:
-    """Return the environment of the contract beside the file, else of the contract inside it, else the default one."""
+def _environment_of(path: Path, inside: str | None) -> Biped:
+    """Return the environment that an ONNX file was made for, by the contract beside it, else by the text of the
+    contract `inside` it; the default one without a contract."""
     beside = contract_path(path)
     if inside is None and not beside.is_file():
         return Biped(BipedSettings(), 1)
@@ -191,8 +192,8 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
         biped = Biped(settings_from(**contract["settings"]), 1)
         stored = None if contract.get("fingerprint") is None else dict(contract["fingerprint"])
     except (KeyError, TypeError, ValueError, RecursionError) as error:
-        what = f"has no {error}" if isinstance(error, KeyError) else f"is not a contract: {one_line(error)}"
-        raise SpringfootError(f"{name} {what}") from None
+        fault = f"has no {error}" if isinstance(error, KeyError) else f"is not a contract: {one_line(error)}"
+        raise SpringfootError(f"{name} {fault}") from None
     if stored is not None:
         require_same(path, stored, fingerprint(biped))
     return biped
@@ -200,33 +201,38 @@ def _asked_by(path: Path, inside: str | None) -> Biped:
 
 def _first_observations(biped: Biped) -> NDArray:
     """Return the first observations (2, D) of two episodes, float32."""
-    found = []
+    observations = []
     for seed in range(2):
         biped.reset(np.array([0]), [seed])
-        found.append(biped.observe()[0])
-    return np.stack(found)
+        observations.append(biped.observe()[0])
+    return np.stack(observations)
 
 
-def _probed(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
-    """Return the policy of `act`; two first observations show whether it takes (N, D), (1, D) or (D,)."""
-    probe = _first_observations(biped)
-    count = len(biped.action_names)
-    width = probe.shape[1]
-    wrong = ""
+def _accepted(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
+    """Return the policy of a function `act` that takes (N, D), (1, D) or (D,): the first form that works.
+
+    Tries each form on first observations of two episodes. Raises `SpringfootError` if none returns finite actions.
+    """
+    observations = _first_observations(biped)
+    actions = len(biped.action_names)
+    width = observations.shape[1]
+    wrong_shape = ""
     failed = ""
-    for take, given, wanted in (
-        (act, probe, (2, count)),
-        (lambda rows: np.concatenate([act(row[None]) for row in rows]), probe[:1], (1, count)),
-        (lambda rows: np.stack([act(row) for row in rows]), probe[0], (count,)),
+    for act_on_rows, argument, expected in (
+        (act, observations, (2, actions)),
+        (lambda rows: np.concatenate([act(row[None]) for row in rows]), observations[:1], (1, actions)),
+        (lambda rows: np.stack([act(row) for row in rows]), observations[0], (actions,)),
     ):
         try:
-            found = np.shape(act(given))
+            shape = np.shape(act(argument))
         except Exception as error:  # whatever the user's function raises
-            failed = failed or f"{name} fails on observations {given.shape}: {one_line(error)}"
+            failed = failed or f"{name} fails on observations {argument.shape}: {one_line(error)}"
             continue
-        if found == wanted:
-            policy = ForeignPolicy(name=name, settings=biped.settings, width=width, act=take)
-            policy(probe)  # raises for what is not finite
+        if shape == expected:
+            policy = ForeignPolicy(name=name, settings=biped.settings, width=width, act=act_on_rows)
+            policy(observations)  # raises for actions that are not finite
             return policy
-        wrong = wrong or f"{name} must return actions {wanted} for observations {given.shape}, returned {found}"
-    raise SpringfootError(wrong or failed)
+        wrong_shape = wrong_shape or (
+            f"{name} must return actions {expected} for observations {argument.shape}, returned {shape}"
+        )
+    raise SpringfootError(wrong_shape or failed)

@@ -16,16 +16,19 @@ _MOMENTS = frozenset({"step", "exp_avg", "exp_avg_sq"})
 
 
 def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
-    """Raise `SpringfootError` for a tensor, known by its name, with numbers that no training makes."""
+    """Raise `SpringfootError` for numbers that no training makes, by the kind of tensor that its name tells.
+
+    `path` is the file, or another subject of the error.
+    """
     for name, values in tensors.items():
         bounds = _bounds(name)
         if bounds is not None and values.size:
             low, high = bounds
             least = float(values.min())
             most = float(values.max())
-            if not low <= least <= most <= high:
-                wrong = least if not least >= low else most
-                raise SpringfootError(f"{path}: {name} must be in [{low:g}, {high:g}], has {wrong:.4g}")
+            if not low <= least <= most <= high:  # so that NaN is refused too
+                outside = least if not least >= low else most
+                raise SpringfootError(f"{path}: {name} must be in [{low:g}, {high:g}], has {outside:.4g}")
 
 
 def _bounds(name: str) -> tuple[float, float] | None:
@@ -43,7 +46,7 @@ def _bounds(name: str) -> tuple[float, float] | None:
 
 def require_moments(path: object, names: Mapping[str, object], parameters: int) -> None:
     """Raise `SpringfootError` unless Adam's moments exist for all `parameters`, or for none."""
-    found = {name for name in names if name.startswith("adam.")}
-    wanted = {f"adam.{index}.{item}" for index in range(parameters) for item in _MOMENTS}
-    if found and (missing := sorted(wanted - found)):
+    present = {name for name in names if name.startswith("adam.")}
+    expected = {f"adam.{index}.{item}" for index in range(parameters) for item in _MOMENTS}
+    if present and (missing := sorted(expected - present)):
         raise SpringfootError(f"{path} has no {missing[0]}")

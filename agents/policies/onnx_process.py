@@ -19,7 +19,7 @@ INPUT_TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 FORMS = ("(N, D)", "(1, D)", "(D,)")
 """Shapes in which an observation is given: several, the only row, alone."""
 REFUSED = {"Loop", "RandomNormal", "RandomNormalLike", "RandomUniform", "RandomUniformLike", "Multinomial", "Bernoulli"}
-"""Operators that no policy needs, and with which a run says nothing about the time and the memory of the next."""
+"""Operators that no policy needs, and with which two runs may take different time and memory."""
 
 _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
@@ -31,23 +31,22 @@ def form(observation: NDArray) -> str:
 
 
 def onnx_session(path: Path, observations: NDArray) -> tuple[Any, dict[str, str]]:
-    """Return onnxruntime's session of a file, and the reasons why it does not take `observations` (N, D), by `form`.
+    """Return onnxruntime's session of a file, and the `form`s of `observations` (N, D) that it fails on, with reasons.
 
-    A child process opens the file and runs it on them first: the time and the memory that a graph takes may depend on
-    the numbers that it is given. Raises `SpringfootError` for a file that onnxruntime does not open, or not within the
-    bounds.
+    A child process with bounded time and memory opens the file and runs it on the observations first, as both may
+    depend on the numbers. Raises `SpringfootError` for a file that onnxruntime does not open, or not within the bounds.
     """
     if (size := path.stat().st_size) > MOST_ONNX_BYTES:
         raise SpringfootError(f"{path} must have at most {MOST_ONNX_BYTES:,} bytes, has {size:,}")
-    said = output_in_process(_CHILD, str(path.absolute()), json.dumps(np.asarray(observations, float).tolist()))
-    if said is None:
+    output = output_in_process(_CHILD, str(path.absolute()), json.dumps(np.asarray(observations, float).tolist()))
+    if output is None:
         raise SpringfootError(
             f"{path} is damaged: onnxruntime crashed on it, or took over {MOST_SECONDS} s or {MOST_MEMORY // 2**20} MiB"
         )
-    found = json.loads(said)
-    if found["refused"]:
-        raise SpringfootError(f"{path} is not an ONNX file that onnxruntime runs: {found['refused']}")
-    return _session(path), found["fails"]
+    result = json.loads(output)
+    if result["refused"]:
+        raise SpringfootError(f"{path} is not an ONNX file that onnxruntime runs: {result['refused']}")
+    return _session(path), result["fails"]
 
 
 def _session(path: Path) -> Any:
@@ -56,45 +55,46 @@ def _session(path: Path) -> Any:
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # more would compete with the physics'
-    options.log_severity_level = 4  # errors are raised, and told
+    options.log_severity_level = 4  # fatal only: errors are raised anyway
     return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
 
 
 def main() -> None:
-    """Run the child: open the file that the command line names, run it once, print the reason if it failed."""
+    """Run the child process: open the file that the command line names, run it on the observations that follow, and
+    print the reasons of refusal and failure as JSON."""
     import onnx  # before the bounds
     import onnxruntime  # noqa: F401  # likewise
 
-    out = os.dup(1)
-    os.dup2(2, 1)  # what a library prints is not ours
+    stdout = os.dup(1)
+    os.dup2(2, 1)  # libraries print to standard error: standard output is for the result alone
     bound_resources()
-    found: dict[str, Any] = {"refused": "", "fails": {}}
+    result: dict[str, Any] = {"refused": "", "fails": {}}
     try:
         session = _session(Path(sys.argv[1]))
         if refused := sorted(REFUSED & _operators(onnx.load(sys.argv[1], load_external_data=False))):
             raise SpringfootError(f"a policy may not use {refused[0]}")
-    except Exception as error:  # its classes have no common one
-        found["refused"] = one_line(error)
+    except Exception as error:  # onnxruntime's errors have no common class
+        result["refused"] = one_line(error)
     else:
-        found["fails"] = _fails(session, np.array(json.loads(sys.argv[2])))
-    os.write(out, json.dumps(found).encode())
+        result["fails"] = _fails(session, np.array(json.loads(sys.argv[2])))
+    os.write(stdout, json.dumps(result).encode())
 
 
 def _operators(model: Any) -> set[str]:
     """Return the names of a model's operators, also of those in its functions and in graphs within graphs."""
-    found: set[str] = set()
+    names: set[str] = set()
     waiting = [*model.graph.node, *(node for function in model.functions for node in function.node)]
     while waiting:
         node = waiting.pop()
-        found.add(node.op_type)
+        names.add(node.op_type)
         for attribute in node.attribute:
             waiting += [inner for graph in (attribute.g, *attribute.graphs) for inner in graph.node]
-    return found
+    return names
 
 
 def _fails(session: Any, observations: NDArray) -> dict[str, str]:
-    """Run a session on the observations, on each as the only row, and alone; return the reasons of what fails, by
-    `form`."""
+    """Run a session on observations (N, D): on all, on each row as (1, D), and on each as (D,); return the reason of a
+    failure for each `form` that fails."""
     inputs = session.get_inputs()
     failed: dict[str, str] = {}
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:
@@ -108,6 +108,6 @@ def _fails(session: Any, observations: NDArray) -> dict[str, str]:
 
 
 def one_line(error: Exception) -> str:
-    """Return an error as a part of a message."""
+    """Return an error's text in one line, at most 300 characters, with its class unless it is our own."""
     text = " ".join(str(error).split())
     return text if isinstance(error, SpringfootError) else f"{type(error).__name__}: {text[:300]}"

@@ -110,20 +110,20 @@ class Policy:
 
     @property
     def observation_deviation(self) -> np.ndarray:
-        """Return (D,) the divisor of an observation's distance from its mean."""
+        """Return (D,) the standard deviation that normalises observations, with the variance floor."""
         return np.sqrt(self.observation_variance + self.variance_floor)
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Return mean actions (N, 4) in [-1, 1] for observations (N, D)."""
+        """Return mean actions (N, 4) or (4,) in [-1, 1], float32, for observations (N, D) or (D,)."""
         rows = observation_rows(observation, len(self.observation_mean))
         rows = (rows - self.observation_mean) / self.observation_deviation
         if self.observation_clip is not None:
             rows = rows.clip(-self.observation_clip, self.observation_clip)
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             rows = ACTIVATIONS[self.activation](rows) if layer else rows
-            # einsum adds in the same order for any N; BLAS does not, and a batch must equal its rows alone.
+            # einsum adds in the same order for any N, BLAS does not; a row must not depend on the other rows.
             rows = np.einsum("...i,oi->...o", rows, weight.astype(np.float64), optimize=False) + bias
-        if not np.isfinite(rows).all():  # as the widest and deepest of unbounded layers can make it
+        if not np.isfinite(rows).all():  # wide and deep unbounded layers can overflow
             raise SpringfootError("the policy's output is not finite")
         return (np.tanh(rows) if self.output == "tanh" else rows.clip(-1.0, 1.0)).astype(np.float32)
 
@@ -198,8 +198,8 @@ def read_policy(name: str | Path) -> Policy:
         settings = settings_from(**values)
         biped = Biped(settings, 1)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        what = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
-        raise SpringfootError(f"{name}: its header {what}") from None
+        fault = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
+        raise SpringfootError(f"{name}: its header {fault}") from None
     known = activation in ACTIVATIONS and output in get_args(Output)
     if not known or floor is None or not 0 <= floor <= LARGEST_WEIGHT:
         raise SpringfootError(f"{name}: its header asks for a network this version does not have: {quoted(network)}")
@@ -226,13 +226,13 @@ def read_policy(name: str | Path) -> Policy:
 
 
 def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list[int]) -> None:
-    """Raise `SpringfootError` for tensors that do not fit the layer sizes."""
-    expected = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
+    """Raise `SpringfootError` unless the tensors are those of layers of these `sizes`, with numbers within bounds."""
+    shapes = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
-        expected |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}
-    for tensor_name in sorted(set(expected) | set(tensors)):
-        wanted = expected.get(tensor_name, "absent")
-        found = tensors[tensor_name].shape if tensor_name in tensors else "absent"
-        if found != wanted:
-            raise SpringfootError(f"{name}: {tensor_name} must be {wanted}, is {found}")
+        shapes |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}
+    for tensor_name in sorted(set(shapes) | set(tensors)):
+        expected = shapes.get(tensor_name, "absent")
+        shape = tensors[tensor_name].shape if tensor_name in tensors else "absent"
+        if shape != expected:
+            raise SpringfootError(f"{name}: {tensor_name} must be {expected}, is {shape}")
     require_bounded(name, tensors)

@@ -35,9 +35,9 @@ SAME_BETA = 1e-4
 def schedule_file(
     name: str, conditions: BipedSettings
 ) -> tuple[dict[str, Any], Callable[[BipedSettings], PolicyFunction]]:
-    """Return the settings that a schedule file needs, and a function that makes its policy.
+    """Read a schedule file: return the settings that it needs, and a function that makes its policy of settings.
 
-    The settings are for the body of `conditions`: absolute actions, and the file's equilibrium. The function takes the
+    The settings are absolute actions and the file's rest angles, for the body of `conditions`; the function takes the
     settings of an environment of that body. Raises `SpringfootError` for another file.
     """
     path = Path(name)
@@ -46,12 +46,13 @@ def schedule_file(
         return {"action_mode": "absolute", "equilibrium": "phase", "schedule": springs.to_json()}, schedule
     table = read_csv(path)
     stiffness = _stiffness(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), conditions)
-    own = {"action_mode": "absolute"} | _equilibrium(table, stiffness)
-    return own, lambda settings: follow(stiffness[None], np.zeros(1), settings, body_of(settings))
+    needed = {"action_mode": "absolute"} | _equilibrium(table, stiffness)
+    return needed, lambda settings: follow(stiffness[None], np.zeros(1), settings, body_of(settings))
 
 
 def _scale(height: float | None, mass: float | None, settings: BipedSettings) -> float:
-    """Return the stiffness of the body of `settings` over that of a body of `height` [m] and `mass` with load [kg]."""
+    """Return the ratio of the stiffness of the body of `settings` to that of a body of `height` [m] and `mass` with
+    load [kg]; None is 1.70 m or 63 kg."""
     height = require_number("height_m", REFERENCE_HEIGHT if height is None else height, 0.0, unit="m", above=True)
     mass = require_number("mass_kg", REFERENCE_MASS if mass is None else mass, 0.0, unit="kg", above=True)
     return body_of(settings).stiffness_scale / (mass / REFERENCE_MASS * height / REFERENCE_HEIGHT)
@@ -61,15 +62,16 @@ def _scale(height: float | None, mass: float | None, settings: BipedSettings) ->
 
 
 def _cell(table: Table, column: str) -> float | None:
+    """Return the number in a column's first row; None without that column."""
     return float(table.numbers(column)[0]) if table.has(column) else None
 
 
-def _columns(table: Table, what: str) -> list[list[str]]:
-    """Return [side][joint] the names of the columns with quantity `what` of each spring: one a side, or one for
+def _columns(table: Table, quantity: str) -> list[list[str]]:
+    """Return [side][joint] the names of the columns with a quantity of each spring: one for each side, or one for
     both."""
     names = [
         [
-            next((c for c in (f"{joint}_{side}_{what}", f"{joint}_{what}") if c in table.columns), "")
+            next((c for c in (f"{joint}_{side}_{quantity}", f"{joint}_{quantity}") if c in table.columns), "")
             for joint in SPRINGS
         ]
         for side in SIDES
@@ -77,13 +79,14 @@ def _columns(table: Table, what: str) -> list[list[str]]:
     for joint, *columns in zip(SPRINGS, *names, strict=True):
         if not all(columns):
             raise SpringfootError(
-                f"{table.name}, line 1: needs a column {joint}_{what}, or {joint}_left_{what} and {joint}_right_{what}"
+                f"{table.name}, line 1: needs a column {joint}_{quantity}, "
+                f"or {joint}_left_{quantity} and {joint}_right_{quantity}"
             )
     return names
 
 
-def _curves(table: Table, what: str) -> NDArray:
-    """Return (SAMPLES, side, joint) quantity `what` on `GRID`; linear and periodic between the rows."""
+def _curves(table: Table, quantity: str) -> NDArray:
+    """Return (SAMPLES, side, joint) a quantity of the springs on `GRID`; linear and periodic between the rows."""
     if not table.has("percent"):
         raise SpringfootError(f"{table.name}, line 1: needs a column percent, of the leg's stride")
     percent = table.ascending("percent")
@@ -91,13 +94,12 @@ def _curves(table: Table, what: str) -> NDArray:
         if not 0.0 <= value <= PERCENT[-1]:
             raise table.error(line, "percent", f"must be in [0, 100], got {value:g}")
     inside = percent < PERCENT[-1]  # 100 is 0 again
-    read = [[table.numbers(column)[inside] for column in columns] for columns in _columns(table, what)]
+    of_rows = [[table.numbers(column)[inside] for column in columns] for columns in _columns(table, quantity)]
     if not inside.any():
         raise SpringfootError(f"{table.name} needs a row of less than 100 percent")
-    at = percent[inside] / PERCENT[-1]
-    return np.stack([[np.interp(GRID, at, curve, period=1.0) for curve in curves] for curves in read]).transpose(
-        2, 0, 1
-    )
+    phase = percent[inside] / PERCENT[-1]
+    on_grid = np.stack([[np.interp(GRID, phase, curve, period=1.0) for curve in curves] for curves in of_rows])
+    return on_grid.transpose(2, 0, 1)
 
 
 def _stiffness(table: Table) -> NDArray:
@@ -114,9 +116,10 @@ def _stiffness(table: Table) -> NDArray:
 
 
 def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
-    """Return the setting in the file's column `equilibrium`, `planned` without that column.
+    """Return the settings of the rest angles: `equilibrium` from the column of that name, `planned` without it.
 
-    With `phase` also the schedule of the rest angles, constant over each percent and the same for both legs.
+    With `phase` also `schedule`: stiffness and rest angles, constant over each percent of the stride and the same for
+    both legs.
     """
     kinds = get_args(Equilibrium)
     kind = "planned"
@@ -127,9 +130,9 @@ def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
             raise table.error(line, "equilibrium", f"must be one of {', '.join(kinds)}, got {kind!r:.40}")
     if kind != "phase":
         return {"equilibrium": kind}
-    every = len(GRID) // int(PERCENT[-1])
-    springs = np.stack([stiffness, np.radians(_curves(table, "equilibrium_deg"))], -1).mean(axis=1)[::every]
-    starts = np.broadcast_to(GRID[::every, None, None], (len(springs), len(SPRINGS), 1))
+    per_percent = len(GRID) // int(PERCENT[-1])
+    springs = np.stack([stiffness, np.radians(_curves(table, "equilibrium_deg"))], -1).mean(axis=1)[::per_percent]
+    starts = np.broadcast_to(GRID[::per_percent, None, None], (len(springs), len(SPRINGS), 1))
     lines = np.concatenate([starts, springs], axis=-1).swapaxes(0, 1).tolist()
     return {"equilibrium": kind, "schedule": dict(zip(SPRINGS, lines, strict=True))}
 
@@ -152,19 +155,19 @@ def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
             f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
             f"toe, and these {', '.join(SPRING_KEYS)}"
         ) from None
-    beta = damping_times(body_of(settings))[FEET]
+    model_betas = damping_times(body_of(settings))[FEET]
     scale = _scale(height, mass, settings)
-    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))
+    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))  # of bodies that scale
     lines = []
-    for column, (joint, own) in enumerate(zip(SPRINGS, beta, strict=True)):
+    for column, (joint, model_beta) in enumerate(zip(SPRINGS, model_betas, strict=True)):
         segments = []
-        for phase, stiffness, damping, rest_deg in (state[column] for state in entries):
+        for phase, stiffness, beta, rest_deg in (state[column] for state in entries):
             stiffness = require_number(
                 f"{path.name}: {joint} {SPRING_KEYS[0]}", stiffness, 0.0, unit="N m/rad", above=True
             )
-            if damping is not None and not abs(as_float(damping) * time_scale - own) < SAME_BETA:
-                beta_s = f"{own / time_scale:.4g} s, the model's"
-                raise SpringfootError(f"{path.name}: {joint} {SPRING_KEYS[1]} must be {beta_s}, got {damping!r:.40}")
+            if beta is not None and not abs(as_float(beta) * time_scale - model_beta) < SAME_BETA:
+                allowed = f"{model_beta / time_scale:.4g} s, the model's"
+                raise SpringfootError(f"{path.name}: {joint} {SPRING_KEYS[1]} must be {allowed}, got {beta!r:.40}")
             rest = radians(require_within(f"{path.name}: {joint} {SPRING_KEYS[2]}", rest_deg, (-180.0, 180.0), "deg"))
             segments.append(Segment(phase, stiffness * scale, rest))
         lines.append(tuple(segments))

@@ -1,33 +1,35 @@
-"""Let callbacks watch a training, and end it: stable-baselines3's callbacks, and functions of evaluations."""
+"""Let callbacks follow a training and end it: stable-baselines3's callbacks, and functions of evaluations."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
-Onlooker = BaseCallback | Callable[[dict[str, Any]], object]
-"""A callback of stable-baselines3, or a function of each periodic evaluation as in run.json. Either ends the training
-in good order by returning False."""
+UserCallback = BaseCallback | Callable[[dict[str, Any]], object]
+"""A callback of stable-baselines3, or a function called after each periodic evaluation with its entry of run.json.
+Either ends the training in good order by returning False."""
 
 
-class Onlookers(CallbackList):
-    """The training's own callback, then the onlookers; `stop` is called when an onlooker returns False."""
+class SessionAndUserCallbacks(CallbackList):
+    """Call the session's callback and then the user's at every step; call `stop` if one of the user's returns False."""
 
-    def __init__(self, own: BaseCallback, others: Sequence[Onlooker], stop: Callable[[], object]) -> None:
-        super().__init__([own, *(each for each in others if isinstance(each, BaseCallback))])
+    def __init__(
+        self, session: BaseCallback, user_callbacks: Sequence[UserCallback], stop: Callable[[], object]
+    ) -> None:
+        super().__init__([session, *(callback for callback in user_callbacks if isinstance(callback, BaseCallback))])
         self._stop = stop
 
     def _on_step(self) -> bool:
-        own, *others = self.callbacks
-        going = own.on_step()
-        told = [other.on_step() for other in others]  # every one
-        if not all(told):
+        session, *others = self.callbacks
+        session_continues = session.on_step()
+        others_continue = [callback.on_step() for callback in others]  # all are called, also after a False
+        if not all(others_continue):
             self._stop()
-        return going and all(told)
+        return session_continues and all(others_continue)
 
 
-def tell(onlookers: Sequence[Onlooker], evaluation: dict[str, Any]) -> bool:
-    """Call the functions among the onlookers with an evaluation; return False if one of them ends the training."""
-    functions = [each for each in onlookers if not isinstance(each, BaseCallback)]
-    answers = [each(dict(evaluation)) for each in functions]
+def call_with_evaluation(user_callbacks: Sequence[UserCallback], evaluation: dict[str, Any]) -> bool:
+    """Call the functions among the callbacks with an evaluation; return False if one of them ends the training."""
+    functions = [callback for callback in user_callbacks if not isinstance(callback, BaseCallback)]
+    answers = [function(dict(evaluation)) for function in functions]
     return all(answer is not False for answer in answers)

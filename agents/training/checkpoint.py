@@ -40,8 +40,8 @@ class Header(TypedDict):
 
 def checkpoints(out: Path) -> list[Path]:
     """Return the checkpoints in a folder, the one of the most timesteps first."""
-    found = {path: _NAME.fullmatch(path.name) for path in out.iterdir()}
-    return sorted((path for path, match in found.items() if match), key=_timesteps, reverse=True)
+    named = [path for path in out.iterdir() if _NAME.fullmatch(path.name)]
+    return sorted(named, key=_timesteps, reverse=True)
 
 
 def write_checkpoint(
@@ -54,7 +54,7 @@ def write_checkpoint(
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Return header and arrays of a checkpoint; raise `SpringfootError` for a damaged file and for any other."""
+    """Return header and arrays of a checkpoint; raise `SpringfootError` for a damaged file, and for any other file."""
     names = Header.__annotations__
     header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, needs_digest=True)
     if missing := [name for name in names if name not in header]:
@@ -90,21 +90,20 @@ def newest_checkpoint(out: Path) -> Checkpoint | None:
     Damaged ones are renamed to end in `.damaged`, with a warning on standard error. Raises `SpringfootError`, with
     nothing changed, if all are damaged.
     """
-    passed: list[tuple[Path, SpringfootError]] = []
+    damaged: list[tuple[Path, SpringfootError]] = []
     for path in checkpoints(out):
         try:
-            found = read_checkpoint(path)
+            checkpoint = read_checkpoint(path)
         except SpringfootError as error:
-            passed.append((path, error))
+            damaged.append((path, error))
             continue
-        for damaged, why in passed:
-            damaged.replace(damaged.with_name(f"{damaged.name}.damaged"))
-            print(f"Warning: {why}; going on from {path.name}", file=sys.stderr, flush=True)
-        return found
-    if passed:
-        raise SpringfootError(
-            f"{passed[0][1]}, and so are all other checkpoints in {out}" if passed[1:] else passed[0][1]
-        )
+        for damaged_path, reason in damaged:
+            damaged_path.replace(damaged_path.with_name(f"{damaged_path.name}.damaged"))
+            print(f"Warning: {reason}; going on from {path.name}", file=sys.stderr, flush=True)
+        return checkpoint
+    if damaged:
+        _, reason = damaged[0]
+        raise SpringfootError(f"{reason}, and so are all other checkpoints in {out}" if damaged[1:] else reason)
     return None
 
 

@@ -125,7 +125,7 @@ def config_to_json(config: TrainingConfig) -> dict[str, Any]:
 
 
 def config_from_json(values: dict[str, Any]) -> TrainingConfig:
-    """Return the configuration that `config_to_json` wrote; raise `SpringfootError` for anything else."""
+    """Return the configuration of a dictionary as from `config_to_json`; raise `SpringfootError` for a bad one."""
     names = [item.name for item in dataclasses.fields(TrainingConfig)]
     if unknown := sorted(set(values) - set(names)):
         raise SpringfootError(f"unknown training setting {unknown[0]!r}; valid: {', '.join(names)}")

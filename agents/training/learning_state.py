@@ -49,7 +49,7 @@ class Learning(TypedDict):
 def learning_state(
     learner: Learner, environments: SegmentedFootBipedVecEnv
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Return a copy of everything that training changes: JSON values, and arrays by name."""
+    """Return a copy of everything that training changes: JSON values as in `Learning`, and arrays by name."""
     ppo = learner.ppo
     normalized = learner.normalized
     assert ppo._last_obs is not None and ppo._last_episode_starts is not None and ppo.ep_info_buffer is not None
@@ -72,7 +72,7 @@ def learning_state(
         "numpy": [int(numpy_state["state"]["pos"]), numpy_state["has_gauss"], numpy_state["gauss"]],  # type: ignore[index]
         "python_gauss": python_gauss,
         "updates": ppo._n_updates,
-        "episodes": [{"r": float(each["r"]), "l": int(each["l"])} for each in ppo.ep_info_buffer],
+        "episodes": [{"r": float(episode["r"]), "l": int(episode["l"])} for episode in ppo.ep_info_buffer],
         "logged": {
             name: [float(value), ppo.logger.name_to_excluded[name]]
             for name, value in ppo.logger.name_to_value.items()
@@ -88,10 +88,10 @@ def restore_learning(
     values: Mapping[str, Any],
     arrays: Mapping[str, np.ndarray],
 ) -> None:
-    """Continue from the values of `learning_state`, except `logged`, which is checked and left to the caller.
+    """Bring learner and environments to the state that `learning_state` returned as `values` and `arrays`.
 
-    Call it last, as nothing may draw random numbers afterwards. Raises `SpringfootError` if the state does not fit this
-    learner.
+    The entry `logged` is checked and left to the caller. Call it last: nothing may draw random numbers between it and
+    the next rollout. Raises `SpringfootError` if the state does not fit this learner.
     """
     ppo = learner.ppo
     normalized = learner.normalized
@@ -105,11 +105,11 @@ def restore_learning(
         ppo._last_obs = _fitting(arrays, "rollout.observation", (ppo.n_envs, width), np.float32)
         ppo._last_episode_starts = _fitting(arrays, "rollout.episode_starts", (ppo.n_envs,), np.bool_)
         ppo._n_updates = require_count("updates", values["updates"], 0)
-        episodes = ({"r": float(each["r"]), "l": int(each["l"])} for each in values["episodes"])
+        episodes = ({"r": float(episode["r"]), "l": int(episode["l"])} for episode in values["episodes"])
         ppo.ep_info_buffer = deque(episodes, maxlen=ppo._stats_window_size)
-        ppo.ep_success_buffer = deque(maxlen=ppo._stats_window_size)  # these environments tell of no success
+        ppo.ep_success_buffer = deque(maxlen=ppo._stats_window_size)  # these environments report no success
         if not all(
-            len(told) == 2 and isinstance(told[1], list) and isfinite(told[0]) for told in values["logged"].values()
+            len(entry) == 2 and isinstance(entry[1], list) and isfinite(entry[0]) for entry in values["logged"].values()
         ):
             raise ValueError("logged must be values, each with the formats that leave it out")
         position, has_gauss, gauss = values["numpy"]
@@ -120,12 +120,12 @@ def restore_learning(
     except SpringfootError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, RuntimeError, OverflowError) as error:
-        what = " ".join(str(error).split())
-        raise SpringfootError(f"the training state does not fit its configuration: {what}") from None
+        reason = " ".join(str(error).split())
+        raise SpringfootError(f"the training state does not fit its configuration: {reason}") from None
 
 
 def _fitting(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
-    """Return an array of a state; raise `ValueError` for another shape, another type, or numbers that are not
+    """Return the array `name` of a state; raise `ValueError` for another shape or type, and for numbers that are not
     finite."""
     values = arrays[name]
     if values.shape != shape or values.dtype != kind:

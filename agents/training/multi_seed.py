@@ -53,7 +53,9 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
     configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
     with owned(out):
         require_new(out)
-        rows, signalled = train_all([(each, out / f"seed-{each.seed}", f"seed {each.seed}") for each in configs])
+        rows, signalled = train_all(
+            [(seeded, out / f"seed-{seeded.seed}", f"seed {seeded.seed}") for seeded in configs]
+        )
         record = {"config": config_to_json(config), "status": _status(rows, signalled), "seeds": rows}
         record |= {"spread": spread(rows)} | ({"signal": signalled.name} if signalled else {})
         write_atomically(out / SEEDS, (json.dumps(record, indent=2) + "\n").encode())
@@ -63,10 +65,13 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
 def train_all(
     jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engine = "here"
 ) -> tuple[list[dict[str, Any]], signal.Signals | None]:
-    """Train each configuration in its folder, as `train_seeds` does; its messages begin with its name.
+    """Train several configurations at once; return a row of results for each, and the signal that stopped them, if any.
 
-    A folder with an unfinished run is continued. With the `engine` ray the trainings run on the nodes of a Ray cluster
-    (`cluster.nodes`). Returns a row of results for each, and the signal that stopped them.
+    Args:
+        jobs: configuration, folder and name of each training. An unfinished run in the folder is continued; the name
+            precedes every message of the training.
+        engine: `here` for one process per processor of this machine, `ray` for the nodes of a Ray cluster
+            (`cluster.nodes`).
     """
     if engine == "ray":
         return _train_on_ray(jobs)
@@ -80,7 +85,7 @@ def train_all(
 def _train_on_ray(
     jobs: Sequence[tuple[TrainingConfig, Path, str]],
 ) -> tuple[list[dict[str, Any]], signal.Signals | None]:
-    """Train as `train_all` does, on the nodes of a Ray cluster."""
+    """Train the jobs of `train_all` on the nodes of a Ray cluster; return what `train_all` returns."""
     with naming_extras():
         from .cluster.nodes import run_on_ray  # not above: an extra
     stopping = None
@@ -88,8 +93,8 @@ def _train_on_ray(
         run_on_ray([(name, _command(config, folder.absolute())) for config, folder, name in jobs])
     except KeyboardInterrupt:
         stopping = signal.SIGINT
-    without = "interrupted" if stopping else "failed"
-    return [_row(config, folder, without) for config, folder, _ in jobs], stopping
+    if_incomplete = "interrupted" if stopping else "failed"
+    return [_row(config, folder, if_incomplete) for config, folder, _ in jobs], stopping
 
 
 def _command(config: TrainingConfig, folder: Path) -> list[str]:
@@ -99,16 +104,17 @@ def _command(config: TrainingConfig, folder: Path) -> list[str]:
 
 
 def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) -> str:
-    """Return `finished`, `failed` or `interrupted`, for all together."""
+    """Return the status of all seeds together: `failed` if one failed, else `interrupted` after a signal, else
+    `finished`."""
     status = "interrupted" if signalled else "finished"
     return "failed" if any(row["status"] == "failed" for row in rows) else status
 
 
 def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engine = "here") -> str:
-    """Train the configurations without a finished run in their folders, as `train_all` does.
+    """Train those of the jobs (see `train_all`) whose folder holds no finished run, continuing unfinished ones.
 
-    Continues unfinished runs. Returns `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing
-    changed, for a run of another configuration.
+    Returns the status of all: `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing changed,
+    if a folder holds a run of another configuration.
     """
     for config, folder, _ in jobs:
         if (folder / RUN).is_file():
@@ -120,7 +126,7 @@ def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engi
 
 
 def is_finished(folder: Path) -> bool:
-    """Tell whether the folder holds a training that ran to its end."""
+    """Return True if the folder holds a training that ran to its end."""
     return (folder / RUN).is_file() and read_record(folder).get("status") == "finished"
 
 
@@ -145,10 +151,10 @@ def training_table(record: dict[str, Any]) -> str:
 
 
 class _Trainings:
-    """Training processes, and the handling of signals that end them; a context manager."""
+    """Run trainings in processes of their own, and pass SIGINT and SIGTERM on to them; a context manager."""
 
     def __init__(self) -> None:
-        self.stopping: signal.Signals | None = None
+        self.stopping: signal.Signals | None = None  # the signal that came, if one did
         self._lock = threading.RLock()  # a second signal may interrupt the passing on of the first
         self._running: list[subprocess.Popen[str]] = []
         self._before: dict[int, Any] = {}
@@ -178,10 +184,9 @@ class _Trainings:
             self._running.remove(process)
         if process.returncode < 0 and not self.stopping:
             ended = signal.Signals(-process.returncode).name
-            safe = f"springfoot train --resume {folder} goes on from what it has saved"
-            safe = safe if (folder / RUN).is_file() else "it had saved nothing yet"
-            said = f"{name}: its process was ended by {ended}; {safe}"
-            print(said, file=sys.stderr, flush=True)
+            saved = f"springfoot train --resume {folder} goes on from what it has saved"
+            saved = saved if (folder / RUN).is_file() else "it had saved nothing yet"
+            print(f"{name}: its process was ended by {ended}; {saved}", file=sys.stderr, flush=True)
         return _row(config, folder, "interrupted" if self.stopping else "failed")
 
     def _stop(self, number: int, _frame: Any) -> None:
@@ -214,15 +219,16 @@ def _block(blocked: bool) -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, SIGNALS)
 
 
-def _row(config: TrainingConfig, folder: Path, without: str) -> dict[str, Any]:
-    """Return the row of results of one seed, from its run.json; its status is `without` if that file is not
-    complete."""
-    row: dict[str, Any] = {"seed": config.seed, "folder": folder.name, "status": without}
+def _row(config: TrainingConfig, folder: Path, if_incomplete: str) -> dict[str, Any]:
+    """Return the row of results of one seed, from its run.json; its status is `if_incomplete` if that file is missing
+    or still says `running`."""
     record = read_record(folder) if (folder / RUN).is_file() else {}
+    status = record.get("status", "running")
     best = record.get("best") or {}
-    if record.get("status", "running") != "running":
-        row["status"] = record["status"]
-    return row | {
+    return {
+        "seed": config.seed,
+        "folder": folder.name,
+        "status": if_incomplete if status == "running" else status,
         "timesteps": record.get("timesteps"),
         "seconds": record.get("seconds"),
         "return_mean": best.get("return_mean"),
@@ -239,7 +245,8 @@ def _main() -> int:
 
 
 def _train(config: TrainingConfig, folder: str) -> int:
-    from .training import resume, train  # not above: torch takes seconds, which the process of all need not wait for
+    """Train or continue one seed in this process; return the exit code."""
+    from .training import resume, train  # not above: torch takes seconds, and the parent process does not need it
 
     _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
     end_in_order()

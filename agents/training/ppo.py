@@ -23,18 +23,18 @@ from .config import TrainingConfig
 
 
 class Learner:
-    """An untrained actor and critic on a batch of environments; the actor's mean action begins at 0.
+    """An untrained actor and critic on a batch of environments, with stable-baselines3's PPO to train them.
 
-    Orthogonal weights, on the action layer with gain 0.01, and biases of zero. Observations and rewards are
-    normalised by their running statistics.
+    Weights are orthogonal, biases zero; with gain 0.01 on the action layer the mean action begins near 0. Observations
+    and rewards are normalised by their running statistics.
     """
 
     def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
         torch.set_num_threads(1)  # more compete with the threads of the physics, and are up to 200 times slower
         self._environment = config.environment
-        share = config.environment.step_seconds / ACTION_STEP
-        gamma = config.gamma**share
-        gae_lambda = config.gae_lambda**share
+        steps_of_20ms = config.environment.step_seconds / ACTION_STEP  # gamma and lambda are per 20 ms
+        gamma = config.gamma**steps_of_20ms
+        gae_lambda = config.gae_lambda**steps_of_20ms
         self.normalized = VecNormalize(environments, gamma=gamma)
         self.rollout_steps = config.update_steps // config.num_envs
         samples = self.rollout_steps * config.num_envs
@@ -45,7 +45,7 @@ class Learner:
                 self.normalized,
                 learning_rate=lambda left: config.learning_rate * (left + config.learning_rate_end * (1 - left)),
                 n_steps=self.rollout_steps,
-                batch_size=-(-samples // config.minibatches),
+                batch_size=-(-samples // config.minibatches),  # rounded up
                 n_epochs=config.epochs,
                 gamma=gamma,
                 gae_lambda=gae_lambda,
@@ -60,10 +60,10 @@ class Learner:
             )
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
-        """Return the actor's mean actions with the present weights and observation statistics."""
+        """Return a copy of the actor as a policy that acts by its mean action."""
         layers, _, _ = actor_of(self.ppo.policy)
-        # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         seen = self._statistics()["observation"]
+        # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         return ignoring_unvaried(
             Policy(
                 settings=self._environment,
@@ -77,7 +77,7 @@ class Learner:
         )
 
     def state(self) -> dict[str, np.ndarray]:
-        """Return everything that learning changes: network, Adam's moments, running statistics."""
+        """Return copies of all arrays that learning changes, by name: network, Adam's moments, running statistics."""
         tensors = {f"network.{name}": value for name, value in self.ppo.policy.state_dict().items()}
         for index, moments in self.ppo.policy.optimizer.state_dict()["state"].items():
             tensors |= {f"adam.{index}.{name}": value for name, value in moments.items()}
@@ -89,9 +89,9 @@ class Learner:
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Continue from a `state`; raise `SpringfootError` if it does not fit this learner."""
-        what = "the training state"
-        require_bounded(what, arrays)
-        require_moments(what, arrays, len(list(self.ppo.policy.parameters())))
+        subject = "the training state"  # of the errors
+        require_bounded(subject, arrays)
+        require_moments(subject, arrays, len(list(self.ppo.policy.parameters())))
         try:
             network = {name: value for name, value in arrays.items() if name.startswith("network.")}
             self.ppo.policy.load_state_dict(
@@ -113,10 +113,11 @@ class Learner:
                     _require_shape(f"{name}.{item}", value, np.shape(getattr(statistics, item)))
                     setattr(statistics, item, value if value.shape else float(value))
         except (KeyError, IndexError, ValueError, RuntimeError) as error:
-            what = " ".join(str(error).split())
-            raise SpringfootError(f"the training state does not fit its configuration: {what}") from None
+            reason = " ".join(str(error).split())
+            raise SpringfootError(f"{subject} does not fit its configuration: {reason}") from None
 
     def _statistics(self) -> dict[str, RunningMeanStd]:
+        """Return the running statistics of `observation` and `return`, not copied."""
         observation: Any = self.normalized.obs_rms  # a dictionary only for dictionary observations
         return {"observation": observation, "return": self.normalized.ret_rms}
 

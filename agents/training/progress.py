@@ -11,7 +11,7 @@ LINE_SECONDS = 20.0
 
 
 class Progress:
-    """Progress of `total` environment steps, `done` of them in earlier sessions; a context manager."""
+    """Show how many of `total` environment steps are done, `done` of them in earlier sessions; a context manager."""
 
     def __init__(self, total: int, done: int = 0) -> None:
         self._bar = tqdm(
@@ -45,9 +45,9 @@ class Progress:
         """Print a line of progress if there is no bar."""
         if self._bar.disable:
             self._last_line = monotonic()
-            rate = (self._done - self._first) / max(self._last_line - self._began, 1e-9)
-            missing = max(self._total - self._done, 0)
-            left = f"{tqdm.format_interval(missing / rate)} left" if rate and missing else ""
+            rate = (self._done - self._first) / max(self._last_line - self._began, 1e-9)  # [steps/s]
+            remaining = max(self._total - self._done, 0)
+            left = f"{tqdm.format_interval(remaining / rate)} left" if rate and remaining else ""
             parts = f"{self._done:,} of {self._total:,} steps", self._state, left
             print(" · ".join(part for part in parts if part), file=sys.stderr, flush=True)
 
@@ -59,5 +59,5 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the bar as it is."""
+        """Close the bar; it stays on the screen as it is."""
         self._bar.close()

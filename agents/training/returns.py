@@ -13,7 +13,7 @@ EVALUATION_SEED = 2**30
 
 
 def evaluation_of(biped: Biped, policy: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
-    """Return the numbers of a periodic evaluation, as they stand in run.json: one episode in each environment."""
+    """Run one episode in each environment; return the summary that run.json keeps of a periodic evaluation."""
     returns, seconds, fell = evaluate_returns(biped, policy, EVALUATION_SEED)
     return {
         "return_mean": float(returns.mean()),

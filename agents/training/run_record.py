@@ -19,7 +19,7 @@ RLLIB = "rllib"
 
 
 def read_record(out: Path) -> dict[str, Any]:
-    """Return the record in a run's folder; raise `SpringfootError` if there is none."""
+    """Return the record in a run's folder; raise `SpringfootError` if there is none or it is malformed."""
     record = read_object(out / RUN, "record of a run")
     try:
         if not isinstance(record["config"], dict):
@@ -40,10 +40,10 @@ def require_past(record: Mapping[str, Any]) -> None:
     for name in ("sessions", "evaluations"):
         if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
             raise ValueError(f"{name} must be a list of objects")
-    measured = [session["best"] for session in record["sessions"] if "best" in session]
-    if not all(isinstance(best, dict) for best in measured):
+    remeasured = [session["best"] for session in record["sessions"] if "best" in session]
+    if not all(isinstance(best, dict) for best in remeasured):
         raise ValueError("best must be an object")
-    for entry in (*record["evaluations"], *measured):
+    for entry in (*record["evaluations"], *remeasured):
         for name in ("timesteps", "return_mean", "return_sd", "falls", "episodes"):
             require_number(name, entry[name], -inf)
     for session in record["sessions"]:
@@ -61,15 +61,16 @@ def write_record(out: Path, record: Mapping[str, Any]) -> None:
 
 
 def is_of_rllib(record: Mapping[str, Any]) -> bool:
-    """Tell whether a run's record says that RLlib trained it."""
+    """Return True if a run's record says that RLlib trained it."""
     engine = record.get("engine")
     return isinstance(engine, dict) and engine.get("name") == RLLIB
 
 
 def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the best evaluation, the first of equal ones; None before the first.
+    """Return the evaluation with the highest mean return, the first of equal ones; None without evaluations.
 
-    A session with another task measured the best policy anew; from then on only later evaluations are compared with it.
+    If a session changed the task and measured the best policy anew, only that measurement and later evaluations are
+    compared.
     """
     entries: list[dict[str, Any]] = record["evaluations"]
     for session in reversed(record["sessions"]):
@@ -80,7 +81,7 @@ def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def same_source(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Tell whether two sessions ran the same code, with the same versions."""
+    """Return True if two sessions ran the same code, with the same versions."""
     return all(one.get(name) == other.get(name) for name in ("commit", "modified", "versions"))
 
 
@@ -90,7 +91,7 @@ def event_sizes(out: Path) -> dict[str, int]:
 
 
 def cut_events(out: Path, sizes: Mapping[str, int]) -> None:
-    """Cut the event files to `sizes`: a resumed run writes the later events again."""
+    """Cut the event files to `sizes` [bytes by name] and remove others: a resumed run writes the later events again."""
     for path in out.glob(EVENTS):
         size = sizes.get(path.name, 0)
         if size == 0:

@@ -69,16 +69,17 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return observation, reward.copy(), done, infos  # PPO adds bootstrapped values to the rewards in place
 
     def state(self) -> dict[str, Any]:
-        """Return the exact state between two steps: of the batch (see `Biped.state`) and of the running episodes."""
+        """Return the exact state between two steps: that of `Biped.state`, and return and length of the running
+        episodes."""
         episodes = {"episode.return": self._returns.copy(), "episode.length": self._lengths.copy()}
         return self.env.biped.state() | episodes
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a `state`; raise `SpringfootError` for a state of other settings."""
-        for name, own in (("episode.return", self._returns), ("episode.length", self._lengths)):
-            if np.shape(state.get(name, ())) != own.shape:
-                raise SpringfootError(f"the state does not fit: {name!r} must be {own.shape}")
-        self.reset()  # so that an episode is running everywhere; nothing of it is left
+        for name, present in (("episode.return", self._returns), ("episode.length", self._lengths)):
+            if np.shape(state.get(name, ())) != present.shape:
+                raise SpringfootError(f"the state does not fit: {name!r} must be {present.shape}")
+        self.reset()  # an episode must be running in every environment; `restore` then replaces all of it
         self.env.biped.restore({name: values for name, values in state.items() if not name.startswith("episode.")})
         self._returns[:] = state["episode.return"]
         self._lengths[:] = state["episode.length"]
@@ -112,23 +113,29 @@ class SegmentedFootBipedVecEnv(VecEnv):
         """Return False for each of `indices`: nothing wraps an environment inside the batch."""
         return [False for _ in self._get_indices(indices)]
 
-    def _require_all(self, indices: VecEnvIndices, what: str) -> None:
+    def _require_all(self, indices: VecEnvIndices, action: str) -> None:
+        """Raise `SpringfootError` if `indices` leave environments out of an action such as "set NAME"."""
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
-            raise SpringfootError(f"cannot {what} for some environments only: the batch is one simulation")
+            raise SpringfootError(f"cannot {action} for some environments only: the batch is one simulation")
 
 
-def _merged(each: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the options of one reset from those of each environment; only bodies and speeds may differ."""
-    options, *others = ({name: value for name, value in own.items() if name not in DRAWN} for own in each)
-    if any(other != options for other in others):
+def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Merge the reset options of the environments into those of the batch.
+
+    The options of `DRAWN` (bodies and speeds) may differ between environments and become lists; all others must agree.
+    """
+    merged, *others = (
+        {name: value for name, value in options.items() if name not in DRAWN} for options in by_environment
+    )
+    if any(other != merged for other in others):
         raise SpringfootError(f"reset options other than {', '.join(DRAWN)} must be the same for all environments")
     for name in DRAWN:
-        given = [own[name] for own in each if name in own]
-        if 0 < len(given) < len(each):
+        values = [options[name] for options in by_environment if name in options]
+        if 0 < len(values) < len(by_environment):
             raise SpringfootError(f"reset option {name!r} must be given to all environments, or to none")
-        if given:
-            options[name] = given
-    return options
+        if values:
+            merged[name] = values
+    return merged
 
 
 def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:

@@ -22,7 +22,7 @@ from springfoot.files.writing import write_atomically
 
 from ..policies.fingerprint import fingerprint, require_same
 from ..policies.policy import BEST, LAST, read_policy, save_policy
-from .callbacks import Onlooker, Onlookers, tell
+from .callbacks import SessionAndUserCallbacks, UserCallback, call_with_evaluation
 from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, checkpoints, write_checkpoint
 from .config import TrainingConfig, config_to_json, processors
 from .learning_state import learning_state, restore_learning
@@ -32,33 +32,37 @@ from .returns import evaluation_of
 from .run_record import best_of, cut_events, event_sizes, same_source, write_record
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 from .stopping import Stopping
-from .training_log import log_configuration, no_word_of_writers
+from .training_log import log_configuration, without_writer_tracebacks
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
 """Packages whose versions decide the result of a training."""
-SHARE = 0.02
-"""Largest fraction of the time between two evaluations that checkpoints may take; chosen."""
+CHECKPOINT_TIME_FRACTION = 0.02
+"""Largest fraction of the wall time that checkpoints between two evaluations may take; chosen."""
 BEST_FILE = "file.best"
 """Array of a checkpoint with the bytes of the best policy's file."""
 
 
 class Session(BaseCallback):
-    """Train the run in the folder `out`, from the beginning or from the checkpoint `found`."""
+    """Train the run in the folder `out`, from the beginning or from `checkpoint`.
+
+    PPO alternates rollouts, which collect steps, and updates of the weights. At the start of each rollout the exact
+    state is captured; logs, evaluations and checkpoints are made of the captured state.
+    """
 
     def __init__(
         self,
         config: TrainingConfig,
         out: Path,
         record: dict[str, Any],
-        found: Checkpoint | None = None,
+        checkpoint: Checkpoint | None = None,
         threads: int | None = None,
-        callbacks: Sequence[Onlooker] = (),
+        callbacks: Sequence[UserCallback] = (),
     ) -> None:
         super().__init__()
         self._config = config
         self._out = out
         self._record = record
-        self._found = found
+        self._start = checkpoint
         threads = threads or config.threads or processors()
         settings = settings_to_json(config.environment)
         self._environments = SegmentedFootBipedVecEnv(config.num_envs, num_threads=threads, **settings)
@@ -68,45 +72,48 @@ class Session(BaseCallback):
         self.learner = Learner(config, self._environments, seed)
         self._stopping = Stopping()
         self._began = monotonic()
-        self._written = (0.0, 0.0)
-        self._first, self._seconds_before = (found[0]["timesteps"], found[0]["seconds"]) if found else (0, 0.0)
-        self._trained = self._first
-        self._kept = found
+        self._written_at, self._write_seconds = 0.0, 0.0  # of the latest checkpoint
+        header, arrays = checkpoint or ({"timesteps": 0, "seconds": 0.0}, {})
+        self._first_timesteps = header["timesteps"]
+        self._seconds_before = header["seconds"]
+        self._trained = self._first_timesteps
+        self._captured = checkpoint
         self._policy = None
-        self._best = found[1][BEST_FILE].tobytes() if found and BEST_FILE in found[1] else b""
-        self._onlookers = callbacks
-        self._sums: dict[str, np.ndarray] = {}
-        self._ended: list[dict[str, Any]] = []
-        self._whole = True
+        self._best = arrays[BEST_FILE].tobytes() if BEST_FILE in arrays else b""
+        self._user_callbacks = callbacks
+        self._sums: dict[str, np.ndarray] = {}  # over the steps of a rollout, (N,) by name
+        self._ended: list[dict[str, Any]] = []  # infos of the episodes that ended in a rollout
+        self._rollout_complete = True
 
     def learn(self) -> dict[str, Any]:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
-        with no_word_of_writers():
+        with without_writer_tracebacks():
             self._learn()
         return self._record
 
     def _learn(self) -> None:
-        """Run PPO from the beginning or the checkpoint, with progress and signals handled."""
+        """Run PPO from the beginning or the checkpoint, showing progress; save at the end, also after a signal."""
         ppo = self.learner.ppo
-        session = {"from_timesteps": self._first, **versions_and_commit(PACKAGES)}
-        logged = self._go_on(session)
+        session = {"from_timesteps": self._first_timesteps, **versions_and_commit(PACKAGES)}
+        logged = self._restore(session)
         self._write_record("running")
         ppo.set_logger(configure(str(self._out), ["tensorboard"]))
         for name, (value, excluded) in logged.items():
             ppo.logger.record(name, value, exclude=tuple(excluded))
-        if any(each is session for each in self._record["sessions"]):  # not one that goes on by the same code
+        if any(recorded is session for recorded in self._record["sessions"]):  # with the same code it is not recorded
             log_configuration(ppo.logger, self._config)
-        ppo.num_timesteps = self._first
-        self._progress = Progress(self._config.timesteps, self._first)
+        ppo.num_timesteps = self._first_timesteps
+        self._progress = Progress(self._config.timesteps, self._first_timesteps)
         try:
             with self._stopping:
-                with suppress(KeyboardInterrupt), self._progress:  # at the second signal: what is kept stands
-                    onlookers = Onlookers(self, self._onlookers, self._stopping.ask)
-                    ppo.learn(self._config.timesteps - self._first, onlookers, reset_num_timesteps=False)
+                with suppress(KeyboardInterrupt), self._progress:  # the second signal: the captured state is saved
+                    callbacks = SessionAndUserCallbacks(self, self._user_callbacks, self._stopping.ask)
+                    steps = self._config.timesteps - self._first_timesteps
+                    ppo.learn(steps, callbacks, reset_num_timesteps=False)
                 self._save("finished" if self._finished else "interrupted")
         except OSError as error:
-            found = checkpoints(self._out) if self._out.is_dir() else []
-            saved = f"resume goes on from {found[0].name}" if found else "nothing of it was saved"
+            written = checkpoints(self._out) if self._out.is_dir() else []
+            saved = f"resume goes on from {written[0].name}" if written else "nothing of it was saved"
             raise SpringfootError(f"{self._out}: {error.strerror or error}; {saved}") from None
         except Exception:
             self._write_record("failed")
@@ -116,34 +123,38 @@ class Session(BaseCallback):
                 ppo.logger.close()
             self.learner.normalized.close()
 
-    def _go_on(self, session: dict[str, Any]) -> dict[str, Any]:
-        """Restore the checkpoint, if there is one, into a new session; return the unwritten values of the logger.
+    def _restore(self, session: dict[str, Any]) -> dict[str, Any]:
+        """Restore the checkpoint, if there is one; return the logger's unwritten values.
 
-        Random generators come last, so that nothing draws in between.
+        `session` joins the record unless it only continues the last one: same code, settings and best return. A best
+        policy with another return than the recorded one, as under another reward, is recorded in it anew. Random
+        generators are restored last, so that nothing draws in between.
         """
-        if self._found is None:
+        if self._start is None:
             self._record["sessions"].append(session)
-            cut_events(self._out, {})  # of a training that was killed before it had a checkpoint
+            cut_events(self._out, {})  # of a training that was killed before its first checkpoint
             return {}
-        header, arrays = self._found
+        header, arrays = self._start
         require_same(self._out, header["fingerprint"], self._fingerprint)
         if self._best and not has_content(self._out / BEST, self._best):
             write_atomically(self._out / BEST, self._best)
-        told = best_of(self._record)
-        if told is not None:
-            again = told | evaluation_of(self._evaluation, read_policy(self._out / BEST))
-            if again["return_mean"] != told["return_mean"]:
-                session["best"] = again
+        recorded = best_of(self._record)
+        if recorded is not None:
+            measured = recorded | evaluation_of(self._evaluation, read_policy(self._out / BEST))
+            if measured["return_mean"] != recorded["return_mean"]:
+                session["best"] = measured
                 print(
-                    f"The best policy returns {again['return_mean']:.1f} in this task now", file=sys.stderr, flush=True
+                    f"The best policy returns {measured['return_mean']:.1f} in this task now",
+                    file=sys.stderr,
+                    flush=True,
                 )
-        settings = json.loads(json.dumps(config_to_json(self._config)))
+        config = json.loads(json.dumps(config_to_json(self._config)))
         before = header["config"].get("environment", {})
-        now = settings["environment"]
+        now = config["environment"]
         if changed := {name: value for name, value in before.items() if now.get(name) != value}:
             session["changed_from"] = changed
-        same = {**header["config"], "threads": 0} == {**settings, "threads": 0}
-        if not (same and same_source(self._record["sessions"][-1], session) and "best" not in session):
+        same_config = {**header["config"], "threads": 0} == {**config, "threads": 0}
+        if not (same_config and same_source(self._record["sessions"][-1], session) and "best" not in session):
             self._record["sessions"].append(session)
         learning = {name: values for name, values in arrays.items() if name != BEST_FILE}
         restore_learning(self.learner, self._environments, header["learning"], learning)
@@ -152,23 +163,25 @@ class Session(BaseCallback):
 
     @property
     def _finished(self) -> bool:
-        """Return True if all timesteps are done, and evaluated."""
-        past = self._record["evaluations"]
-        return bool(past) and past[-1]["timesteps"] == self._trained >= self._config.timesteps
+        """Return True if all timesteps are done and evaluated."""
+        evaluations = self._record["evaluations"]
+        return bool(evaluations) and evaluations[-1]["timesteps"] == self._trained >= self._config.timesteps
 
     def _on_rollout_start(self) -> None:
+        """Capture the state between two updates; evaluate if that is due, else write a checkpoint now and then."""
         self._sums = {}
         self._ended = []
-        self._whole = False
-        self._keep()
-        past = self._record["evaluations"]
-        due = not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval
+        self._rollout_complete = False
+        self._capture()
+        evaluations = self._record["evaluations"]
+        due = not evaluations or self._trained - evaluations[-1]["timesteps"] >= self._config.eval_interval
         if due and not self._stopping.asked:
             self._evaluate()
-        elif monotonic() - self._written[0] > self._written[1] / SHARE:
+        elif monotonic() - self._written_at > self._write_seconds / CHECKPOINT_TIME_FRACTION:
             self._write_checkpoint()
 
     def _on_step(self) -> bool:
+        """Sum rewards and stiffness, and collect the infos of ended episodes; return False to end the training."""
         for name, values in self._environments.step_info.items():
             if name.startswith(("reward/", "stiffness/")):
                 self._sums[name] = self._sums.get(name, 0.0) + values
@@ -177,7 +190,8 @@ class Session(BaseCallback):
         return not self._stopping.asked
 
     def _on_rollout_end(self) -> None:
-        self._whole = True
+        """Log means over the rollout: rewards, stiffness, and return, length and falls of the ended episodes."""
+        self._rollout_complete = True
         for name, sums in self._sums.items():
             self.logger.record(name, float(np.mean(sums)) / self.learner.rollout_steps)
         if self._ended:
@@ -188,14 +202,15 @@ class Session(BaseCallback):
             self.logger.record("episode/falls_share", np.mean(falls))
 
     def _on_training_end(self) -> None:
-        if not self._whole:
-            return  # it was ended within a rollout, and what is kept is from before
-        self._keep()
+        """Capture and evaluate the last state."""
+        if not self._rollout_complete:
+            return  # ended within a rollout: the state captured at its start is the last one between two updates
+        self._capture()
         if not self._stopping.asked and not self._finished:
             self._evaluate()
 
-    def _keep(self) -> None:
-        """Keep the exact present state, between two updates, for the next checkpoint."""
+    def _capture(self) -> None:
+        """Hold a copy of the exact present state, between two updates, for the next checkpoint."""
         self._trained = self.learner.ppo.num_timesteps
         for form in self.logger.output_formats:
             if isinstance(form, TensorBoardOutputFormat):
@@ -212,7 +227,7 @@ class Session(BaseCallback):
         }
         if self._best:
             arrays[BEST_FILE] = np.frombuffer(self._best, np.uint8)
-        self._kept = (header, arrays)
+        self._captured = (header, arrays)
         self._policy = self.learner.policy(self._fingerprint)
 
     def _evaluate(self) -> None:
@@ -230,32 +245,40 @@ class Session(BaseCallback):
             self.logger.record(f"evaluation/{name}", entry[name])
         self.logger.dump(self._trained)
         self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {entry['episodes']} fell")
-        self._keep()
+        self._capture()
         self._save("running")
-        if not tell(self._onlookers, entry):
+        if not call_with_evaluation(self._user_callbacks, entry):
             self._stopping.ask()
 
     def _seconds(self) -> float:
-        """Wall time of this session and the earlier ones [s]."""
+        """Return the wall time of this session and the earlier ones [s]."""
         return self._seconds_before + monotonic() - self._began
 
     def _save(self, status: str) -> None:
-        """Write the kept checkpoint, the newest policy and the record."""
+        """Write the captured state as a checkpoint, the newest policy and the record."""
         self._write_checkpoint(1 if status == "finished" else KEPT_CHECKPOINTS)
         if self._policy is not None:
             save_policy(self._out / LAST, self._policy)
         self._write_record(status)
 
     def _write_checkpoint(self, kept: int = KEPT_CHECKPOINTS) -> None:
+        """Write the captured state and remove all but the newest `kept` checkpoints; note the time that it took."""
         began = monotonic()
-        if self._kept is not None:
-            write_checkpoint(self._out, *self._kept, kept)
-        self._written = monotonic(), monotonic() - began
+        if self._captured is not None:
+            write_checkpoint(self._out, *self._captured, kept)
+        self._written_at = monotonic()
+        self._write_seconds = self._written_at - began
 
     def _write_record(self, status: str) -> None:
-        """Write run.json with this session's status, time and evaluations."""
-        self._record |= {"config": config_to_json(self._config), "status": status, "timesteps": self._trained}
-        self._record |= {"seconds": round(self._seconds(), 1), "best": best_of(self._record)}
+        """Write run.json: configuration, status, timesteps, wall time of all sessions, best evaluation, and all that
+        the record already holds."""
+        self._record |= {
+            "config": config_to_json(self._config),
+            "status": status,
+            "timesteps": self._trained,
+            "seconds": round(self._seconds(), 1),
+            "best": best_of(self._record),
+        }
         if status == "interrupted" and self._stopping.signal is not None:
             self._record["signal"] = self._stopping.signal.name
         write_record(self._out, self._record)

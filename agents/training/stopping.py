@@ -9,7 +9,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Stopping:
-    """Request to stop, with its signal if there was one; a context manager that works in the main thread only."""
+    """Note a request to stop, by a signal or by `ask`; a context manager, which sees signals in the main thread only.
+
+    `asked` is True after a request, `signal` the signal of the request, if there was one.
+    """
 
     def __init__(self) -> None:
         self.asked = False
@@ -17,11 +20,12 @@ class Stopping:
         self._before: dict[int, Any] = {}
 
     def _stop(self, number: int, _frame: Any) -> None:
+        """Note the first signal; at the second, raise KeyboardInterrupt."""
         first = self.signal is None
         self.signal = signal.Signals(number)
         self.asked = True
         if not first:
-            self._restore()  # the third is as if nobody handled it
+            self._restore()  # a third signal meets the handlers from before
             raise KeyboardInterrupt
 
     def ask(self) -> None:
@@ -29,6 +33,7 @@ class Stopping:
         self.asked = True
 
     def _restore(self) -> None:
+        """Restore the signal handlers from before."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 

@@ -28,29 +28,31 @@ def log_configuration(logger: Logger, config: TrainingConfig) -> None:
 
 
 @contextmanager
-def no_word_of_writers() -> Iterator[None]:
-    """Suppress tracebacks of TensorBoard's writer threads inside the block; waiting for such a thread raises its error
-    anyway."""
+def without_writer_tracebacks() -> Iterator[None]:
+    """Suppress tracebacks of TensorBoard's writer threads inside the block: their errors are raised again where the
+    training waits for them."""
     before = threading.excepthook
 
-    def told(ended: threading.ExceptHookArgs) -> None:
+    def report(ended: threading.ExceptHookArgs) -> None:
         if not (isinstance(ended.exc_value, OSError) and type(ended.thread).__module__.startswith(_WRITERS)):
             before(ended)
 
-    threading.excepthook = told
+    threading.excepthook = report
     try:
         yield
     finally:
         threading.excepthook = before
 
 
-def _flat(values: dict[str, Any], at: str = "") -> dict[str, bool | str | float | None]:
-    """Return `{"environment": {"speed": 1.2}}` as `{"environment/speed": 1.2}`; lists as text, without entries of
-    None."""
+def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, bool | str | float | None]:
+    """Return nested dictionaries as one: `{"environment": {"speed": 1.2}}` as `{"environment/speed": 1.2}`.
+
+    Lists become JSON text; entries of None are left out.
+    """
     flat: dict[str, bool | str | float | None] = {}
     for name, value in values.items():
         if isinstance(value, dict) and value:
-            flat |= _flat(value, f"{at}{name}/")
+            flat |= _flat(value, f"{prefix}{name}/")
         elif value is not None:
-            flat[f"{at}{name}"] = value if isinstance(value, (bool, int, float, str)) else json.dumps(value)
+            flat[f"{prefix}{name}"] = value if isinstance(value, (bool, int, float, str)) else json.dumps(value)
     return flat

@@ -1,6 +1,6 @@
-"""Join a Ray cluster, and run independent commands on its nodes; one whose node dies runs again on another.
+"""Join a Ray cluster, and run independent commands on its nodes; a command whose node dies runs again on another.
 
-Every node needs springfoot, and for commands the same folders: they read and write files.
+Every node needs springfoot, and the same folders, as commands read and write files.
 """
 
 import logging
@@ -21,10 +21,10 @@ MOST_RETRIES = 10
 
 @contextmanager
 def joined(processors: int | None = None) -> Iterator[None]:
-    """Join the cluster of the variable RAY_ADDRESS until the block ends, else start one on this machine alone.
+    """Connect to the Ray cluster of the environment variable RAY_ADDRESS until the block ends.
 
-    A process that is connected already stays so. `processors` is how many a cluster on this machine offers; as many as
-    there are unless given.
+    Without that variable, start a cluster on this machine alone, with `processors` processors (None: all). A process
+    that is connected already stays so.
     """
     if ray.is_initialized():
         yield
@@ -34,10 +34,10 @@ def joined(processors: int | None = None) -> Iterator[None]:
     os.environ.setdefault("RAY_BACKEND_LOG_LEVEL", "fatal")
     address = os.environ.get("RAY_ADDRESS")
     alone: dict[str, Any] = {} if address else {"include_dashboard": False, "num_cpus": processors}
-    ours = signal.getsignal(signal.SIGTERM)
+    sigterm_handler = signal.getsignal(signal.SIGTERM)
     ray.init(address=address or "local", log_to_driver=False, logging_level="ERROR", **alone)
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, ours)  # Ray's own ends Python at once
+        signal.signal(signal.SIGTERM, sigterm_handler)  # Ray's own handler would end Python at once
     try:
         yield
     finally:
@@ -45,7 +45,7 @@ def joined(processors: int | None = None) -> Iterator[None]:
 
 
 def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
-    """Run each (name, words) with one processor of the cluster, and print what it says after its name.
+    """Run commands (name, words), each on one processor of the cluster; print their standard error, name first.
 
     Raises `KeyboardInterrupt` after a signal, with the commands ended.
     """
@@ -57,19 +57,19 @@ def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
             while waiting:
                 (done,), waiting = ray.wait(waiting)
                 try:
-                    said = ray.get(done)
+                    output = ray.get(done)
                 except ray.exceptions.RayError as error:
-                    said = f"lost with its node: {str(error).splitlines()[0]}\n"
-                for line in said.splitlines():
+                    output = f"lost with its node: {str(error).splitlines()[0]}\n"
+                for line in output.splitlines():
                     print(f"{names[done]}: {line}", file=sys.stderr, flush=True)
         except KeyboardInterrupt:
-            for each in waiting:
-                ray.cancel(each)
+            for running in waiting:
+                ray.cancel(running)
             raise
 
 
 def _run(words: list[str], folder: str) -> str:
-    """Run a command in a folder on this node; return what it says on standard error."""
+    """Run a command in a folder on this node; return its standard error."""
     done = subprocess.run(
         words,
         cwd=folder,

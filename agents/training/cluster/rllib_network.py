@@ -1,4 +1,4 @@
-"""Define actor and critic for RLlib with the layers and the first weights that our own trainer gives them.
+"""Define actor and critic for RLlib, with the layers and initial weights of stable-baselines3's.
 
 Observations are normalised inside by statistics that stay as they are: RLlib's own filter merges the counts of its
 runners anew after every update, so that they grow without bound.
@@ -25,31 +25,32 @@ _HIDDEN_GAIN, _ACTION_GAIN, _VALUE_GAIN = 2**0.5, 0.01, 1.0
 class ActorCritic(TorchRLModule, ValueFunctionAPI):
     """Two tanh networks on normalised observations: mean actions with a common log standard deviation, and the value.
 
-    `model_config` has `hidden`, widths; `log_std`, of the actions at the start; `mean` and `variance` (D,) of the
-    observations.
+    `model_config` holds `hidden` (widths of the hidden layers), `log_std` (of the actions, at the start), and `mean`
+    and `variance` (D,) of the observations.
     """
 
     def setup(self) -> None:
         """Make the layers; the mean action begins at 0."""
-        given: dict[str, Any] = dict(self.model_config)
+        config: dict[str, Any] = dict(self.model_config)
         observations = int(np.prod(self.observation_space.shape))
         actions = int(np.prod(self.action_space.shape))
-        self.register_buffer("mean", torch.tensor(given["mean"], dtype=torch.float32))
-        self.register_buffer("variance", torch.tensor(given["variance"], dtype=torch.float32))
-        self.actor = _network([observations, *given["hidden"], actions], _ACTION_GAIN)
-        self.critic = _network([observations, *given["hidden"], 1], _VALUE_GAIN)
-        self.log_std = nn.Parameter(torch.full((actions,), float(given["log_std"])))
+        self.register_buffer("mean", torch.tensor(config["mean"], dtype=torch.float32))
+        self.register_buffer("variance", torch.tensor(config["variance"], dtype=torch.float32))
+        self.actor = _network([observations, *config["hidden"], actions], _ACTION_GAIN)
+        self.critic = _network([observations, *config["hidden"], 1], _VALUE_GAIN)
+        self.log_std = nn.Parameter(torch.full((actions,), float(config["log_std"])))
 
     def _forward(self, batch: dict[str, Any], **_: Any) -> dict[str, Any]:
-        """Return means and log standard deviations (N, 8) of the actions."""
+        """Return the inputs of the action distribution (N, 8): four means, then four log standard deviations."""
         mean = self.actor(self._normalized(batch))
         return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, self.log_std.expand_as(mean)], dim=-1)}
 
     def compute_values(self, batch: dict[str, Any], embeddings: Any = None) -> torch.Tensor:
-        """Return the values (N,)."""
+        """Return the critic's values (N,) of the observations of a batch."""
         return self.critic(self._normalized(batch)).squeeze(-1)
 
     def _normalized(self, batch: dict[str, Any]) -> torch.Tensor:
+        """Return the observations (N, D) of a batch, by mean and deviation, clipped."""
         centred = (batch[Columns.OBS] - self.mean) / torch.sqrt(self.variance + VARIANCE_FLOOR)
         return centred.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
 
@@ -67,7 +68,7 @@ def _network(widths: list[int], gain: float) -> nn.Sequential:
 
 
 def actor_layers(state: dict[str, np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return weight and bias of each layer of the actor in a module's state."""
+    """Return weight and bias of each layer of the actor, from the state of an `ActorCritic`."""
     names = sorted(
         (name.removesuffix(".weight") for name in state if name.startswith("actor.") and name.endswith(".weight")),
         key=lambda name: int(name.split(".")[1]),

@@ -49,23 +49,23 @@ PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray
 """Packages whose versions decide the result of a training."""
 CHECKPOINT = "ray-"
 """First part of a checkpoint's folder name; the timesteps follow."""
-_TOLD = "springfoot.json"
-"""File of a checkpoint with the record at its time."""
-_BATCH = "springfoot-batch"
+_RECORD = "springfoot.json"
+"""File of a checkpoint: the run's sessions, evaluations, timesteps and seconds at its time."""
+_ENVIRONMENT = "springfoot-batch"
 """Name under which RLlib finds our environments."""
 
 
 class _Batch(gym.vector.VectorWrapper):
-    """Our vector environment with rewards times `scale`, and without the infos, which RLlib would turn into N
+    """Multiply the rewards of a vector environment by `scale`, and drop its infos, of which RLlib would make N
     dictionaries a step."""
 
     def __init__(self, env: gym.vector.VectorEnv, scale: float) -> None:
         super().__init__(env)
         self._scale = scale
 
-    def reset(self, **given: Any) -> tuple[NDArray, dict[str, Any]]:
+    def reset(self, **arguments: Any) -> tuple[NDArray, dict[str, Any]]:
         """Reset as the environment does."""
-        return self.env.reset(**given)[0], {}
+        return self.env.reset(**arguments)[0], {}
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Step as the environment does."""
@@ -73,19 +73,19 @@ class _Batch(gym.vector.VectorWrapper):
         return observation, reward * self._scale, terminated, truncated, {}
 
 
-def _batch(given: Mapping[str, Any]) -> gym.vector.VectorEnv:
-    """Make the environments of a runner; `given` has their number, their settings and the scale of the reward."""
-    return _Batch(SegmentedFootBipedVector(given["num_envs"], **given["settings"]), given["scale"])
+def _batch(context: Mapping[str, Any]) -> gym.vector.VectorEnv:
+    """Make the environments of a runner from RLlib's `context`: their number, their settings, the reward's scale."""
+    return _Batch(SegmentedFootBipedVector(context["num_envs"], **context["settings"]), context["scale"])
 
 
 def train(config: TrainingConfig, out: str | Path, num_env_runners: int | None = None) -> dict[str, Any]:
     """Train a new policy in the new folder `out` on a Ray cluster; return the content of `run.json`.
 
     Args:
-        config: as at home; `num_envs` and `update_steps` are those of all runners together.
+        config: as for `springfoot.agents.train`; `num_envs` and `update_steps` are those of all runners together.
         out: new folder, on this machine.
-        num_env_runners: processes that collect, each on one processor of the cluster; 0 collects in this process, None
-            takes one for each processor but one.
+        num_env_runners: number of processes that collect, each on one processor of the cluster; 0 collects in this
+            process, None takes one for each processor but one.
 
     The cluster is that of the variable RAY_ADDRESS, else the one this process is connected to, else this machine alone.
     Signals, status and errors are those of `springfoot.agents.train`; the bits depend on the order in which samples
@@ -103,8 +103,13 @@ def resume(
 ) -> dict[str, Any]:
     """Continue the run in `out` from its newest checkpoint, which is a pickle; return the content of `run.json`.
 
-    `timesteps` are how many more, None finishes an interrupted run; `num_env_runners` are as many as before unless
-    given. Raises `SpringfootError` for a run that is finished, or that another engine trained.
+    Args:
+        out: the run's folder.
+        timesteps: how many more to train; None finishes an interrupted run.
+        threads: threads of the physics of periodic evaluations; None for as many as before.
+        num_env_runners: see `train`; None for as many as before.
+
+    Raises `SpringfootError` for a run that is finished, or that another engine trained.
     """
     out = Path(out)
     with owned(out):
@@ -112,31 +117,32 @@ def resume(
         record = read_record(out)
         if not is_of_rllib(record):
             raise SpringfootError(f"{out} was trained by another engine")
-        found = _newest(out)
-        told = read_object(found / _TOLD, "record of a checkpoint") if found else {"sessions": [], "evaluations": []}
+        checkpoint = _newest(out)
+        past = {"sessions": [], "evaluations": []}
+        past = read_object(checkpoint / _RECORD, "record of a checkpoint") if checkpoint else past
         try:
-            require_past(told)
-            done = require_count("timesteps", told.get("timesteps", 0), 0)
+            require_past(past)
+            done = require_count("timesteps", past.get("timesteps", 0), 0)
             runners = record["engine"]["num_env_runners"] if num_env_runners is None else num_env_runners
         except (KeyError, TypeError, ValueError) as error:
-            raise SpringfootError(f"{found or out} is not a checkpoint of ours: {error}") from None
+            raise SpringfootError(f"{checkpoint or out} is not a checkpoint of ours: {error}") from None
         config = config_from_json(record["config"])
         total = config.timesteps if timesteps is None else done + timesteps
         if total <= done and record.get("status") == "finished":
             raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
         config = dataclasses.replace(config, timesteps=total, threads=threads or config.threads)
-        return _Run(config, out, told, runners, found).learn()
+        return _Run(config, out, past, runners, checkpoint).learn()
 
 
 def _newest(out: Path) -> Path | None:
     """Return the folder of the newest checkpoint; None if there is none."""
-    numbers = [path.name.removeprefix(CHECKPOINT) for path in out.glob(f"{CHECKPOINT}*") if (path / _TOLD).is_file()]
+    numbers = [path.name.removeprefix(CHECKPOINT) for path in out.glob(f"{CHECKPOINT}*") if (path / _RECORD).is_file()]
     numbers = [number for number in numbers if number.isdecimal()]
     return out / f"{CHECKPOINT}{max(map(int, numbers))}" if numbers else None
 
 
 class _Run:
-    """Train the run in the folder `out`, from the beginning or from the checkpoint `found`."""
+    """Train the run in the folder `out`, from the beginning or from the folder `checkpoint` in it."""
 
     def __init__(
         self,
@@ -144,14 +150,14 @@ class _Run:
         out: Path,
         record: dict[str, Any],
         num_env_runners: int | None,
-        found: Path | None = None,
+        checkpoint: Path | None = None,
     ) -> None:
         threads = config.threads or processors()
         self._evaluation = Biped(config.environment, config.eval_episodes, threads)  # first: raises for bad settings
         self._fingerprint = fingerprint(self._evaluation)
         self._config = config
         self._out = out
-        self._found = found
+        self._checkpoint = checkpoint
         self._runners = num_env_runners
         self._trained = record.get("timesteps", 0)
         self._seconds_before = float(record.get("seconds", 0.0))
@@ -163,20 +169,20 @@ class _Run:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
         with ExitStack() as stack:
             self._connect(stack)
-            self._algorithm = self._built()
+            self._algorithm = self._build()
             stack.callback(shutil.rmtree, self._algorithm.logdir, ignore_errors=True)  # Ray's, empty
             stack.callback(self._algorithm.stop)
-            if self._found is not None:
-                self._algorithm.restore_from_path(str(self._found.absolute()))
-                if (self._found / BEST).is_file():
-                    shutil.copyfile(self._found / BEST, self._out / BEST)
+            if self._checkpoint is not None:
+                self._algorithm.restore_from_path(str(self._checkpoint.absolute()))
+                if (self._checkpoint / BEST).is_file():
+                    shutil.copyfile(self._checkpoint / BEST, self._out / BEST)
             self._record["sessions"].append({"from_timesteps": self._trained, **versions_and_commit(PACKAGES)})
             self._write_record("running")
             self._writer = stack.enter_context(SummaryWriter(str(self._out), purge_step=self._trained or None))
             self._progress = Progress(self._config.timesteps, self._trained)
             stack.enter_context(self._stopping)  # after Ray, which has handlers of its own
             try:
-                with suppress(KeyboardInterrupt), self._progress:  # at the second signal: what is kept stands
+                with suppress(KeyboardInterrupt), self._progress:  # the second signal: the last checkpoint counts
                     self._learn()
             except Exception:
                 self._write_record("failed")
@@ -185,7 +191,7 @@ class _Run:
         return self._record
 
     def _connect(self, stack: ExitStack) -> None:
-        """Join or start a Ray cluster, and settle the number of runners."""
+        """Join or start a Ray cluster until `stack` is closed, and decide the number of runners."""
         stack.enter_context(joined(None if self._runners is None else max(self._runners + 1, processors())))
         if self._runners is None:
             self._runners = max(1, int(ray.cluster_resources().get("CPU", 2)) - 1)
@@ -195,17 +201,17 @@ class _Run:
                 f"num_envs must be a multiple of the {self._runners} runners, got {self._config.num_envs}"
             )
 
-    def _built(self) -> Any:
+    def _build(self) -> Any:
         """Return RLlib's PPO with the configuration's numbers."""
         config = self._config
         assert self._runners is not None
         torch.set_num_threads(1)
-        register_env(_BATCH, _batch)
-        share = config.environment.step_seconds / ACTION_STEP
-        gamma = config.gamma**share
-        fragment = max(1, config.update_steps // config.num_envs)
-        samples = fragment * config.num_envs
-        mean, variance = observed(config)
+        register_env(_ENVIRONMENT, _batch)
+        steps_of_20ms = config.environment.step_seconds / ACTION_STEP  # gamma and lambda are per 20 ms
+        gamma = config.gamma**steps_of_20ms
+        rollout_steps = max(1, config.update_steps // config.num_envs)
+        samples = rollout_steps * config.num_envs
+        mean, variance = observation_moments(config)
         network = {
             "hidden": list(config.hidden),
             "log_std": config.log_std,
@@ -216,7 +222,8 @@ class _Run:
         ppo = (
             PPOConfig()
             .environment(
-                _BATCH,
+                _ENVIRONMENT,
+                # 1 - gamma: returns are then of the size of one step's reward
                 env_config={"settings": settings_to_json(config.environment), "scale": 1.0 - gamma},
                 disable_env_checking=True,
             )
@@ -224,18 +231,18 @@ class _Run:
                 num_env_runners=self._runners,
                 num_envs_per_env_runner=config.num_envs // max(1, self._runners),
                 gym_env_vectorize_mode="vector_entry_point",
-                rollout_fragment_length=fragment,
+                rollout_fragment_length=rollout_steps,
                 explore=True,
             )
             .learners(num_learners=0)
             .rl_module(rl_module_spec=RLModuleSpec(module_class=ActorCritic, model_config=network))
             .training(
                 train_batch_size_per_learner=samples,
-                minibatch_size=-(-samples // config.minibatches),
+                minibatch_size=-(-samples // config.minibatches),  # rounded up
                 num_epochs=config.epochs,
                 lr=[[0, rate], [config.timesteps, rate * config.learning_rate_end]],
                 gamma=gamma,
-                lambda_=config.gae_lambda**share,
+                lambda_=config.gae_lambda**steps_of_20ms,
                 clip_param=config.clip_range,
                 use_kl_loss=False,
                 entropy_coeff=0.0,
@@ -254,8 +261,8 @@ class _Run:
     def _learn(self) -> None:
         """Train, evaluate and keep checkpoints until the end or a signal."""
         while self._trained < self._config.timesteps and not self._stopping.asked:
-            past = self._record["evaluations"]
-            if not past or self._trained - past[-1]["timesteps"] >= self._config.eval_interval:
+            evaluations = self._record["evaluations"]
+            if not evaluations or self._trained - evaluations[-1]["timesteps"] >= self._config.eval_interval:
                 self._evaluate()
             result = self._algorithm.train()
             collected = result["env_runners"]
@@ -271,12 +278,12 @@ class _Run:
 
     @property
     def _finished(self) -> bool:
-        """Return True if all timesteps are done, and evaluated."""
-        past = self._record["evaluations"]
-        return bool(past) and past[-1]["timesteps"] == self._trained >= self._config.timesteps
+        """Return True if all timesteps are done and evaluated."""
+        evaluations = self._record["evaluations"]
+        return bool(evaluations) and evaluations[-1]["timesteps"] == self._trained >= self._config.timesteps
 
     def _policy(self) -> Policy:
-        """Return the actor's mean actions with the present weights."""
+        """Return a copy of the actor as a policy that acts by its mean action."""
         state = self._algorithm.learner_group.get_weights()[DEFAULT_MODULE_ID]
         layers = actor_layers(state)
         return ignoring_unvaried(
@@ -306,31 +313,32 @@ class _Run:
         self._keep()
 
     def _keep(self) -> None:
-        """Write the newest policy, a checkpoint of Ray's, and the record; remove the checkpoints before."""
+        """Write the newest policy, a checkpoint of Ray's and the record; remove older checkpoints."""
         save_policy(self._out / LAST, self._policy())
-        kept = self._out / f"{CHECKPOINT}{self._trained}"
-        part = self._out / f".{kept.name}"
-        for left in self._out.glob(f".{CHECKPOINT}*"):  # of a run that was killed while it saved
-            shutil.rmtree(left, ignore_errors=True)
-        self._algorithm.save_to_path(str(part.absolute()))
-        told = {name: self._record[name] for name in ("sessions", "evaluations")}
-        told |= {"timesteps": self._trained, "seconds": self._seconds()}
-        write_atomically(part / _TOLD, object_with_digest(told))
+        checkpoint = self._out / f"{CHECKPOINT}{self._trained}"
+        unfinished = self._out / f".{checkpoint.name}"  # gets the final name when it is whole
+        for leftover in self._out.glob(f".{CHECKPOINT}*"):  # of a run that was killed while it saved
+            shutil.rmtree(leftover, ignore_errors=True)
+        self._algorithm.save_to_path(str(unfinished.absolute()))
+        past = {name: self._record[name] for name in ("sessions", "evaluations")}
+        past |= {"timesteps": self._trained, "seconds": self._seconds()}
+        write_atomically(unfinished / _RECORD, object_with_digest(past))
         if (self._out / BEST).is_file():
-            shutil.copyfile(self._out / BEST, part / BEST)
-        shutil.rmtree(kept, ignore_errors=True)
-        part.rename(kept)
+            shutil.copyfile(self._out / BEST, unfinished / BEST)
+        shutil.rmtree(checkpoint, ignore_errors=True)
+        unfinished.rename(checkpoint)
         for path in self._out.glob(f"{CHECKPOINT}*"):
-            if path != kept:
+            if path != checkpoint:
                 shutil.rmtree(path, ignore_errors=True)
         self._write_record("running")
 
     def _seconds(self) -> float:
-        """Wall time of this session and the earlier ones [s]."""
+        """Return the wall time of this session and the earlier ones [s]."""
         return round(self._seconds_before + monotonic() - self._began, 1)
 
     def _write_record(self, status: str) -> None:
-        """Write run.json with this session's status, time and evaluations."""
+        """Write run.json: engine, configuration, status, timesteps, wall time of all sessions, best evaluation, and all
+        that the record already holds."""
         self._record |= {
             "engine": {"name": RLLIB, "num_env_runners": self._runners},
             "config": config_to_json(self._config),
@@ -344,19 +352,20 @@ class _Run:
         write_record(self._out, self._record)
 
 
-def observed(config: TrainingConfig) -> tuple[NDArray, NDArray]:
-    """Return mean and variance (D,) of the observations of one update of random actions around 0.
+def observation_moments(config: TrainingConfig) -> tuple[NDArray, NDArray]:
+    """Return mean and variance (D,) of the observations, from one update's steps with random actions around 0.
 
-    They stand for the whole training: a mean that moved would have to be the same on every runner at every step.
+    The whole training normalises by them: statistics that moved would have to be the same on every runner at every
+    step.
     """
     environments = SegmentedFootBipedVector(config.num_envs, **dict[str, Any](settings_to_json(config.environment)))
     random = np.random.default_rng([config.seed, 1])
     shape = environments.action_space.shape
     observation, _ = environments.reset(seed=config.seed)
-    seen = [observation.astype(float)]
+    batches = [observation.astype(float)]
     for _ in range(max(1, config.update_steps // config.num_envs)):
         observation, *_ = environments.step(random.normal(0.0, np.exp(config.log_std), shape).clip(-1.0, 1.0))
-        seen.append(observation.astype(float))
+        batches.append(observation.astype(float))
     environments.close()
-    every = np.concatenate(seen)
-    return every.mean(axis=0), every.var(axis=0)
+    observations = np.concatenate(batches)
+    return observations.mean(axis=0), observations.var(axis=0)

@@ -1,4 +1,4 @@
-"""Onlookers of a training: TensorBoard, and callbacks that may end it but change no bit."""
+"""Callbacks of a training: TensorBoard, and callbacks that may end it but change no bit."""
 
 import dataclasses
 import json
@@ -86,7 +86,7 @@ def test_a_function_of_evaluations_may_end_the_training(tmp_path):
 
 
 @pytest.mark.slow
-def test_onlookers_change_no_bit_of_what_is_trained(run, tmp_path):
+def test_callbacks_change_no_bit_of_what_is_trained(run, tmp_path):
     training.train(SHORT, tmp_path / "run", callbacks=[Counting(10**9), lambda evaluation: None])
     alone, seen = (read_policy(folder / training.LAST) for folder in (run[0], tmp_path / "run"))
     assert all(np.array_equal(a, b) for a, b in zip(alone.weights, seen.weights, strict=True))

@@ -64,7 +64,7 @@ def test_the_first_policy_is_the_mean_action_of_the_untrained_network(tmp_path):
 
     from springfoot.agents.training.cluster.rllib_network import ActorCritic, actor_layers
 
-    mean, variance = rllib_training.observed(SMALL)
+    mean, variance = rllib_training.observation_moments(SMALL)
     environments = SegmentedFootBipedVector(4)
     given = {"hidden": [8, 8], "log_std": -0.9, "mean": mean.tolist(), "variance": variance.tolist()}
     module = ActorCritic(
