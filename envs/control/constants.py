@@ -97,14 +97,14 @@ class SlopeConstants:
 def constants_name(
     equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", follows_plan: bool = False
 ) -> str:
-    """Return the name of the committed constants for a setting.
+    """Return the name of the constants for these settings and `speed` [m/s at 1.70 m] in a file of constants.
 
     The equilibria "angle" and "phase" share those of "planned"; a body that follows the plan has one set for all.
     """
     name = "predicted" if follows_plan else "neutral" if equilibrium == "neutral" else "planned"
     name = name if cadence == "people" else f"{name}, {cadence} cadence"
     if follows_plan:
-        feedforward = "people"  # its own moments are fed forward in any case
+        feedforward = "people"  # not part of the name: the plan's moments are fed forward in any case
     name = name if feedforward == "people" else f"{name}, {feedforward}'s moments"
     return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
 
@@ -143,22 +143,23 @@ def _sets(table: Mapping[str, Any], name: str) -> dict[float, LegConstants]:
     others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]
     names = {TUNED_SPEED: name} | {float(other.removeprefix(prefix).removesuffix(unit)): other for other in others}
     return {
-        require_within("speed", at, PLAN_SPEED_RANGE, "m/s"): constants_from(table[own]) for at, own in names.items()
+        require_within("speed", speed, PLAN_SPEED_RANGE, "m/s"): constants_from(table[name_at_speed])
+        for speed, name_at_speed in names.items()
     }
 
 
 def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
     """Return the constants at `speed` [m/s], linear between the `sets` by speed; outside, those of the nearest set."""
     speeds = sorted(sets)
-    place = float(np.interp(speed, speeds, np.arange(len(speeds))))
-    lower = sets[speeds[int(place)]]
-    weight = place - int(place)
+    position = float(np.interp(speed, speeds, np.arange(len(speeds))))
+    lower = sets[speeds[int(position)]]
+    weight = position - int(position)
     if weight == 0.0:
         return lower
-    upper = sets[speeds[int(place) + 1]]
+    upper = sets[speeds[int(position) + 1]]
     values = {}
     for field in fields(LegConstants):
-        low, high = (np.array(getattr(each, field.name), float) for each in (lower, upper))
+        low, high = (np.array(getattr(constants, field.name), float) for constants in (lower, upper))
         values[field.name] = (low + weight * (high - low)).tolist()
     return constants_from(values)
 
@@ -179,33 +180,37 @@ def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
 
 
 def _from_json(kind: type[Constants], values: Any) -> Constants:
-    """Return constants of a kind; raise `SpringfootError` unless each has as many finite numbers as its field."""
+    """Return constants of the class `kind` from their JSON form.
+
+    Raises `SpringfootError` for missing or unknown names, and unless each has as many finite numbers as its field.
+    """
     required = [field.name for field in fields(kind) if field.default is MISSING]
     known = {field.name for field in fields(kind)}
     if not isinstance(values, Mapping) or not set(required) <= set(values) <= known:
         raise SpringfootError(f"constants must be a dictionary with {', '.join(required)}")
-    found: dict[str, Any] = {}
+    checked: dict[str, Any] = {}
     for name, hint in get_type_hints(kind).items():
         if name not in values:
             continue
         value = values[name]
         if hint is float:
-            found[name] = _within(name, value)
+            checked[name] = _within(name, value)
             continue
-        kinds = get_args(hint)
-        count = len(KNOTS) if Ellipsis in kinds else len(kinds)
+        item_hints = get_args(hint)
+        count = len(KNOTS) if Ellipsis in item_hints else len(item_hints)
         if not isinstance(value, (list, tuple)) or len(value) != count:
             raise SpringfootError(f"{name} must be {count} numbers")
-        found[name] = tuple(_within(name, each) for each in value)
-    return kind(**found)
+        checked[name] = tuple(_within(name, number) for number in value)
+    return kind(**checked)
 
 
 def _within(name: str, value: Any) -> float:
+    """Return the value of the constant `name` as a float; raise `SpringfootError` unless it is within its bounds."""
     return require_within(name, value, (LEAST_STIFFNESS.get(name, -LARGEST_CONSTANT), LARGEST_CONSTANT))
 
 
 def _sets_of(file: Path, name: str) -> dict[float, LegConstants]:
-    """Return speed [m/s] -> the constants `name` of a file; raise `SpringfootError` unless it has them."""
+    """Return speed [m/s] -> the constants `name` in a file; raise `SpringfootError` if it does not have them."""
     try:
         return _sets(json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"], name)
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -213,9 +218,11 @@ def _sets_of(file: Path, name: str) -> dict[float, LegConstants]:
 
 
 def _committed() -> dict[str, dict]:
+    """Return name -> the package's leg constants, in JSON form."""
     return _file()["constants"]
 
 
 @cache
 def _file() -> dict[str, dict]:
+    """Return the content of the package's file of constants."""
     return json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))

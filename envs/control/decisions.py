@@ -22,46 +22,47 @@ def gait_events(target: HumanGait) -> NDArray:
 
 @kernel
 def _take(actions, running, events, rows):
-    """Decide the actions that take effect.
+    """Decide the actions that take effect: new ones where a leg has passed an event since its last decision.
 
     Args:
-        actions: (N, 4) as given.
-        running: (N,) bool.
-        events: (E,) stride phases at which a leg decides; none for every step.
+        actions: (N, 4) actions as given.
+        running: (N,) bool; other bodies keep their actions.
+        events: (E,) stride phases at which a leg decides; none for decisions in every step.
         rows: (N,) of `CONTROL_ROW`; `decision` is changed.
 
-    Returns False for a number that is not finite.
+    Returns False, with nothing changed, if an action of a running body is not finite.
     """
     for i in range(len(actions)):
         for k in range(4):
             if running[i] and not isfinite(actions[i, k]):
                 return False
     for i in range(len(actions)):
-        own = rows[i].decision
+        decision = rows[i].decision
         phase = rows[i].legs.phase
         for side in range(2):
-            now = 0
+            passed = 0  # events since the leg's heel strike
             for event in events:
-                now += phase[side] >= event
-            held = not running[i] or (len(events) > 0 and now == own.stage[side])
+                passed += phase[side] >= event
+            held = not running[i] or (len(events) > 0 and passed == decision.stage[side])
             if running[i]:
-                own.stage[side] = now
+                decision.stage[side] = passed
             for joint in range(2):
                 k = 2 * side + joint
                 if held:
-                    own.action[k] = own.last_action[k]
+                    decision.action[k] = decision.last_action[k]
                 elif not rows[i].feet.controlled[side, joint]:
-                    own.action[k] = 0.0
+                    decision.action[k] = 0.0
                 else:
-                    own.action[k] = min(max(actions[i, k], -1.0), 1.0)
+                    decision.action[k] = min(max(actions[i, k], -1.0), 1.0)
     return True
 
 
 class DecisionTimes:
-    """Decide the actions of N bodies that take effect in a step.
+    """Decide which actions of N bodies take effect in a step.
 
-    With `decisions="event"` the leg's phase tells the events. A touchdown sets the phase to 0, so the heel strike is
-    that of the foot itself, and a foot that bounces does not decide again. Other events lie at the target's phases.
+    With `decisions="event"` a leg decides where its phase passes an event. A touchdown sets the phase to 0, so the heel
+    strike is that of the simulated foot, and a foot that bounces does not decide again. The other events lie at the
+    target's phases.
 
     Args:
         settings: times and joints of decisions.
@@ -72,19 +73,19 @@ class DecisionTimes:
     def __init__(self, settings: BipedSettings, target: HumanGait, rows: NDArray):
         self._events = gait_events(target) if settings.decisions == "event" else np.empty(0)
         self._rows = rows
-        self._own = rows["decision"]
-        self.action = self._own["action"]
-        """(N, 4) the actions that take effect, in [-1, 1]."""
+        self._decisions = rows["decision"]
+        self.action = self._decisions["action"]
+        """(N, 4) actions that take effect, in [-1, 1]."""
 
     def reset(self, ids: NDArray) -> None:
         """Let the next actions of bodies `ids` (K,) take effect at any phase."""
-        self._own["stage"][ids] = -1
-        self._own["last_action"][ids] = 0.0
+        self._decisions["stage"][ids] = -1
+        self._decisions["last_action"][ids] = 0.0
 
     def take(self, actions: NDArray, running: NDArray) -> NDArray | None:
         """Return the actions that take effect, (N, 4): `actions` clipped to [-1, 1].
 
-        Legs at no event, and bodies that are not `running` (N,), keep their last actions. Returns None, leaving all
-        state unchanged, for a number that is not finite.
+        Legs that have passed no event, and bodies that are not `running` (N,), keep their last actions. Returns None,
+        with all state unchanged, if an action of a running body is not finite.
         """
         return self.action if _take(actions, running, self._events, self._rows) else None

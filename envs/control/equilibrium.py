@@ -33,7 +33,10 @@ def plateau_curve(values: tuple[float, ...], plateaus: tuple[float, ...] = PLATE
 
 
 def foot_curves(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> tuple[NDArray, NDArray]:
-    """Return (SAMPLES, 2) rest angles [rad] and scheduled stiffness [N m/rad] of ankle and toe for the `settings`."""
+    """Return rest angles [rad] and scheduled stiffness [N m/rad] of ankle and toe, (SAMPLES, 2) each, on `GRID`.
+
+    `settings` say which; `constants` and `walk` are a row of the tables (`reference_walk.rows`).
+    """
     if settings.schedule is None:
         stiffness = fixed_stiffness(constants, walk.body, walk.target.foot.plateaus)
         rest = neutral(constants)
@@ -50,7 +53,7 @@ def foot_curves(settings: BipedSettings, constants: LegConstants, walk: Referenc
 
 
 def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> tuple[NDArray, NDArray]:
-    """Return rest angles and scheduled stiffness for each row of the tables.
+    """Return rest angles and scheduled stiffness of each of R rows (`reference_walk.rows`), for `PhaseTable`s.
 
     Rest angles are (R, SAMPLES, 2), with torques beside the springs (`foot_feed`) (R, SAMPLES, 4); stiffness is (R,
     SAMPLES, 2).
@@ -82,18 +85,21 @@ def _bound(rest: NDArray, stiffness: NDArray, tendon: float, walk: ReferenceWalk
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
-    """Return ankle and toe stiffness (SAMPLES, 2) [N m/rad] of the fixed schedule, which was tuned with the legs."""
+    """Return ankle and toe stiffness (SAMPLES, 2) [N m/rad] of the fixed schedule, part of the tuned `constants`."""
     toe = np.full(len(GRID), constants.toe_schedule)
     return np.stack([plateau_curve(constants.ankle_schedule, plateaus), toe], axis=-1) * body.stiffness_scale
 
 
 def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """Return rest angles (SAMPLES, 2) [rad] that follow the target's ankle and feed a moment forward through its K_ref.
+    """Return the rest angles (SAMPLES, 2) [rad] of the equilibrium "planned".
 
-    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots. A body that is on the plan and has K = K_ref then gets a
-    times the moment M of the walk (plantarflexion positive). The toe's rest angle is the tuned one from foot flat to
-    toe-off, and that of swing otherwise. A plan has no K_ref: theta_eq is its ankle and toe alone, each ahead by beta,
-    and its moments are fed forward beside the spring (`foot_feed`).
+    The ankle follows the target's angle theta and feeds its moment M (plantarflexion positive) forward through K_ref:
+    theta_eq = theta + a (beta dtheta/dt - M/K_ref) + knots, a = `constants.feedforward`. A body that is on the plan
+    and has K = K_ref then gets a times M. The toe's rest angle is the tuned one from foot flat to toe-off, and that of
+    swing otherwise.
+
+    A plan as target has no K_ref: theta_eq = theta + beta dtheta/dt + correction at ankle and toe, and its moments are
+    fed forward beside the springs (`foot_feed`).
     """
     body = walk.body
     target = walk.target
@@ -101,21 +107,22 @@ def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     beta = damping_times(body)
     period = constants.period_factor * walk.plan.stride_time
     if foot.ankle_quasi_stiffness is None:
-        flat = np.interp(GRID, [*foot.toe_flat, *foot.toe_off], [0.0, 1.0, 1.0, 0.0])
-        shifts = knot_curve(constants.ankle_knots_deg), flat * np.deg2rad(constants.toe_flat_deg)
-        named = zip(("ankle", "toe"), (beta[ANKLE], beta[TOE]), shifts, strict=True)
-        ahead = [target.mean(n, GRID) + b * target.rate(n, GRID) / period + shift for n, b, shift in named]
-        return np.stack(ahead, axis=-1)
-    quasi = plateau_curve(foot.ankle_quasi_stiffness or (), foot.plateaus) * body.stiffness_scale
-    lead = beta[ANKLE] * target.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / quasi
+        flat = np.interp(GRID, [*foot.toe_flat, *foot.toe_off], [0.0, 1.0, 1.0, 0.0])  # 1 from foot flat to toe-off
+        corrections = knot_curve(constants.ankle_knots_deg), flat * np.deg2rad(constants.toe_flat_deg)
+        joints = zip(("ankle", "toe"), (beta[ANKLE], beta[TOE]), corrections, strict=True)
+        angles = [target.mean(name, GRID) + b * target.rate(name, GRID) / period + shift for name, b, shift in joints]
+        return np.stack(angles, axis=-1)
+    k_ref = plateau_curve(foot.ankle_quasi_stiffness or (), foot.plateaus) * body.stiffness_scale
+    lead = beta[ANKLE] * target.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / k_ref
     ankle = target.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
     return np.stack([ankle, _toe(foot, constants.toe_flat_deg)], axis=-1)
 
 
 def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> NDArray | None:
-    """Return the torque (SAMPLES, 2) [N m], dorsiflexion positive, beside the springs of ankle and toe at any K.
+    """Return the torque (SAMPLES, 2) [N m], dorsiflexion positive, that acts beside the springs of ankle and toe,
+    whatever their K: the target's moments, fed forward.
 
-    None unless the settings feed the plan's moments forward.
+    None unless the equilibrium is "planned" and the target is a plan.
     """
     if settings.equilibrium != "planned" or walk.target.foot.ankle_quasi_stiffness is not None:
         return None

@@ -27,17 +27,19 @@ class FootLines(NamedTuple):
 
 @part
 def device(row, feet, theta, side, joint) -> Any:
-    """Return K and K theta_eq of a device: by its line at the angle `theta`, its schedule, or its numbers.
+    """Return K [N m/rad] and K theta_eq [N m] of the device at one joint; zeros without a device.
 
-    A line continues straight beyond its ends. `row` is of `CONTROL_ROW`, `feet` are `FootLines` as a plain tuple.
+    They come from the device's torque-angle line at the angle `theta` [rad], from its schedule, or from its numbers. A
+    line continues straight beyond its ends. `row` is of `CONTROL_ROW`, `feet` are `FootLines` as a plain tuple.
     """
     (lines, curves), foot = feet, row.feet
     if foot.line[side, joint] >= 0:
         line = lines[foot.line[side, joint]]
-        at = 0
-        while at < len(line) - 2 and theta >= line[at + 1, 0]:
-            at += 1
-        return line[at, 2], line[at, 1] + line[at, 2] * line[at, 0]
+        piece = 0
+        while piece < len(line) - 2 and theta >= line[piece + 1, 0]:
+            piece += 1
+        # On the piece torque = torque_0 - K (theta - theta_0) = K theta_eq - K theta.
+        return line[piece, 2], line[piece, 1] + line[piece, 2] * line[piece, 0]
     if foot.curve[side] >= 0:
         place = np.zeros(1, PLACE)[0]
         values = np.empty(4)
@@ -61,16 +63,18 @@ def foot_lines(feet: Sequence[Feet]) -> FootLines:
 
 
 def _tables(feet: Sequence[Feet]) -> list[tuple[tuple[float, float], ...]]:
+    """Return the torque-angle lines of the devices of all feet, each once."""
     joints = [joint for pair in feet for foot in pair for joint in foot.joints]
     return list(dict.fromkeys(joint.device.table for joint in joints if joint.device and joint.device.table))
 
 
 def _schedules(feet: Sequence[Feet]) -> list[StiffnessSchedule]:
+    """Return the devices' schedules of all feet, each once."""
     return list(dict.fromkeys(foot.schedule for pair in feet for foot in pair if foot.schedule))
 
 
 def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
-    """Return (N,) of `FOOT` for N pairs of feet."""
+    """Return the muscles and devices of N pairs of feet, (N,) of `FOOT`; `settings` say which joints actions set."""
     rows = np.zeros(len(feet), FOOT)
     tables = _tables(feet)
     schedules = _schedules(feet)

@@ -55,7 +55,8 @@ def action_of(stiffness: ArrayLike, settings: BipedSettings, body: Body) -> NDAr
 
 
 def draw_delay(settings: BipedSettings, random: np.random.Generator) -> int:
-    """Return the control windows from the request of a stiffness until it acts, in one episode; drawn if so set."""
+    """Return the number of control windows from the request of a stiffness until it acts, for one episode: the setting,
+    or drawn from its range."""
     if settings.stiffness_delay_range_s is None:
         return round(settings.stiffness_delay_s / CONTROL_WINDOW)
     shortest, longest = (round(delay / CONTROL_WINDOW) for delay in settings.stiffness_delay_range_s)
@@ -68,11 +69,11 @@ SPRING_OPTIONS = np.dtype(
         ("tendon", float),  # largest stiffness of the calf with its tendon [N m/rad]; infinite without a bound
         ("tissue", float),  # factor on the stiffness of the ankle's passive tissue beside it [-]
         ("scheduled", np.int64, 2),  # 1 where the schedule sets that of ankle, of toe
-        ("follows", np.int64),  # 1 if the rest angles move with the slope: a constant equilibrium does not
+        ("follows", np.int64),  # 1 if the rest angles change with the slope; constant ones do not
         ("held", np.int64),  # 1 if the rest angles are those of the phases at which K was set
     ]
 )
-"""Numbers of the settings, and of the tables' body, that springs need."""
+"""Settings of the springs; stiffness is that of the tables' body."""
 
 
 @part
@@ -93,64 +94,68 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
     scheduled = np.empty(2)
     option = options[0]
     for i in range(len(rows)):
-        own = rows[i].springs
+        springs = rows[i].springs
         subject = rows[i].subject
         angle = bodies[i].measured.angle
         for side in range(2):
             read(schedule[side * rows[i].legs.right :], subject.place, rows[i].legs.phase[side], scheduled)
-            own.rest_phase[side] = rows[i].legs.phase[side]
+            springs.rest_phase[side] = rows[i].legs.phase[side]
             for joint in range(2):
-                own.work_stiffness[side, joint] = own.work_equilibrium[side, joint] = 0.0
+                springs.work_stiffness[side, joint] = springs.work_equilibrium[side, joint] = 0.0
                 if not walking[i]:
                     continue
-                middle = scheduled[joint] if fixed[i] or option.scheduled[joint] else option.middle[joint]
-                share = 1.0 if fixed[i] else factor[i, 2 * side + joint]
+                base = scheduled[joint] if fixed[i] or option.scheduled[joint] else option.middle[joint]
+                ratio = 1.0 if fixed[i] else factor[i, 2 * side + joint]
                 if not rows[i].feet.muscles[side, joint]:
-                    share = 0.0
-                before = own.stiffness[side, joint]
-                after = middle * subject.scale.torque * share
-                deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
-                own.requests[0, side, joint] = after
-                if own.fresh:
-                    own.requests[:, side, joint] = after
-                if own.fresh or own.delay == 0:
-                    own.stiffness[side, joint] = after
-                if not own.fresh and own.delay == 0:
-                    own.work_stiffness[side, joint] = own.acts[side, joint] * 0.5 * (after - before) * deflection**2
+                    ratio = 0.0
+                before = springs.stiffness[side, joint]
+                after = base * subject.scale.torque * ratio
+                deflection = springs.equilibrium[side, joint] - angle[side, ANKLE + joint]
+                springs.requests[0, side, joint] = after
+                if springs.fresh:
+                    springs.requests[:, side, joint] = after
+                if springs.fresh or springs.delay == 0:
+                    springs.stiffness[side, joint] = after
+                if not springs.fresh and springs.delay == 0:
+                    work = springs.acts[side, joint] * 0.5 * (after - before) * deflection**2
+                    springs.work_stiffness[side, joint] = work
 
 
 @part
-def _arrive(own, angle):
-    """Let the request of `delay` windows ago act, and shift the past requests by one window."""
+def _arrive(springs, angle):
+    """Let the request of `delay` windows ago act, count its work, and shift the past requests by one window.
+
+    `springs` is of `SPRING_STATE`, `angle` (side, joint) [rad].
+    """
     for side in range(2):
         for joint in range(2):
-            before = own.stiffness[side, joint]
-            after = own.requests[own.delay, side, joint]
-            deflection = own.equilibrium[side, joint] - angle[side, ANKLE + joint]
-            own.stiffness[side, joint] = after
-            own.work_stiffness[side, joint] += own.acts[side, joint] * 0.5 * (after - before) * deflection**2
-            for past in range(len(own.requests) - 1, 0, -1):
-                own.requests[past, side, joint] = own.requests[past - 1, side, joint]
+            before = springs.stiffness[side, joint]
+            after = springs.requests[springs.delay, side, joint]
+            deflection = springs.equilibrium[side, joint] - angle[side, ANKLE + joint]
+            springs.stiffness[side, joint] = after
+            springs.work_stiffness[side, joint] += springs.acts[side, joint] * 0.5 * (after - before) * deflection**2
+            for past in range(len(springs.requests) - 1, 0, -1):
+                springs.requests[past, side, joint] = springs.requests[past - 1, side, joint]
 
 
 @part
 def _bound_by_tendon(row, option, angle):
-    """Lower the K of ankles to that of tendon and tissue at the joint angles `angle` (2, 4) [rad]."""
-    own = row.springs
+    """Lower the K of ankles to that of tendon and tissue at the joint angles `angle` (side, joint) [rad]."""
+    springs = row.springs
     for side in range(2):
         tissue = option.tissue * tissue_stiffness(angle[side, KNEE], angle[side, ANKLE])
         most = row.subject.scale.torque * (option.tendon + tissue)
-        if own.stiffness[side, 0] > most:
-            deflection = own.equilibrium[side, 0] - angle[side, ANKLE]
-            change = most - own.stiffness[side, 0]
-            own.stiffness[side, 0] = most
-            if not own.fresh:
-                own.work_stiffness[side, 0] += own.acts[side, 0] * 0.5 * change * deflection**2
+        if springs.stiffness[side, 0] > most:
+            deflection = springs.equilibrium[side, 0] - angle[side, ANKLE]
+            change = most - springs.stiffness[side, 0]
+            springs.stiffness[side, 0] = most
+            if not springs.fresh:
+                springs.work_stiffness[side, 0] += springs.acts[side, 0] * 0.5 * change * deflection**2
 
 
 @part
 def _swings(row, force, side):
-    """Tell whether a leg swings: past mid-stride and unloaded."""
+    """Return True if a leg swings: past mid-stride and unloaded. `force` is (side, contact, 2) [N]."""
     load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]
     return row.legs.phase[side] > 0.5 and load < row.legs.gains.touchdown
 
@@ -167,25 +172,28 @@ def muscle_stiffness(springs, side, joint) -> float:
 
 @part
 def _control(row, control, feet, theta, side, joint):
-    """Put K and K theta_eq of one joint at the angle `theta`, muscles and device together, into the control."""
-    own = row.springs
-    muscles = muscle_stiffness(own, side, joint)
+    """Put K and K theta_eq of one joint at the angle `theta` [rad], muscles and device together, into the control.
+
+    Arguments are as for `move`, `row` and `control` (side, joint, 2) of one body.
+    """
+    springs = row.springs
+    muscles = muscle_stiffness(springs, side, joint)
     stiffness, drive = device(row, feet, theta, side, joint)
-    own.device[side, joint] = stiffness
+    springs.device[side, joint] = stiffness
     if stiffness > 0.0:
-        own.equilibrium[side, joint] = drive / stiffness  # no muscles act beside it
+        springs.equilibrium[side, joint] = drive / stiffness  # no muscles act beside a device
     control[side, ANKLE + joint, 0] = muscles + stiffness
-    control[side, ANKLE + joint, 1] = muscles * own.equilibrium[side, joint] + drive
+    control[side, ANKLE + joint, 1] = muscles * springs.equilibrium[side, joint] + drive
 
 
 @part
 def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
     """Begin a control window: put K and K theta_eq of ankles and toes into the control.
 
-    K is the requested stiffness of `delay` windows ago, theta_eq the rest angle at the legs' phases or the foot's own.
-    An ankle's tendon may bound K, at the angles now. Moving the rest angle, so that the deflection goes from x to x',
-    puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack as the leg begins to swing lose their stored energy.
-    A device has its own K and theta_eq.
+    K is the requested stiffness of `delay` windows ago, bounded by an ankle's tendon at the present angles if the
+    setting asks for it; theta_eq is the rest angle at the legs' phases, or that of the foot's setting. Moving the rest
+    angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack as
+    the leg begins to swing lose their stored energy. A device has K and theta_eq of its setting.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
@@ -198,61 +206,61 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         options: (1,) of `SPRING_OPTIONS`.
         walking: (N,) bool; the springs of other bodies do not change.
     """
-    wanted = np.empty(rest.shape[-1])
+    planned = np.empty(rest.shape[-1])
     inclined = np.empty(4)
     option = options[0]
     feeds = rest.shape[-1] > 2
-    level = np.zeros(1, PLACE)[0]
+    first_row = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
-        own = rows[i].springs
+        springs = rows[i].springs
         foot = rows[i].feet
         subject = rows[i].subject
         angle = bodies[i].measured.angle
-        if walking[i] and own.delay > 0:
-            _arrive(own, angle)
+        if walking[i] and springs.delay > 0:
+            _arrive(springs, angle)
         if walking[i] and option.tendon < np.inf:
             _bound_by_tendon(rows[i], option, angle)
         for side in range(2):
             if not option.held:
-                own.rest_phase[side] = rows[i].legs.phase[side]
-            read(rest[side * rows[i].legs.right :], subject.place, own.rest_phase[side], wanted)
+                springs.rest_phase[side] = rows[i].legs.phase[side]
+            read(rest[side * rows[i].legs.right :], subject.place, springs.rest_phase[side], planned)
             if option.follows and subject.slope != 0.0:
-                read(incline, level, own.rest_phase[side], inclined)
-                wanted[0] += subject.slope * inclined[ANKLE]
+                read(incline, first_row, springs.rest_phase[side], inclined)
+                planned[0] += subject.slope * inclined[ANKLE]
             for joint in range(2):
-                k = own.stiffness[side, joint]
+                k = springs.stiffness[side, joint]
                 theta = angle[side, ANKLE + joint]
                 if walking[i]:
-                    acted = acts = own.acts[side, joint]
+                    acted = acts = springs.acts[side, joint]
                     if not foot.in_swing[side, joint]:
                         acts = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
-                        own.acts[side, joint] = acts
-                    aim = foot.rest[side, joint] if foot.rests[side, joint] else wanted[joint]
+                        springs.acts[side, joint] = acts
+                    new_rest = foot.rest[side, joint] if foot.rests[side, joint] else planned[joint]
                     if feeds and foot.muscles[side, joint] and not foot.rests[side, joint]:
-                        aim += subject.scale.torque * wanted[2 + joint] / k
-                    before = own.equilibrium[side, joint] - theta
-                    after = aim - theta
-                    own.equilibrium[side, joint] = aim
-                    if not own.fresh:
-                        own.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
-                        own.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
+                        new_rest += subject.scale.torque * planned[2 + joint] / k
+                    before = springs.equilibrium[side, joint] - theta
+                    after = new_rest - theta
+                    springs.equilibrium[side, joint] = new_rest
+                    if not springs.fresh:
+                        springs.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
+                        springs.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
                 _control(rows[i], control[i], feet, theta, side, joint)
         if walking[i]:
-            own.fresh = 0
+            springs.fresh = 0
 
 
 @kernel
 def _hold(rows, bodies, control, feet, held):
     """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in `control` (N, side, joint, 2).
 
-    They act without delay, and the work of both changes is counted as that of `stiffen` and `move`. A device, and a
-    rest angle that is the foot's own, stay. `rows` (N,) of `CONTROL_ROW`, `bodies` (N,) of `BODY_ROW`, `feet` a
+    They act without delay, and the work of both changes is counted as in `stiffen` and `move`. A device, and a rest
+    angle that the foot's setting gives, stay. `rows` (N,) of `CONTROL_ROW`, `bodies` (N,) of `BODY_ROW`, `feet` a
     `FootLines`.
     """
     for i in range(len(rows)):
         if not held[i]:
             continue
-        own = rows[i].springs
+        springs = rows[i].springs
         foot = rows[i].feet
         angle = bodies[i].measured.angle
         for side in range(2):
@@ -262,31 +270,31 @@ def _hold(rows, bodies, control, feet, held):
                 rest = foot.rest[side, joint] if foot.rests[side, joint] else drive / k
                 k = k if foot.muscles[side, joint] else 0.0
                 theta = angle[side, ANKLE + joint]
-                before = own.acts[side, joint] * own.stiffness[side, joint]
-                old = own.equilibrium[side, joint] - theta
-                new = rest - theta
-                own.stiffness[side, joint] = k
-                own.equilibrium[side, joint] = rest
-                own.acts[side, joint] = 1.0
-                own.requests[:, side, joint] = k
-                if not own.fresh:
-                    own.work_stiffness[side, joint] += 0.5 * (k - before) * old * old
-                    own.work_equilibrium[side, joint] += 0.5 * k * (new * new - old * old)
+                k_before = springs.acts[side, joint] * springs.stiffness[side, joint]
+                before = springs.equilibrium[side, joint] - theta
+                after = rest - theta
+                springs.stiffness[side, joint] = k
+                springs.equilibrium[side, joint] = rest
+                springs.acts[side, joint] = 1.0
+                springs.requests[:, side, joint] = k
+                if not springs.fresh:
+                    springs.work_stiffness[side, joint] += 0.5 * (k - k_before) * before * before
+                    springs.work_equilibrium[side, joint] += 0.5 * k * (after * after - before * before)
                 _control(rows[i], control[i], feet, theta, side, joint)
-        own.fresh = 0
+        springs.fresh = 0
 
 
 class FootSprings:
-    """The ankle and toe springs of N bodies, and the work of changing them.
+    """Ankle and toe springs of N bodies, and the work of changing them; the kernels `stiffen` and `move` act on them.
 
     Args:
-        settings: ranges of stiffness and action mode.
-        body: the body of the tables.
+        settings: ranges of stiffness, action mode, equilibrium.
+        body: body of the tables.
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables; or (R, SAMPLES,
             4), torques beside the springs [N m] behind them.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
-        subjects: bodies and requested speeds.
-        feet: N pairs in place of the settings' feet.
+        subjects: bodies and commanded speeds.
+        feet: N pairs of feet in place of the settings' feet.
     """
 
     def __init__(
@@ -304,19 +312,19 @@ class FootSprings:
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)
         self._factor = np.tile(factor, 2)
-        fixed = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
+        scheduled = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
         follows = settings.equilibrium in ("planned", "angle")
         held = settings.equilibrium == "phase"
         tendon = np.inf if settings.ankle_tendon is None else TENDON_SHARE * settings.ankle_tendon
         scale = body.stiffness_scale
-        self.options = np.array([(middle, tendon * scale, scale, fixed, follows, held)], SPRING_OPTIONS)
+        self.options = np.array([(middle, tendon * scale, scale, scheduled, follows, held)], SPRING_OPTIONS)
         """(1,) of `SPRING_OPTIONS`."""
         self.rest = PhaseTable(equilibrium)
         self.schedule = PhaseTable(schedule)
         self._subjects = subjects
-        self._own = subjects.rows["springs"]
-        self._own["fresh"] = 1
-        self._own["acts"] = 1.0
+        self._springs = subjects.rows["springs"]
+        self._springs["fresh"] = 1
+        self._springs["acts"] = 1.0
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
         """Begin an episode of springs `ids` (K,).
@@ -324,9 +332,9 @@ class FootSprings:
         Their next change does no work and acts at once, as if it had been requested long before. Later changes act
         `delay` (K,) control windows after their request.
         """
-        self._own["fresh"][ids] = 1
-        self._own["delay"][ids] = delay
-        self._own["acts"][ids] = 1.0
+        self._springs["fresh"][ids] = 1
+        self._springs["delay"][ids] = delay
+        self._springs["acts"][ids] = 1.0
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """Return (N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
@@ -339,7 +347,7 @@ class FootSprings:
     def factor(self, action: NDArray) -> NDArray:
         """Return the factors (N, 4) of actions (N, 4) on the stiffness at action 0, or on the schedule.
 
-        By NumPy, not in a kernel: its powers have other last bits than those of numba.
+        Computed by NumPy: powers in a kernel would have other last bits.
         """
         return np.exp(action) if self._residual else self._factor**action
 

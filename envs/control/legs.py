@@ -37,7 +37,7 @@ FARTHEST = 0.1
 """Error of the CoM's position over the stance foot [m at 1.70 m] at which the gains' input is clipped; chosen, as
 `SLOWEST`."""
 PLANNED_SPEED, PLANNED_PLACE = 5, 6
-"""Columns of `leg_curves`."""
+"""Columns of `leg_curves`: the planned CoM's speed, and its place."""
 HOLD = 0.001
 """Distance below 1 at which a leg's phase waits until its foot touches down; chosen, small against a window's 0.009."""
 
@@ -87,7 +87,10 @@ def _follow(constants, rows):
 
 @part
 def _too_fast(m, row):
-    """Return the error of the CoM's forward speed against the plan [m/s], clipped for the gains."""
+    """Return by how much the CoM moves forward faster than planned [m/s], at least `SLOWEST`.
+
+    `m` is the measurement of one body, `row` of `CONTROL_ROW`.
+    """
     return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
 
 
@@ -104,7 +107,7 @@ def drive(rows, bodies, control, table, incline) -> None:
     """
     curves = np.empty((2, table.shape[-1]))
     inclined = np.empty(4)
-    level = np.zeros(1, PLACE)[0]
+    first_row = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
         subject = rows[i].subject
         legs = rows[i].legs
@@ -115,21 +118,22 @@ def drive(rows, bodies, control, table, incline) -> None:
             read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
         too_fast = _too_fast(m, rows[i])
+        # A stance hip holds trunk and speed by a torque; a swing hip's target shifts, so that the foot lands elsewhere.
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
-        on_trunk = trunk + gain.speed_torque * too_fast
+        stance_torque = trunk + gain.speed_torque * too_fast
         for side in range(2):
             stance = curves[side, 0]
             hip = torque * curves[side, 1]
             knee = torque * curves[side, 2]
             ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
-            aim = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
-            own = stance * on_trunk + (1.0 - stance) * hip * aim
+            shift = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
+            feedback = stance * stance_torque + (1.0 - stance) * hip * shift
             control[i, side, HIP, 0] = hip
-            control[i, side, HIP, 1] = torque * curves[side, 3] + own
+            control[i, side, HIP, 1] = torque * curves[side, 3] + feedback
             control[i, side, KNEE, 0] = knee
             control[i, side, KNEE, 1] = torque * curves[side, 4]
-            if subject.slope != 0.0:  # moves the targets of hips, knees and trunk
-                read(incline, level, legs.phase[side], inclined)
+            if subject.slope != 0.0:  # a slope moves the targets of hips, knees and trunk
+                read(incline, first_row, legs.phase[side], inclined)
                 lean = stance * gain.trunk_stiffness * inclined[3]
                 control[i, side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
                 control[i, side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
@@ -143,9 +147,10 @@ def _load(force):
 
 @part
 def advance(rows, bodies, walking) -> None:
-    """Advance the phase by one window.
+    """Advance the phase of the legs by one window.
 
-    The phase runs on, waits at its end for a late foot, and is set to the start of its stride by a foot that lands.
+    The phase waits at the end of a leg's stride for a late foot, and jumps to the start of its stride when a foot
+    lands. The right leg is half a stride behind the left one.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; the phase of the legs is changed.
@@ -160,8 +165,8 @@ def advance(rows, bodies, walking) -> None:
         gain = legs.gains
         left = legs.phase[LEFT]
         rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(m, rows[i]))
-        waiting = (0.5 if left < 0.5 else 1.0) - HOLD
-        left = min(left + max(rate, 0.0), max(waiting, left))
+        end = (0.5 if left < 0.5 else 1.0) - HOLD  # of the right leg's stride, or of the left leg's
+        left = min(left + max(rate, 0.0), max(end, left))
         right = (left + 0.5) % 1.0
         if left > TOUCHDOWN_PHASE and _load(m.force[LEFT]) > gain.touchdown:
             left = 0.0
@@ -172,12 +177,13 @@ def advance(rows, bodies, walking) -> None:
 
 
 class LegController:
-    """Phase and hip-knee controller of N bodies.
+    """Controller of phase, hips and knees of N bodies; the kernels `drive` and `advance` act on its rows and table.
 
     Args:
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
-        right: the same for a right leg of its own; phase, trunk and speed are held by the constants of `rows`.
+        right: the same for the right leg, if it has constants of its own; phase, trunk and speed are held by the
+            constants of `rows`.
     """
 
     def __init__(
@@ -196,7 +202,7 @@ class LegController:
         self.follow()
 
     def follow(self) -> None:
-        """Take over the present bodies and commanded speeds of the subjects."""
+        """Compute the gains anew for the present bodies and commanded speeds of the subjects."""
         _follow(self._constants, self._subjects.rows)
 
     def reset(self, ids: NDArray, left_phase: NDArray) -> None:
@@ -205,7 +211,7 @@ class LegController:
 
 
 def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
-    """Return a leg's constants in the order of `GAINS`, for the settings' body."""
+    """Return a leg's constants in the order of `GAINS`, scaled to the settings' body."""
     body = walk.body
     stride_time = walk.plan.stride_time
     scale = body.stiffness_scale

@@ -25,36 +25,37 @@ HELD_BY_SOUND = (
 
 
 def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
-    """Return the side of the foot to which the person has adapted, and its `adapted`; None without such a foot.
+    """Return the side of the foot to which the person has adapted, and the foot's `adapted`; None without such a foot.
 
     Raises `SpringfootError` if both feet have one, and for settings other than those of the search.
     """
     feet = settings.left_foot, settings.right_foot
-    found = [(side, foot.adapted) for side, foot in enumerate(feet) if foot.adapted is not None]
-    if not found:
+    adapted = [(side, foot.adapted) for side, foot in enumerate(feet) if foot.adapted is not None]
+    if not adapted:
         return None
-    if len(found) > 1:
+    if len(adapted) > 1:
         raise SpringfootError("left_foot and right_foot: a person adapts to one foot, the other one sound; got both")
-    asked = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.follows_plan
-    if (kind := constants_name(*asked)) != "planned":
-        raise SpringfootError(f"{FOOT_SETTINGS[found[0][0]]}: adapted legs are of 'planned' constants, got {kind!r}")
-    return found[0]
+    wanted = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.follows_plan
+    if (name := constants_name(*wanted)) != "planned":
+        raise SpringfootError(f"{FOOT_SETTINGS[adapted[0][0]]}: adapted legs are of 'planned' constants, got {name!r}")
+    return adapted[0]
 
 
 def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
-    """Return the constants of the leg of `side` at `speed` [m/s at 1.70 m]."""
-    asked = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
-    tuned = leg_constants(*asked, plan_file_of(settings))
+    """Return the constants of the leg of `side` at `speed` [m/s at 1.70 m]: the tuned ones, or an adapted person's."""
+    wanted = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
+    tuned = leg_constants(*wanted, plan_file_of(settings))
     adapted = adapted_foot(settings)
     if adapted is None:
         return tuned
-    of_side, given = adapted
-    sets = committed_feet()[given][ADAPTED] if isinstance(given, str) else given
-    leg = LEGS[side == of_side]
+    adapted_side, person = adapted
+    sets = committed_feet()[person][ADAPTED] if isinstance(person, str) else person
+    leg = LEGS[side == adapted_side]
     return _moved(tuned, {float(at): _checked(legs) for at, legs in sets.items()}, leg, speed)
 
 
 def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
+    """Return the constants of both `LEGS` from their JSON form; raise `SpringfootError` for bad ones."""
     try:
         return {leg: constants_from(legs[leg]) for leg in LEGS}
     except SpringfootError as error:
@@ -64,23 +65,25 @@ def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
 def _moved(
     tuned: LegConstants, sets: Mapping[float, Mapping[str, LegConstants]], leg: str, speed: float
 ) -> LegConstants:
-    """Return the constants `tuned` at `speed`, moved by the adapted ones' distance from those tuned at their speeds."""
+    """Return the adapted constants of a leg at `speed` [m/s].
+
+    At a speed of the `sets` they are the set's. Elsewhere they are the `tuned` ones of that speed, moved by the
+    difference of adapted from tuned constants, which is linear between the speeds of the sets and constant outside.
+    """
     speeds = sorted(sets)
     if speed in sets:
-        own = asdict(sets[speed][leg])
-        return constants_from(own | {name: getattr(sets[speed][LEGS[0]], name) for name in HELD_BY_SOUND})
+        of_leg = asdict(sets[speed][leg])
+        return constants_from(of_leg | {name: getattr(sets[speed][LEGS[0]], name) for name in HELD_BY_SOUND})
     values = {}
-    for name, here in asdict(tuned).items():
+    for name, tuned_value in asdict(tuned).items():
         source = LEGS[0] if name in HELD_BY_SOUND else leg
-        away = [
+        differences = [
             np.subtract(getattr(sets[at][source], name), getattr(leg_constants("planned", "people", at), name))
             for at in speeds
         ]
-        place = float(np.interp(speed, speeds, np.arange(len(speeds))))
-        low = int(place)
+        position = float(np.interp(speed, speeds, np.arange(len(speeds))))
+        low = int(position)
         high = min(low + 1, len(speeds) - 1)
-        moved = np.maximum(
-            here + away[low] + (place - low) * (away[high] - away[low]), LEAST_STIFFNESS.get(name, -np.inf)
-        )
-        values[name] = moved.tolist()
+        moved = tuned_value + differences[low] + (position - low) * (differences[high] - differences[low])
+        values[name] = np.maximum(moved, LEAST_STIFFNESS.get(name, -np.inf)).tolist()
     return constants_from(values)

@@ -24,39 +24,39 @@ _FIRST = np.zeros(1, PLACE)
 
 @part
 def read(table, place, phase, curves) -> None:
-    """Read one phase.
+    """Read the curves of a table at one phase, linear between samples and between two rows.
 
     Args:
         table: (R, SAMPLES, value and rise, C) of a `PhaseTable`.
-        place: one `PLACE`.
-        phase: in [0, 1).
+        place: one `PLACE`, the row and the weight of the next row.
+        phase: stride phase in [0, 1).
         curves: (C,), which is filled.
     """
-    spot = phase * SAMPLES
+    position = phase * SAMPLES
     index = 0
-    if spot >= SAMPLES - 1:
+    if position >= SAMPLES - 1:
         index = SAMPLES - 1
-    elif spot > 0.0:
-        index = int(spot)
+    elif position > 0.0:
+        index = int(position)
     row = table[place.row, index]
     for column in range(row.shape[1]):
-        curves[column] = row[0, column] + (spot - index) * row[1, column]
+        curves[column] = row[0, column] + (position - index) * row[1, column]
     if place.weight > 0.0:
-        above = table[place.row + 1, index]
+        next_row = table[place.row + 1, index]
         for column in range(row.shape[1]):
-            value = above[0, column] + (spot - index) * above[1, column]
+            value = next_row[0, column] + (position - index) * next_row[1, column]
             curves[column] += place.weight * (value - curves[column])
 
 
 @kernel
 def _read_all(table, place, phase, curves):
-    """Read `phase` (M,) in [0, 1) into `curves` (M, C), an equal number of them at each of the places.
+    """Read the curves at `phase` (M,) in [0, 1) into `curves` (M, C), the same number of phases at each place in turn.
 
-    `table` (R, SAMPLES, C); `place` (P,) of `PLACE`.
+    `table` is (R, SAMPLES, value and rise, C); `place` (P,) of `PLACE`.
     """
-    each = max(len(phase) // len(place), 1)
+    phases_per_place = max(len(phase) // len(place), 1)
     for i in range(len(phase)):
-        read(table, place[i // each], phase[i], curves[i])
+        read(table, place[i // phases_per_place], phase[i], curves[i])
 
 
 class PhaseTable:

@@ -61,18 +61,19 @@ class ReferenceWalk:
 def walks_of_legs(
     settings: BipedSettings, left: Sequence[LegConstants] | None = None, right: Sequence[LegConstants] | None = None
 ) -> tuple[tuple[ReferenceWalk, ...], tuple[ReferenceWalk, ...]]:
-    """Return the walks of both legs, and those of the right leg if it has constants of its own, else none.
+    """Return the walks of the left leg, and those of the right leg; the latter are none if the legs do not differ.
 
     `left` and `right` are leg constants in place of the committed ones, as in `reference_walks`.
     """
-    own = right or (left is None and adapted_foot(settings))
-    return reference_walks(settings, left), reference_walks(settings, right, RIGHT) if own else ()
+    legs_differ = right or (left is None and adapted_foot(settings))
+    return reference_walks(settings, left), reference_walks(settings, right, RIGHT) if legs_differ else ()
 
 
 def reference_walks(
     settings: BipedSettings, legs: Sequence[LegConstants] | None = None, side: int = LEFT
 ) -> tuple[ReferenceWalk, ...]:
-    """Return the walks of the settings' body at `tabulated_speeds`, slowest first, with the leg of `side`.
+    """Return the walks of the settings' body at `tabulated_speeds`, slowest first, with the constants of the leg of
+    `side`.
 
     `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
@@ -83,7 +84,7 @@ def reference_walks(
 def reference_walk_at(
     settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None, side: int = LEFT
 ) -> ReferenceWalk:
-    """Return the walk of the settings' body at `speed` [m/s]."""
+    """Return the walk of the settings' body at `speed` [m/s]; `legs` and `side` as for `reference_walks`."""
     body = body_of(settings)
     people = reference_gait(settings, speed)
     equal_speed = speed / sqrt(body.length_scale)
@@ -109,14 +110,14 @@ def reference_walk_at(
 
 
 def _moments_of(gait: HumanGait, body: Body) -> NDArray:
-    """Return (SAMPLES, 3) `ReferenceWalk.moments` of a gait."""
+    """Return (SAMPLES, 3) a gait's mean moments of the joints in `FED`, scaled to the body [N m]."""
     moments = [gait.mean(f"{joint}_moment", GRID) for joint in FED]
     return np.stack(moments, -1) * body.total_mass * body.length_scale
 
 
 def _plans_moments(plan: WalkPlan) -> NDArray:
-    """Return (SAMPLES, 3) `ReferenceWalk.moments` from inverse dynamics of the plan, smoothed where feet land and
-    leave."""
+    """Return (SAMPLES, 3) the moments of the joints in `FED` by inverse dynamics of the plan [N m], without harmonics
+    above `FED_HARMONICS`, as they jump where feet land and leave."""
     by_joint = planned_moments(plan, GRID)
     waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
     waves[FED_HARMONICS + 1 :] = 0.0
@@ -124,7 +125,7 @@ def _plans_moments(plan: WalkPlan) -> NDArray:
 
 
 def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, ReferenceWalk]]:
-    """Return the rows of a table over variants and speeds, in order: speeds within variants."""
+    """Yield constants and walk of each row of a table: all speeds of the first variant, then of the next."""
     for variant, walk in product(range(len(walks[0].constants) if walks else 0), walks):
         yield walk.constants[variant], walk
 
@@ -138,20 +139,23 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     """
     height = settings.height
     speed = settings.speed
-    lowest, highest = (sqrt(height / other) for other in reversed(settings.height_range or (height, height)))
+    # A body of another height walks at the Froude number at which this body walks sqrt(height / other) times as fast.
+    tallest_ratio, shortest_ratio = (
+        sqrt(height / other) for other in reversed(settings.height_range or (height, height))
+    )
     slow, fast = settings.speed_range or (speed, speed)
-    slow = min(slow * lowest, speed)
-    fast = max(fast * highest, speed)
-    unit = sqrt(body_of(settings).length_scale)
+    slow = min(slow * tallest_ratio, speed)
+    fast = max(fast * shortest_ratio, speed)
+    unit = sqrt(body_of(settings).length_scale)  # speed of this body over the Froude-equal one at 1.70 m
     if settings.start == "standing" or settings.stop_at is not None:
         slow = min(slow, SLOW_SPEED * unit)
     if slow == fast:
         return np.array([speed])
     first = floor(slow / unit / SPACING + 1e-9)
     last = ceil(fast / unit / SPACING - 1e-9)
-    grid = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
+    multiples = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
     least, most = PLAN_SPEED_RANGE
-    return np.array(sorted({*(min(max(at, min(slow, least)), max(fast, most)) for at in grid), speed}))
+    return np.array(sorted({*(min(max(at, min(slow, least)), max(fast, most)) for at in multiples), speed}))
 
 
 @lru_cache(maxsize=256)

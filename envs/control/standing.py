@@ -66,61 +66,63 @@ HIP_HEIGHT, DRAW_SECONDS = 0.8, 0.5
 its feet apart; otherwise the feet creep, as friction alone holds them."""
 
 WALKING, STANDING, STARTING, STOPPING, STOPPED = range(5)
-
 """Modes of a body: see `Standing.mode`."""
 
 
 @kernel
 def _switch(rows, bodies, running, time, stop_at):
-    """Change modes at their time, and move the CoM's place of bodies that lean.
+    """Change the modes of bodies where that is due, and move the place at which the CoM of leaning bodies is held.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `held` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
         running: (N,) bool; other bodies stay as they are.
-        time: (N,) in the episode [s].
+        time: (N,) time in the episode [s].
         stop_at: time in the episode from which a body stops [s].
 
-    Returns whether a mode changed.
+    Returns True if a mode changed.
     """
     changed = False
     for i in range(len(rows)):
-        body = rows[i].held
+        held = rows[i].held
         subject = rows[i].subject
         phase = rows[i].legs.phase
         if not running[i]:
             continue
-        before = body.mode
-        slow = SLOW_SPEED * body.time
-        if before == STANDING and time[i] >= body.begin:
-            share = min((time[i] - body.begin) / (LEAN_SECONDS * body.time), 1.0)
-            body.place = body.length * (STAND_COM + LEAN * share)
-            if bodies[i].measured.com_velocity[0] > OFF_SPEED * body.time:
-                body.mode = STARTING
-                body.begin = time[i]
+        before = held.mode
+        slow = SLOW_SPEED * held.time
+        if before == STANDING and time[i] >= held.begin:
+            leaned = min((time[i] - held.begin) / (LEAN_SECONDS * held.time), 1.0)  # from 0 to 1
+            held.place = held.length * (STAND_COM + LEAN * leaned)
+            if bodies[i].measured.com_velocity[0] > OFF_SPEED * held.time:
+                held.mode = STARTING
+                held.begin = time[i]
         elif (
-            before == STARTING and time[i] >= body.begin + EARLY_SECONDS * body.time and subject.speed == subject.target
+            before == STARTING and time[i] >= held.begin + EARLY_SECONDS * held.time and subject.speed == subject.target
         ):
-            body.mode = WALKING
+            held.mode = WALKING
         elif before in (WALKING, STARTING) and time[i] >= stop_at:
-            body.mode = STOPPING
+            held.mode = STOPPING
         elif before == STOPPING and subject.speed <= slow * (1.0 + 1e-9):
             for side in range(2):
                 if LANDED[0] <= phase[side] <= LANDED[1]:
-                    body.mode = STOPPED
-        changed = changed or body.mode != before
+                    held.mode = STOPPED
+        changed = changed or held.mode != before
     return changed
 
 
 @part
-def _draw(body, m):
-    """Move the rest angles of the hips until their torque takes over the push of the feet against each other."""
+def _draw(held, m):
+    """Move the rest angles of the hips until their torque takes over the push of the feet against each other.
+
+    `held` is of `HELD`, `m` the measurement of one body.
+    """
     front = 0 if m.ankle[0, 0] > m.ankle[1, 0] else 1
     push = 0.0
     for contact in range(3):
         push += 0.5 * (m.force[1 - front, contact, 0] - m.force[front, contact, 0])
-    torque = push * HIP_HEIGHT * body.length
-    body.draw += CONTROL_WINDOW / (DRAW_SECONDS * body.time) * torque / (STANDING_STIFFNESS[HIP] * body.torque)
+    torque = push * HIP_HEIGHT * held.length
+    held.draw += CONTROL_WINDOW / (DRAW_SECONDS * held.time) * torque / (STANDING_STIFFNESS[HIP] * held.torque)
 
 
 @kernel
@@ -136,23 +138,23 @@ def _drive(rows, bodies, control, standing):
     for i in range(len(rows)):
         if not standing[i]:
             continue
-        body = rows[i].held
+        held = rows[i].held
         m = bodies[i].measured
-        if body.mode == STOPPED:
-            _draw(body, m)
-        ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - body.place
-        trunk = TRUNK_STIFFNESS * (m.base[2] - body.pitch) + TRUNK_DAMPING * body.time * m.base_velocity[2]
+        if held.mode == STOPPED:
+            _draw(held, m)
+        ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - held.place
+        trunk_torque = TRUNK_STIFFNESS * (m.base[2] - held.pitch) + TRUNK_DAMPING * held.time * m.base_velocity[2]
         for side in range(2):
             front = 1.0 if m.ankle[side, 0] > m.ankle[1 - side, 0] else -1.0
             for joint in range(4):
                 k = STANDING_STIFFNESS[joint]
-                rest = body.rest[side, joint]
+                rest = held.rest[side, joint]
                 if joint == ANKLE:
-                    rest -= BALANCE * ahead / body.length
+                    rest -= BALANCE * ahead / held.length
                 if joint == HIP:
-                    rest += TRUNK_FREE * m.base[2] - trunk / k - front * body.draw
-                control[i, side, joint, 0] = k * body.torque
-                control[i, side, joint, 1] = k * body.torque * rest
+                    rest += TRUNK_FREE * m.base[2] - trunk_torque / k - front * held.draw
+                control[i, side, joint, 0] = k * held.torque
+                control[i, side, joint, 1] = k * held.torque * rest
 
 
 class Standing:
@@ -170,10 +172,10 @@ class Standing:
 
     @property
     def mode(self) -> NDArray:
-        """Return (N,) the mode of each body: `STANDING`, `STARTING`, `WALKING` steadily, `STOPPING`, `STOPPED`, in this
-        order.
+        """Return (N,) the mode of each body: in their order in time `STANDING`, `STARTING`, `WALKING`, `STOPPING`,
+        `STOPPED`.
 
-        A body walks in the middle three.
+        In the middle three it walks, in `WALKING` steadily.
         """
         return self._held["mode"]
 
@@ -204,24 +206,28 @@ class Standing:
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
     def switch(self, physics: Physics, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
-        """Let those `running` (N,) set off or stop that are due before a step at `time` (N,) [s].
+        """Let the `running` (N,) bodies for which it is time set off or stop, before a step at `time` (N,) [s].
 
-        Returns (N,) the bodies that run and walk, and (N,) those of them that walk with the fixed schedule.
+        Returns two masks (N,): running bodies that walk, and those of them that walk with the fixed schedule.
         """
         mode = self._held["mode"]
         before = self._held["mode"].copy()
         if _switch(self._subjects.rows, physics.bodies, running, time, self._stop_at):
-            self._told(before, Measurement.of(physics.bodies["measured"]))
+            self._begin_modes(before, Measurement.of(physics.bodies["measured"]))
         scheduled = running & ((mode == STARTING) | (mode == STOPPING))
         return scheduled | (running & (mode == WALKING)), scheduled
 
-    def _told(self, before: NDArray, m: Measurement) -> None:
-        """Command the speeds that follow from changes of mode since `before` (N,)."""
+    def _begin_modes(self, before: NDArray, m: Measurement) -> None:
+        """Begin the new mode of each body whose mode was another one `before` (N,).
+
+        Bodies that set off or stop get their commanded speed; those that have stopped get springs that hold them as
+        they are, `m` being measured now.
+        """
         held = self._held
         subjects = self._subjects
         new = [np.flatnonzero((before != held["mode"]) & (held["mode"] == mode)) for mode in range(5)]
-        for ids, tell in ((new[STARTING], subjects.begin), (new[STOPPING], subjects.end)):
-            tell(ids, np.minimum(subjects.speed[ids], SLOW_SPEED * held["time"][ids]))
+        for ids, command in ((new[STARTING], subjects.begin), (new[STOPPING], subjects.end)):
+            command(ids, np.minimum(subjects.speed[ids], SLOW_SPEED * held["time"][ids]))
         ids = new[STOPPED]
         held["rest"][ids] = m.angle[ids]
         held["rest"][ids, :, HIP] -= TRUNK_FREE * m.base[ids, 2, None]
@@ -244,15 +250,16 @@ def steady_walk(settings: BipedSettings) -> tuple[float, float]:
     end = inf if settings.stop_at is None else settings.stop_at
     if settings.start == "standing":
         time_scale = sqrt(body_of(settings).length_scale)
-        faster = max(settings.speed - SLOW_SPEED * time_scale, 0.0)
-        begin = (
-            STAND_SECONDS[1] + OFF_SECONDS * time_scale + max(EARLY_SECONDS * time_scale, faster / settings.speed_rate)
-        )
+        speed_up = max(settings.speed - SLOW_SPEED * time_scale, 0.0) / settings.speed_rate
+        begin = STAND_SECONDS[1] + OFF_SECONDS * time_scale + max(EARLY_SECONDS * time_scale, speed_up)
     return begin, end
 
 
 def off_phase(drawn: float) -> float:
-    """Return the stride phase of the left leg at which a body sets off; the `drawn` phase decides the stance leg."""
+    """Return the stride phase of the left leg at which a body sets off.
+
+    The stance leg is the left one if the `drawn` phase is below 0.5, else the right one.
+    """
     return OFF_PHASE + (0.0 if drawn < 0.5 else 0.5)
 
 
@@ -264,7 +271,7 @@ def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
     """
 
     def com(shank: float) -> float:
-        """CoM ahead of where it is wanted [m] with the shank's front turned up by `shank` [rad]."""
+        """Return the distance of the CoM ahead of `STAND_COM` [m], with the shank leaning back by `shank` [rad]."""
         knee_x = -body.shank_length * sin(shank)
         hip_x = knee_x - body.thigh_length * sin(shank + knee)
         moment = (body.trunk_mass + body.carried_mass) * hip_x  # trunk and load balance over the hip

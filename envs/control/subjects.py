@@ -27,39 +27,38 @@ MOST_DRAWS = 1000
 
 @kernel
 def _approach(most, running, subjects):
-    """Change the speeds of those `running` (N,) by at most `most` [m/s] towards the targets; `subjects` (N,) of
-    `SUBJECT`.
+    """Change the commanded speeds of `running` (N,) environments by at most `most` [m/s] towards their targets.
 
-    Returns whether any speed is still on its way.
+    `subjects` is (N,) of `SUBJECT`. Returns True if any speed has not reached its target.
     """
     under_way = False
     for i in range(len(subjects)):
         subject = subjects[i]
-        way = subject.target - subject.speed
+        difference = subject.target - subject.speed
         if running[i]:
-            if abs(way) <= most:
+            if abs(difference) <= most:
                 subject.speed = subject.target
             else:
-                subject.speed += most if way > 0.0 else -most
+                subject.speed += most if difference > 0.0 else -most
         under_way = under_way or subject.speed != subject.target
     return under_way
 
 
 @kernel
 def _locate(ids, speeds, first, subjects):
-    """Find the places of environments `ids` (K,) among `speeds` (G,) [m/s], at their Froude speeds.
+    """Set the `place` of environments `ids` (K,) in tables over `speeds` (G,) [m/s], at their Froude-equal speeds.
 
     `first` (N,) is the first row of each environment's variant; `subjects` (N,) of `SUBJECT`.
     """
     last = len(speeds) - 1
     for i in ids:
-        equal = subjects[i].speed / subjects[i].scale.time
+        equal_speed = subjects[i].speed / subjects[i].scale.time  # of the settings' body
         lower = 0
-        while lower < last - 1 and equal >= speeds[lower + 1]:
+        while lower < last - 1 and equal_speed >= speeds[lower + 1]:
             lower += 1
         weight = 0.0
         if last > 0:
-            weight = min(max((equal - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
+            weight = min(max((equal_speed - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
         if weight == 1.0:
             lower = lower + 1
             weight = 0.0
@@ -86,16 +85,16 @@ class Subjects:
         """Body of each environment."""
         self.rows = np.zeros(num, CONTROL_ROW)
         """(N,) row of the control for each environment."""
-        own = self.rows["subject"]
-        self.place, self.scale = own["place"], own["scale"]
+        subjects = self.rows["subject"]
+        self.place, self.scale = subjects["place"], subjects["scale"]
         """(N,) place of the commanded speed in tables of variants x speeds, and ratios of the bodies to that of the
         settings."""
-        self.speed, self.target, self._change = own["speed"], own["target"], own["change"]
+        self.speed, self.target, self._change = subjects["speed"], subjects["target"], subjects["change"]
         """(N,) present commanded speed and its target [m/s]; time of the next drawn target [s]."""
-        self.slope = own["slope"]
+        self.slope = subjects["slope"]
         """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
-        own["height"] = self._home.height
-        own["mass"] = self._home.mass
+        subjects["height"] = self._home.height
+        subjects["mass"] = self._home.mass
         self.scale[:] = 1.0
         self.speed[:] = self.target[:] = settings.speed
         self.slope[:] = radians(settings.slope_deg)
@@ -121,31 +120,32 @@ class Subjects:
             self._draw(random, {name: float(values[row]) for name, values in (given or {}).items()})
             for row, random in enumerate(randoms)
         ]
-        others = self._embody(ids, [body for body, _ in drawn])
+        changed = self._embody(ids, [body for body, _ in drawn])
         for index, random, (_, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
             self.speed[index] = self.target[index] = speed
-            self._change[index] = self._wait(0.0, random)
+            self._change[index] = self._next_change(0.0, random)
         self._locate(ids)
-        return others
+        return changed
 
     def embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> list[int]:
-        """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]; returns as `reset`."""
-        self._changing = True  # whether it was, the next step finds out
+        """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]; return the indices of those
+        with a changed body, as `reset` does."""
+        self._changing = True  # the next step finds out whether a speed has to change
         sizes = zip(height.tolist(), mass.tolist(), strict=True)
-        return self._embody(ids, [replace(self._home, height=each, mass=own) for each, own in sizes])
+        return self._embody(ids, [replace(self._home, height=h, mass=m) for h, m in sizes])
 
     def _embody(self, ids: NDArray, bodies: Sequence[Body]) -> list[int]:
         """Give environments `ids` these bodies; return the indices with a changed body."""
-        others = []
+        changed = []
         for index, body in zip(ids.tolist(), bodies, strict=True):
             if body != self.bodies[index]:
-                others.append(index)
+                changed.append(index)
                 self.bodies[index] = body
                 length = body.height / self._home.height
                 mass = body.mass / self._home.mass
                 self.scale[index] = length, sqrt(length), mass, mass * length
                 self.rows["subject"][["height", "mass"]][index] = body.height, body.mass
-        return others
+        return changed
 
     def command(self, ids: NDArray, speed: NDArray) -> None:
         """Let the commanded speed of environments `ids` (K,) go to `speed` (K,) [m/s], at the setting `speed_rate`."""
@@ -166,7 +166,8 @@ class Subjects:
         self._changing = True
 
     def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
-        """Let a step pass for those `running` (N,), after `steps` (N,); returns whether any commanded speed changed."""
+        """Let a step pass for the `running` (N,) environments, which have done `steps` (N,) before; draw new target
+        speeds where that is due. Return True if any commanded speed changed."""
         settings = self._settings
         if settings.speed_interval is not None:
             time = steps * settings.step_seconds
@@ -174,7 +175,7 @@ class Subjects:
                 random = randoms[index]
                 if random is not None and settings.speed_range is not None:
                     self.target[index] = random.uniform(*settings.speed_range)
-                    self._change[index] = self._wait(time[index], random)
+                    self._change[index] = self._next_change(time[index], random)
                     self._changing = True
         if not self._changing:
             return False
@@ -183,7 +184,7 @@ class Subjects:
         return True
 
     def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, float]:
-        """Draw a speed, then bodies until one is possible."""
+        """Draw a speed, then bodies until one is possible; values in `given` are not drawn. Return body and speed."""
         settings = self._settings
         ranges = {name: getattr(settings, f"{name}_range") for name in DRAWN}
         values = {name: getattr(settings, name) for name in DRAWN}
@@ -202,8 +203,9 @@ class Subjects:
         self._check(body, values["speed"])
         return body, values["speed"]
 
-    def _wait(self, time: float, random: np.random.Generator) -> float:
-        """Return the time of the next drawn speed after `time` [s]."""
+    def _next_change(self, time: float, random: np.random.Generator) -> float:
+        """Return the time [s] after `time` at which the next speed is drawn: 0.5 to 1.5 intervals later; inf without
+        an interval."""
         interval = self._settings.speed_interval
         return np.inf if interval is None else time + interval * random.uniform(0.5, 1.5)
 
@@ -219,4 +221,5 @@ class Subjects:
             )
 
     def _locate(self, ids: NDArray) -> None:
+        """Set the places in the tables of environments `ids` (K,)."""
         _locate(ids, self._speeds, self._first, self.rows["subject"])

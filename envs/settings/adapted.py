@@ -28,20 +28,22 @@ def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[st
     if isinstance(value, str):
         if value not in (known := committed_feet()):
             raise SpringfootError(f"{name}: adapted must be one of {', '.join(map(repr, known))}, got {quoted(value)}")
-        if (its := known[value]["kind"]) != kind:
-            raise SpringfootError(f"{name}: adapted {value!r} is a person on a foot of kind {its!r}, got kind {kind!r}")
+        if (known_kind := known[value]["kind"]) != kind:
+            raise SpringfootError(
+                f"{name}: adapted {value!r} is a person on a foot of kind {known_kind!r}, got kind {kind!r}"
+            )
         return value
     if not isinstance(value, Mapping) or not value:
         raise SpringfootError(
             f"{name}: adapted must be a name or a dictionary of speed -> {' and '.join(LEGS)}, got {quoted(value)}"
         )
     plain = {}
-    for speed, legs in value.items():
-        at = as_float(speed) if not isinstance(speed, str) else _number(speed)
-        require_within(f"{name}: adapted: speed", at, PLAN_SPEED_RANGE, "m/s")
+    for key, legs in value.items():
+        speed = as_float(key) if not isinstance(key, str) else _number(key)
+        require_within(f"{name}: adapted: speed", speed, PLAN_SPEED_RANGE, "m/s")
         if not isinstance(legs, Mapping) or set(legs) != set(LEGS) or not all(map(_is_set, legs.values())):
-            raise SpringfootError(f"{name}: adapted at {at:g} m/s must be {' and '.join(LEGS)}, leg constants both")
-        plain[f"{at:g}"] = {leg: _plain(legs[leg]) for leg in LEGS}
+            raise SpringfootError(f"{name}: adapted at {speed:g} m/s must be {' and '.join(LEGS)}, leg constants both")
+        plain[f"{speed:g}"] = {leg: _plain(legs[leg]) for leg in LEGS}
     return plain
 
 
@@ -57,10 +59,12 @@ def without_person(foot: Mapping[str, Any]) -> dict[str, Any]:
 
 @cache
 def _file() -> dict[str, Any]:
+    """Return the content of the package's file of adapted feet."""
     return json.loads(resources.files("springfoot.envs.control").joinpath("adapted.json").read_text(encoding="utf-8"))
 
 
 def _number(text: str) -> float:
+    """Return the number in a text; NaN if it is none."""
     try:
         return float(text)
     except ValueError:
@@ -68,16 +72,17 @@ def _number(text: str) -> float:
 
 
 def _is_set(values: Any) -> bool:
-    """Tell whether a value maps names to numbers, or to lists of numbers, none of 1e6 or more."""
+    """Return True if a value maps names to numbers or to lists of numbers, all with magnitudes below 1e6."""
     return isinstance(values, Mapping) and all(
-        abs(as_float(each)) < 1e6
+        abs(as_float(number)) < 1e6
         for value in values.values()
-        for each in (value if isinstance(value, (list, tuple)) else (value,))
+        for number in (value if isinstance(value, (list, tuple)) else (value,))
     )
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return leg constants with floats for numbers and lists for tuples."""
     return {
-        key: [float(each) for each in value] if isinstance(value, (list, tuple)) else float(value)
+        key: [float(number) for number in value] if isinstance(value, (list, tuple)) else float(value)
         for key, value in values.items()
     }

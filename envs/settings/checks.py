@@ -52,9 +52,9 @@ def check_people_file(name: object) -> None:
 
 
 def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
-    """Refuse a person's walk with guide `plan`, and a file of plans with guide `people`."""
+    """Refuse human data with guide `plan`, and a file of plans with guide `people`."""
     if follows_plan and human is not None:
-        raise SpringfootError("guide 'plan' follows nobody's walk: human must be None")
+        raise SpringfootError("human must be None with guide 'plan': the plan replaces human data")
     if plan_file is not None:
         if not isinstance(plan_file, str):
             raise SpringfootError(f"plan_file must be the name of a file, got {quoted(plan_file)}")
@@ -64,7 +64,10 @@ def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
 
 
 def check_names(given: Iterable[str], names: Sequence[str]) -> None:
-    """Refuse a name that is not in `names`, the settings, as Python refuses an unknown keyword argument."""
+    """Refuse a given name that is no setting, as Python refuses an unknown keyword argument; `names` are the settings.
+
+    The error names similar settings.
+    """
     for name in given:
         if name not in names:
             likely = get_close_matches(name, [*names, *CONSTRUCTOR_ARGUMENTS], n=3, cutoff=0.5)
@@ -74,13 +77,13 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
 
 def refusing_unknown(settings: type[Settings]) -> type[Settings]:
     """Make a dataclass of settings refuse unknown names, as `check_names` does."""
-    made = settings.__init__
+    init = settings.__init__
     names = [item.name for item in fields(settings)]  # type: ignore[arg-type]
 
-    @wraps(made)
-    def checked(self: Any, *given: Any, **named: Any) -> None:
+    @wraps(init)
+    def checked(self: Any, *arguments: Any, **named: Any) -> None:
         check_names(named, names)
-        made(self, *given, **named)
+        init(self, *arguments, **named)
 
     settings.__init__ = checked
     return settings
@@ -88,8 +91,8 @@ def refusing_unknown(settings: type[Settings]) -> type[Settings]:
 
 def check_start(start: Any) -> None:
     """Refuse other values than "random", "standing" and a stride phase in [0, 1)."""
-    known = start in ("random", "standing") if isinstance(start, str) else is_number(start) and 0 <= start < 1
-    if not known:
+    allowed = start in ("random", "standing") if isinstance(start, str) else is_number(start) and 0 <= start < 1
+    if not allowed:
         raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {quoted(start)}")
 
 
@@ -99,7 +102,7 @@ def check_seed(seed: Any) -> int | None:
 
 
 def is_number(value: Any) -> bool:
-    """Tell whether a value is a finite number."""
+    """Return True if a value is a finite number."""
     return isfinite(as_float(value))
 
 
@@ -150,7 +153,8 @@ def check_windows(name: str, delay: float | tuple[float, ...] | None) -> None:
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:
-    """Refuse unknown reward terms, and weights with another sign than in `defaults` (0 there: a cost)."""
+    """Refuse unknown reward terms, and weights whose sign is not that in `defaults`; a term with default 0 is a
+    cost."""
     if not isinstance(weights, dict):
         raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {quoted(weights)}")
     for name, weight in weights.items():
@@ -169,20 +173,21 @@ def real_numbers(name: str, value: Any) -> NDArray:
         array = np.asarray(value)
         if array.dtype.kind in _NO_NUMBERS or array.dtype.names is not None:
             raise SpringfootError(f"{name} must be real numbers, got {_NO_NUMBERS.get(array.dtype.kind, 'records')}")
-        if array.dtype == object and any(isinstance(each, (str, bytes, complex)) for each in array.flat):
+        if array.dtype == object and any(isinstance(item, (str, bytes, complex)) for item in array.flat):
             raise TypeError
         return np.array(array, float, order="C")
     except (TypeError, OverflowError):
-        found = quoted(value)
+        refused = quoted(value)
     except SpringfootError:
         raise
     except ValueError:
-        found = "rows of unequal length"
-    raise SpringfootError(f"{name} must be real numbers, got {found}")
+        refused = "rows of unequal length"
+    raise SpringfootError(f"{name} must be real numbers, got {refused}")
 
 
 def plain(value: Any) -> Any:
-    """Return Python floats for numbers (also NumPy's), a tuple for a list, a copy of a dictionary."""
+    """Return a setting's value with Python floats for numbers (also NumPy's), tuples for lists, and copies of all
+    else."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return as_float(value)
     if isinstance(value, (list, tuple)):

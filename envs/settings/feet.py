@@ -25,13 +25,16 @@ RIGID_TOE_STIFFNESS = 110.0
 
 
 class Number(NamedTuple):
-    """Allowed number of a foot."""
+    """Default and allowed range of a number of a foot."""
 
     usual: float | None
     """Default value; None leaves it to the body."""
     low: float
+    """Least allowed value."""
     high: float
+    """Largest allowed value."""
     unit: str
+    """Unit of all three."""
 
 
 TABLE_ANGLE, TABLE_TORQUE = Number(None, -60.0, 90.0, "deg"), Number(None, -1000.0, 1000.0, "N m")
@@ -108,7 +111,7 @@ class FootSetting:
 
     @property
     def kind(self) -> str:
-        """The kind, one of `KINDS`."""
+        """Return the kind of foot, one of `KINDS`."""
         return self.plain if isinstance(self.plain, str) else self.plain["kind"]
 
     @property
@@ -141,7 +144,7 @@ def foot_setting(name: str, value: Any) -> FootSetting:
 
 
 def _plain(name: str, value: Any) -> str | dict[str, Any]:
-    """Return a foot's plain JSON values, checked: a word, or a dictionary of its kind and given numbers."""
+    """Check a foot and return its plain JSON values: its kind alone, or a dictionary of kind and given numbers."""
     kind = value.get("kind") if isinstance(value, Mapping) else value
     if not isinstance(kind, str) or kind not in KINDS:
         form = "" if isinstance(value, (str, Mapping)) else ", or a dictionary with one of them as its 'kind'"
@@ -149,15 +152,16 @@ def _plain(name: str, value: Any) -> str | dict[str, Any]:
     if not isinstance(value, Mapping):
         return kind
     plain: dict[str, Any] = {"kind": kind}
-    own = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
-    given = {key: number for key, number in value.items() if key not in ("kind", "orthosis", ADAPTED, *own)}
-    more = *own, "orthosis", ADAPTED
-    plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, more)
-    for key in own:
+    # Beside numbers a kind may have torque-angle lines or a schedule, each in place of the numbers of its joint.
+    replacements = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
+    further = *replacements, "orthosis", ADAPTED
+    given = {key: number for key, number in value.items() if key not in ("kind", *further)}
+    plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, further)
+    for key in replacements:
         if value.get(key) is not None:
             joint = key.partition("_")[0]
-            instead = [other for other in plain if key == "schedule" or other.startswith(joint)]
-            if both := [other for other in instead if other in KINDS[kind]]:
+            replaced = [other for other in plain if key == "schedule" or other.startswith(joint)]
+            if both := [other for other in replaced if other in KINDS[kind]]:
                 raise SpringfootError(f"{name}: give {key} or {both[0]}, not both")
             plain[key] = _schedule(name, value[key]) if key == "schedule" else _table(f"{name}: {key}", value[key])
     if (orthosis := value.get("orthosis")) is not None:
@@ -185,92 +189,103 @@ def _orthosis(name: str, value: Any) -> dict[str, Any]:
 
 
 def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
-    """Return the plain form of a foot's stiffness schedule, checked."""
+    """Check a foot's stiffness schedule and return its plain form."""
     try:
         schedule = StiffnessSchedule.from_json(value)
     except SpringfootError as error:
         raise SpringfootError(f"{name}: schedule: {error}") from None
     for joint in SPRINGS:
-        its = SPRING_NUMBERS[f"{joint}_stiffness"]
+        allowed = SPRING_NUMBERS[f"{joint}_stiffness"]
         for segment in getattr(schedule, joint):
-            require_within(f"{name}: schedule: {joint} K", segment.stiffness, (its.low, its.high), its.unit)
+            require_within(f"{name}: schedule: {joint} K", segment.stiffness, (allowed.low, allowed.high), allowed.unit)
     return schedule.to_json()
 
 
 def _table(name: str, value: Any) -> list[list[float]]:
-    """Return a torque-angle line: at least two points [deg, N m], of ascending angle and falling torque."""
+    """Check a torque-angle line and return its points [deg, N m]: two or more, of ascending angle and falling
+    torque."""
     points = [list(point) if isinstance(point, (list, tuple)) else [] for point in _listed(value)]
     if not 2 <= len(points) <= MOST_POINTS or any(len(point) != 2 for point in points):
         raise SpringfootError(f"{name} must be a list of 2 to {MOST_POINTS} pairs [deg, N m], got {value!r:.60}")
     plain = [
         [
-            require_within(f"{name}: {what}", number, (its.low, its.high), its.unit)
-            for what, number, its in zip(("angle", "torque"), point, (TABLE_ANGLE, TABLE_TORQUE), strict=True)
+            require_within(f"{name}: {quantity}", number, (allowed.low, allowed.high), allowed.unit)
+            for quantity, number, allowed in zip(("angle", "torque"), point, (TABLE_ANGLE, TABLE_TORQUE), strict=True)
         ]
         for point in points
     ]
-    for (first, high), (last, low) in pairwise(plain):
-        if last <= first:
-            raise SpringfootError(f"{name}: angles must ascend, got {last:g} deg after {first:g} deg")
-        fall = (high - low) / radians(last - first)
+    for (angle, torque), (next_angle, next_torque) in pairwise(plain):
+        if next_angle <= angle:
+            raise SpringfootError(f"{name}: angles must ascend, got {next_angle:g} deg after {angle:g} deg")
+        fall = (torque - next_torque) / radians(next_angle - angle)
         if not TABLE_SLOPE.low <= fall <= TABLE_SLOPE.high:
             raise SpringfootError(
                 f"{name}: the torque must fall by {TABLE_SLOPE.low:g} to {TABLE_SLOPE.high:g} {TABLE_SLOPE.unit}, "
-                f"got {fall:.4g} between {first:g} and {last:g} deg"
+                f"got {fall:.4g} between {angle:g} and {next_angle:g} deg"
             )
     return plain
 
 
 def _listed(value: Any) -> Sequence[Any]:
+    """Return a list or tuple as it is, any other value as an empty tuple."""
     return value if isinstance(value, (list, tuple)) else ()
 
 
 def _numbers(
-    name: str, owner: str, given: Mapping[Any, Any], known: Mapping[str, Number], more: tuple[str, ...] = ()
+    name: str, owner: str, given: Mapping[Any, Any], known: Mapping[str, Number], further: tuple[str, ...] = ()
 ) -> dict[str, float]:
-    """Return the given numbers as floats, in the order of `known`."""
+    """Check the given numbers and return them as floats, in the order of `known`.
+
+    Raises `SpringfootError`, in which `name` is the setting and `owner` the thing with the numbers, for a number out of
+    its range and for an unknown key; `further` are other keys that the error lists as valid.
+    """
     for key in given:
         if key not in known:
-            raise SpringfootError(f"{name}: {owner} has no {key!r:.40}; valid: {', '.join([*known, *more])}")
+            raise SpringfootError(f"{name}: {owner} has no {key!r:.40}; valid: {', '.join([*known, *further])}")
     return {
-        key: require_within(f"{name}: {key}", given[key], (its.low, its.high), its.unit)
-        for key, its in known.items()
+        key: require_within(f"{name}: {key}", given[key], (allowed.low, allowed.high), allowed.unit)
+        for key, allowed in known.items()
         if key in given
     }
 
 
 def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
-    """Return the foot of a kind with the given numbers."""
+    """Return the foot of a kind for the physics; numbers that are not given have their defaults."""
     orthosis = given.get("orthosis")
     value: dict[str, Any] = {**_usual(KINDS[kind]), **given}
-    beside = (None, None) if orthosis is None else _springs(_usual(ORTHOSIS_NUMBERS) | orthosis)
-    ankle, toe = (FootJoint(orthosis=spring) for spring in beside)
+    of_ankle, of_toe = (None, None) if orthosis is None else _springs(_usual(ORTHOSIS_NUMBERS) | orthosis)
+    ankle = FootJoint(orthosis=of_ankle)
+    toe = FootJoint(orthosis=of_toe)
     match kind:
         case "rigid":
-            ankle = FootJoint(device=LOCK, orthosis=beside[0])
-            toe = FootJoint(device=Spring(stiffness=RIGID_TOE_STIFFNESS), orthosis=beside[1])
+            ankle = FootJoint(device=LOCK, orthosis=of_ankle)
+            toe = FootJoint(device=Spring(stiffness=RIGID_TOE_STIFFNESS), orthosis=of_toe)
         case "rigid_toe" | "no_toe":
-            toe = FootJoint(device=LOCK, orthosis=beside[1])
+            toe = FootJoint(device=LOCK, orthosis=of_toe)
         case "passive":
-            ankle, toe = (FootJoint(device=own, orthosis=by) for own, by in zip(_springs(value), beside, strict=True))
+            ankle_spring, toe_spring = _springs(value)
+            ankle = FootJoint(device=ankle_spring, orthosis=of_ankle)
+            toe = FootJoint(device=toe_spring, orthosis=of_toe)
         case "adaptive" if "schedule" in given:
-            ankle, toe = (FootJoint(device=Spring(), orthosis=by) for by in beside)
+            ankle = FootJoint(device=Spring(), orthosis=of_ankle)
+            toe = FootJoint(device=Spring(), orthosis=of_toe)
         case "adaptive":
-            ankle = FootJoint(rest=radians(value["ankle_deg"]), orthosis=beside[0])
-            toe = FootJoint(rest=radians(value["toe_deg"]), orthosis=beside[1])
+            ankle = FootJoint(rest=radians(value["ankle_deg"]), orthosis=of_ankle)
+            toe = FootJoint(rest=radians(value["toe_deg"]), orthosis=of_toe)
         case "weak":
-            ankle = FootJoint(strength=value["strength"], orthosis=beside[0])
+            ankle = FootJoint(strength=value["strength"], orthosis=of_ankle)
         case "drop":
-            ankle = FootJoint(acts_in_swing=False, orthosis=beside[0])
+            ankle = FootJoint(acts_in_swing=False, orthosis=of_ankle)
     segments = {name: number for name, number in given.items() if name in SEGMENT_RATIOS}
     schedule = StiffnessSchedule.from_json(given["schedule"]) if "schedule" in given else None
     return Foot(kind=kind, ankle=ankle, toe=toe, schedule=schedule, one_piece=kind == "no_toe", **segments)
 
 
 def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
-    """Return settings in which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
+    """Separate settings in which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
 
-    Returns the settings with the first foot of each list, and the feet of each environment; None without lists.
+    Returns the settings with the first foot of each list, and the feet of each environment, None without lists. Raises
+    `SpringfootError` for a list of another length, and for feet of a list to which different people have adapted.
     """
     listed = {name: settings[name] for name in FOOT_SETTINGS if isinstance(settings.get(name), (list, tuple))}
     for name, feet in listed.items():
@@ -289,6 +304,7 @@ def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], li
 
 
 def _usual(numbers: Mapping[str, Number]) -> dict[str, float | None]:
+    """Return the defaults of the numbers."""
     return {name: number.usual for name, number in numbers.items()}
 
 

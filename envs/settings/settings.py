@@ -238,7 +238,7 @@ class BipedSettings:
 
     @property
     def feet(self) -> Feet:
-        """The left and the right foot as physics."""
+        """Return the left and the right foot, for the physics."""
         return self.left_foot.foot, self.right_foot.foot
 
     @property
@@ -248,7 +248,7 @@ class BipedSettings:
 
     @property
     def step_seconds(self) -> float:
-        """Time of one step of the environment [s]."""
+        """Return the time of one step of the environment [s]."""
         return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP
 
     @property
@@ -257,7 +257,7 @@ class BipedSettings:
         return ceil(self.episode_seconds / self.step_seconds - 0.5)
 
     def _check_draws(self) -> None:
-        """Check the ranges to draw from."""
+        """Raise `SpringfootError` for bad ranges of drawn bodies and speeds, and for bad changes of speed."""
         for name, allowed, unit in (
             *(("height_range", HEIGHT_RANGE, "m"), ("mass_range", MASS_RANGE, "kg")),
             ("speed_range", PLAN_SPEED_RANGE, "m/s"),
@@ -280,7 +280,7 @@ class BipedSettings:
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
 
     def _check_world(self) -> None:
-        """Check ground, noise and delays."""
+        """Raise `SpringfootError` for bad ground, noise or delays."""
         require_number("friction", self.friction, *FRICTION_RANGE)
         require_number("slope_deg", self.slope_deg, *SLOPE_RANGE_DEG, unit="deg")
         check_span("slope_range_deg", self.slope_range_deg, SLOPE_RANGE_DEG, "deg")
@@ -321,7 +321,7 @@ def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
 
 
 def body_of(settings: BipedSettings) -> Body:
-    """Return the body of the settings."""
+    """Return the settings' body; raise `SpringfootError` for an impossible one."""
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
 
 

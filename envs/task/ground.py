@@ -22,9 +22,9 @@ class Ground:
 
     Args:
         settings: slope and unevenness; the simulation's models have the friction.
-        simulation: to lay the ground in.
-        subjects: the bodies, which own the slope.
-        rows: (N,) of `TASK_ROW`.
+        simulation: simulation in which the ground is laid.
+        subjects: bodies; their slope is changed.
+        rows: (N,) of `TASK_ROW`; `ground` is changed.
     """
 
     def __init__(self, settings: BipedSettings, simulation: Simulation, subjects: Subjects, rows: NDArray):
@@ -46,9 +46,10 @@ class Ground:
         self._simulation.lay(ids, self.slope[ids], self.height[ids])
 
     def advance(self, m: Measurement, leg_phase: NDArray, randoms: Sequence[np.random.Generator | None]) -> None:
-        """Give every foot that reached mid-swing in the last control window the ground of its next footfall.
+        """Lay the ground of the next footfall below every foot that reached mid-swing in the last control window.
 
-        The new ground stays below the foot. `leg_phase` (N, side) are the stride phases after the window.
+        The new ground stays below the foot. `m` and `leg_phase` (N, side) are measurement and stride phases after the
+        window, `randoms` the generators of the environments.
         """
         if self._settings.unevenness_m == 0.0:
             return
@@ -57,8 +58,8 @@ class Ground:
         for index, side in np.argwhere(arrived).tolist():
             random = randoms[index]
             if random is not None:
-                room = self.height[index, side] + m.contact[index, side, :, 1].min()
+                lowest_point = self.height[index, side] + m.contact[index, side, :, 1].min()
                 drawn = self._settings.unevenness_m * random.uniform(-1.0, 1.0)
-                self.height[index, side] = min(drawn, max(room, self.height[index, side]))
+                self.height[index, side] = min(drawn, max(lowest_point, self.height[index, side]))
         ids = np.flatnonzero(arrived.any(axis=1))
         self._simulation.lay(ids, self.slope[ids], self.height[ids])

@@ -21,7 +21,7 @@ START_DEPTH = 0.001
 
 
 def start_table(rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> PhaseTable:
-    """Return the target's posture over the stride, for each row of the tables (`envs.control.reference_walk.rows`)."""
+    """Return the target's posture over the stride as a table, for each row of `envs.control.reference_walk.rows`."""
     return PhaseTable(np.stack([_start_curves(walk) for _, walk in rows]))
 
 
@@ -33,10 +33,11 @@ def random_phase(random: np.random.Generator) -> float:
 def walking_posture(
     table: PhaseTable, subjects: Subjects, ids: NDArray, left_phase: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the posture of `table` at `left_phase` (K,), and the commanded speed, of environments `ids` (K,).
+    """Return the posture in which environments `ids` (K,) start to walk, at the phases `left_phase` (K,) of the left
+    leg.
 
-    Returns joint angles, the hips' to the vertical, and rates (K, side, joint) [rad, rad/s]; trunk pitch (K,) [rad];
-    speed (K,) [m/s].
+    `table` comes from `start_table`. Returns joint angles, those of the hips to the vertical, and their rates, (K,
+    side, joint) each [rad, rad/s]; trunk pitch (K,) [rad]; commanded speed (K,) [m/s].
     """
     curves = table.at(leg_phases(left_phase), subjects.place[ids])
     angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
@@ -50,9 +51,10 @@ def place(
     posture: tuple[NDArray, NDArray, NDArray, NDArray],
     noise: NDArray,
 ) -> None:
-    """Put simulations `ids` (K,) into a `posture` of `walking_posture`.
+    """Put simulations `ids` (K,) into a posture, with the lowest contact point `START_DEPTH` in the floor.
 
-    `noise` (K, 2, side, joint) is the relative error of angles and rates. Locked joints start locked.
+    `posture` comes from `walking_posture` or `Standing.reset`; `noise` (K, 2, side, joint) is the relative error of
+    angles and rates. Locked joints start at their rest angle.
     """
     (angle, velocity, pitch, speed), scale = posture, subjects.scale[ids]
     angle = angle * (1.0 + noise[:, 0])

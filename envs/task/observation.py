@@ -39,14 +39,14 @@ SEEN = np.dtype(
 
 @lru_cache(maxsize=256)
 def units_of(body: Body) -> NDArray:
-    """Return (6,) the units of one body's observation, in the order of `UNITS` [SI]."""
+    """Return (6,) the size of each of `UNITS` for a body [SI]."""
     leg = body.leg_length
     return np.array([1.0, 1.0, leg, sqrt(GRAVITY * leg), sqrt(GRAVITY / leg), body.total_mass * GRAVITY])
 
 
 @kernel
 def observe(rows, controls, bodies, table, observation) -> None:
-    """Make the observations; NaN reads as the upper bound.
+    """Make the observations: entries in SI, over their units, clipped to their bounds; NaN reads as the upper bound.
 
     Args:
         rows: (N,) of `TASK_ROW`.
@@ -97,7 +97,7 @@ class SensorNoise:
     """Gaussian noise on the measured entries of N observations, drawn anew at every step.
 
     Args:
-        standard_deviation: of the noise, in the dimensionless units of the observation.
+        standard_deviation: standard deviation of the noise, in the dimensionless units of the observation.
         rows: (N,) of `TASK_ROW`.
     """
 

@@ -10,17 +10,20 @@ UNITS = ("1", "rad", "leg length", "sqrt(g l)", "sqrt(g/l)", "body weight")
 
 
 class Entry(NamedTuple):
-    """One entry of the observation: its name, unit, bounds that clip it, meaning, and whether a sensor measures it.
-
-    Entries that are not measured are values of the controller itself.
-    """
+    """One entry of the observation."""
 
     name: str
+    """Name."""
     unit: str
+    """Unit, one of `UNITS`."""
     low: float
+    """Lower bound, to which it is clipped."""
     high: float
+    """Upper bound, to which it is clipped."""
     meaning: str
+    """Meaning, in words."""
     measured: bool = True
+    """True for measurements of a sensor, False for values of the controller."""
 
 
 def _entries() -> tuple[Entry, ...]:

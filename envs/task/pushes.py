@@ -30,20 +30,24 @@ class Pushes:
         self._begin, self._force, self._ends = (rows["push"][name] for name in ("begin", "force", "ends"))
 
     def reset(self, index: int, random: np.random.Generator) -> None:
-        """Begin an episode of environment `index`."""
+        """Begin an episode of environment `index`, and draw its first push."""
         self._ends[index] = 0.0
         self._draw(index, random)
 
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
-        """Return (N,) the push [N] after `steps` (N,); only environments that are `running` (N,) draw their next
-        push."""
+        """Return (N,) the push on each trunk [N], forward positive, after `steps` (N,) of its episode.
+
+        Environments that are `running` (N,) and whose interval has ended draw their next push by their generators
+        `random`.
+        """
         time = steps * self._step
         for index in np.flatnonzero(running & (time >= self._ends)).tolist():
             generator = random[index]
             if generator is not None:
                 self._draw(index, generator)
-        since = time - self._begin
-        return np.where((since >= 0) & (since < self._duration), self._force * self._scale["mass"], 0.0)
+        since_begin = time - self._begin
+        pushed = (since_begin >= 0) & (since_begin < self._duration)
+        return np.where(pushed, self._force * self._scale["mass"], 0.0)
 
     def _draw(self, index: int, random: np.random.Generator) -> None:
         """Draw time and direction of the next push of environment `index`."""

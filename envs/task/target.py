@@ -33,19 +33,23 @@ TARGET = np.dtype(
 
 
 def target_curves(gait: HumanGait, plan: ComPlan, step_seconds: float) -> NDArray:
-    """Return (SAMPLES,) of dtype `TARGET`: the gait and the plan to follow, for steps of `step_seconds` [s]."""
+    """Return the target over the stride of one leg, (SAMPLES,) of dtype `TARGET` on `GRID`.
+
+    `gait` has joint angles and forces, `plan` CoM and ZMP. `step_seconds` is the environment's step [s]: forces and CoP
+    are averages over it, and belong to its middle.
+    """
     curves = np.zeros(len(GRID), TARGET)
     curves["pose"] = np.stack([gait.mean(name, GRID) for name in ANGLES], -1)
     middle = (GRID - 0.5 * step_seconds / plan.stride_time) % 1.0  # a force averaged over a step belongs to its middle
     for axis, name in enumerate(("grf_forward", "grf_vertical")):
         curves["force"][:, axis] = gait.mean(name, middle)
         curves["force_band"][:, axis] = FORCE_BAND * gait.sd(name, middle)
-    step = (2 * GRID) % 1.0
-    x, z = plan.com(step)
-    curves["com"] = np.stack((x - plan.step_length * step, z), -1)
-    earlier = 2 * GRID - 0.5 * step_seconds / plan.step_time  # the middle of the step, which may lie in the step before
-    curves["zmp"] = plan.zmp(earlier) + plan.step_length * (np.floor(earlier) - np.floor(2 * GRID) - step)
-    curves["speed"], _ = plan.com_velocity(step)
+    step_phase = (2 * GRID) % 1.0  # of the plan's step, half a stride
+    x, z = plan.com(step_phase)
+    curves["com"] = np.stack((x - plan.step_length * step_phase, z), -1)
+    earlier = 2 * GRID - 0.5 * step_seconds / plan.step_time  # may lie in the plan's step before
+    curves["zmp"] = plan.zmp(earlier) + plan.step_length * (np.floor(earlier) - np.floor(2 * GRID) - step_phase)
+    curves["speed"], _ = plan.com_velocity(step_phase)
     curves["stride_length"] = 2 * plan.step_length
     return curves
 
@@ -60,17 +64,20 @@ def targets_at(table, control, curves) -> NDArray:
 
 @part
 def error_of(control, targets, m) -> tuple[float, float, float]:
-    """Return CoM minus target: x [m], z [m], forward speed [m/s].
+    """Return CoM minus target of one body: x [m], z [m], forward speed [m/s].
 
-    The x of the target is from the ankle of the leg whose stance began last.
+    `control` is of `CONTROL_ROW`, `targets` (side,) of `TARGET`, `m` the measurement. The x of the target is from the
+    ankle of the leg whose stance began last; within the step it advances with the phase.
     """
-    ratio = control.subject.scale
+    scale = control.subject.scale
     phase = control.legs.phase
     leader = LEFT if phase[LEFT] < 0.5 else RIGHT
     target = targets[leader]
-    target_x = m.ankle[leader, 0] + ratio.length * target.stride_length * phase[leader]
-    target_x += ratio.length * target.com[0]
-    return m.com[0] - target_x, m.com[1] - ratio.length * target.com[1], m.com_velocity[0] - ratio.time * target.speed
+    target_x = m.ankle[leader, 0] + scale.length * target.stride_length * phase[leader]
+    target_x += scale.length * target.com[0]
+    target_z = scale.length * target.com[1]
+    target_speed = scale.time * target.speed
+    return m.com[0] - target_x, m.com[1] - target_z, m.com_velocity[0] - target_speed
 
 
 @kernel

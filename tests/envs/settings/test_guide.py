@@ -86,7 +86,7 @@ def test_with_the_fixed_schedule_it_walks():
 def test_settings_that_need_people_are_refused():
     own = {"name": "x.csv", "strides": 1, "speed": None, "stride_time": 1.2, "step_length": None, "toe_off": 0.63}
     own |= {"mean": {}, "sd": {}}
-    with pytest.raises(SpringfootError, match="guide 'plan' follows nobody's walk: human must be None"):
+    with pytest.raises(SpringfootError, match="human must be None with guide 'plan': the plan replaces human data"):
         settings_from(**PLAN, human=own)
     with pytest.raises(SpringfootError, match="no leg constants walk with guide 'plan' at cadence 'thesis'"):
         Biped(BipedSettings(guide="plan", cadence="thesis"), 1)
