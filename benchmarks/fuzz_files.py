@@ -34,8 +34,8 @@ from springfoot.gait.plan.walk_style import STYLES, styles_of
 from springfoot.gait.springs.foot_file import read_foot
 from springfoot.studies.base.flags import read_json
 from springfoot.studies.base.kept import Kept
+from springfoot.studies.searches.cma_search import generations
 from springfoot.studies.searches.constants_file import ADAPTED_FEET, CONSTANTS, read_constants, read_feet, read_styles
-from springfoot.studies.searches.kept_search import generations
 from springfoot.studies.walks.learning_curves import read_finished
 
 TASK = BipedSettings()

@@ -110,6 +110,7 @@ def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: B
     table = PhaseTable(of_legs.reshape(*of_legs.shape[:2], -1))
 
     def policy(observation: NDArray) -> NDArray:
+        """Return the actions (N, 4) at phase and speed of the observations (N, D)."""
         position = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))  # between the tabulated speeds
         place = np.zeros(len(position), PLACE)
         place["row"] = position

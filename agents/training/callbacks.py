@@ -20,6 +20,7 @@ class SessionAndUserCallbacks(CallbackList):
         self._stop = stop
 
     def _on_step(self) -> bool:
+        """Call every callback; return False to end the training."""
         session, *others = self.callbacks
         session_continues = session.on_step()
         others_continue = [callback.on_step() for callback in others]  # all are called, also after a False

@@ -62,8 +62,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
     try:
         _require_header(header)
     except (KeyError, TypeError, ValueError) as error:
-        what = f"it has no {error}" if isinstance(error, KeyError) else error
-        raise SpringfootError(f"{path} is damaged: {what}") from None
+        reason = f"it has no {error}" if isinstance(error, KeyError) else error
+        raise SpringfootError(f"{path} is damaged: {reason}") from None
     return header, arrays
 
 

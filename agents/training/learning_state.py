@@ -114,6 +114,7 @@ def restore_learning(
             raise ValueError("logged must be values, each with the formats that leave it out")
         position, has_gauss, gauss = values["numpy"]
         ppo.action_space.np_random.bit_generator.state = values["actions"]
+        # 3 and MT19937 are the versions of Python's and NumPy's state.
         random.setstate((3, tuple(map(int, arrays["random.python"])), values["python_gauss"]))
         np.random.set_state(("MT19937", arrays["random.numpy"], int(position), int(has_gauss), gauss))  # noqa: NPY002
         torch.set_rng_state(torch.from_numpy(arrays["random.torch"]))

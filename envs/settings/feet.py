@@ -312,6 +312,7 @@ def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
     """Return springs at ankle and toe from the values of `SPRING_NUMBERS`."""
 
     def spring(joint: str) -> Spring:
+        """Return the spring of one joint: by its torque-angle line if there is one, else by its numbers."""
         rest = radians(value[f"{joint}_deg"])
         table = value.get(f"{joint}_table", ())
         points = tuple((radians(angle), torque) for angle, torque in table)

@@ -311,7 +311,7 @@ def settings_from(**values: Any) -> BipedSettings:
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    return BipedSettings(**{name: each if name in FOOT_SETTINGS else plain(each) for name, each in values.items()})
+    return BipedSettings(**{name: value if name in FOOT_SETTINGS else plain(value) for name, value in values.items()})
 
 
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:

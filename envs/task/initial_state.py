@@ -56,7 +56,8 @@ def place(
     `posture` comes from `walking_posture` or `Standing.reset`; `noise` (K, 2, side, joint) is the relative error of
     angles and rates. Locked joints start at their rest angle.
     """
-    (angle, velocity, pitch, speed), scale = posture, subjects.scale[ids]
+    angle, velocity, pitch, speed = posture
+    scale = subjects.scale[ids]
     angle = angle * (1.0 + noise[:, 0])
     velocity = velocity * (1.0 + noise[:, 1])
     angle[..., HIP] += pitch[:, None]
@@ -64,7 +65,7 @@ def place(
     locked = feet["locked"] > 0
     angle[..., ANKLE:] = np.where(locked, feet["rest"], angle[..., ANKLE:])
     velocity[..., ANKLE:] = np.where(locked, 0.0, velocity[..., ANKLE:])
-    base, rate = np.zeros((2, len(ids), 3))
+    base, rate = np.zeros((2, len(ids), 3))  # of the hips: x [m], z [m], pitch [rad], and their rates
     base[:, 2] = pitch
     rate[:, 0] = speed
     simulation.reset(ids, base, rate, angle, velocity)

@@ -19,21 +19,24 @@ OPEN_LOOP = "open loop"
 
 
 def open_loop_note(name: str) -> str:
-    """Return the sentence under a table with a policy's open-loop copy; empty if the policy has none."""
+    """Return the sentence that explains a policy's open-loop copy below a table; empty if the policy has none."""
     copies = ", ".join(f"`{copy}`" for copy in and_copy(name)[1:])
     return copies and f" Open loop: {copies}, the policy's mean K over the stride at the same θ_eq, without feedback."
 
 
 @dataclass(frozen=True)
 class Column:
-    """Column of a table: its label, the format of its numbers, and their keys in nested metrics."""
+    """Column of a table."""
 
     label: str
+    """Head of the column."""
     pattern: str
+    """Format of its numbers, such as `.2f`."""
     path: tuple[str, ...]
+    """Keys that lead to its number in nested metrics."""
 
     def of(self, metrics: Mapping[str, Any]) -> Any:
-        """Return the number; None if it could not be measured."""
+        """Return the column's number in `metrics`; None if it could not be measured."""
         return reduce(getitem, self.path, metrics)
 
     @property
@@ -59,17 +62,21 @@ WALK_COLUMNS = (
 
 
 def walks_csv(rows: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> str:
-    """Return the CSV with a line for each walk: its labels, `WALK_COLUMNS`, and the number of episodes."""
-    head = [*rows[0][0], "episodes", *(each.csv_name for each in WALK_COLUMNS)]
-    lines = ([*of.values(), metrics["episodes"], *(each.of(metrics) for each in WALK_COLUMNS)] for of, metrics in rows)
+    """Return the CSV with a line for each of `rows` (labels by column name, metrics): labels, number of episodes,
+    `WALK_COLUMNS`."""
+    head = [*rows[0][0], "episodes", *(column.csv_name for column in WALK_COLUMNS)]
+    lines = (
+        [*labels.values(), metrics["episodes"], *(column.of(metrics) for column in WALK_COLUMNS)]
+        for labels, metrics in rows
+    )
     return csv_text(head, lines)
 
 
 def falls_text(metrics: Mapping[str, Any]) -> str:
-    """Return how many episodes fell, in words."""
+    """Return the number of episodes that fell, as in "2 of 20"."""
     return f"{metrics['falls']} of {metrics['episodes']}"
 
 
 def rmse_text(metrics: Mapping[str, Any]) -> str:
-    """Return the RMSE of `COMPARED_JOINTS` to people's mean [deg], in words."""
+    """Return the RMSE of each of `COMPARED_JOINTS` to people's mean [deg], as in "4.1 / 5.0 / 3.2"."""
     return " / ".join(text_of(metrics["joints"][joint]["rmse_deg"], ".1f") for joint in COMPARED_JOINTS)

@@ -10,6 +10,8 @@ from springfoot.errors import quoted
 
 
 class _NotGiven:
+    """Type of `NOT_GIVEN`."""
+
     def __repr__(self) -> str:
         return "NOT_GIVEN"
 
@@ -25,20 +27,20 @@ _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 
 def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
-    """Return tyro's reader of a flag of this type.
+    """Return tyro's reader of a flag whose value is of type `kind`, such as `tuple[float, float] | None`.
 
     The word `None` is a value only of types that can be None.
     """
-    inner = next((part for part in _parts(kind) if get_origin(part) is tuple), kind)
-    items = get_args(inner) if get_origin(inner) is tuple else ()
+    tuple_kind = next((part for part in _parts(kind) if get_origin(part) is tuple), kind)
+    items = get_args(tuple_kind) if get_origin(tuple_kind) is tuple else ()
     count: Any = "*" if items[1:] == (...,) else len(items) or 1
-    if inner is not kind and count != 1:
-        count = (1, count)  # None alone
+    if tuple_kind is not kind and count != 1:
+        count = (1, count)  # one word for None
     return spec(lambda words: _read(kind, words), metavar_of(kind), count)
 
 
 def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro.constructors.PrimitiveConstructorSpec:
-    """Return a flag of `count` words, which `read` converts to a value; its default is `NOT_GIVEN`."""
+    """Return tyro's reader of a flag of `count` words (a number, a range or "*"), which `read` converts to a value."""
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs=count,
         metavar=metavar,
@@ -60,28 +62,30 @@ def metavar_of(kind: Any) -> str:
 
 
 def _parts(kind: Any) -> tuple[Any, ...]:
+    """Return the types of a union; a type that is no union alone."""
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
 
 def _read(kind: Any, words: list[str]) -> Any:
-    """Return the value; raise `ValueError` with the allowed values for other words."""
+    """Return the value of type `kind` that the words mean; raise `ValueError` with the allowed values for other
+    words."""
     parts = _parts(kind)
     if NoneType in parts and words == [_NONE]:
         return None
     for part in parts:
         try:
-            return _one(part, words)
+            return _read_part(part, words)
         except ValueError:
             continue
     raise ValueError(f"must be {' or '.join(filter(None, map(_meaning, parts)))}, got {quoted(' '.join(words))}")
 
 
-def _one(kind: Any, words: list[str]) -> Any:
-    """Return the value of a type that is not a union, from the words behind its flag."""
+def _read_part(kind: Any, words: list[str]) -> Any:
+    """Return the value of a type that is not a union; raise `ValueError` for other words."""
     if get_origin(kind) is tuple:
         items = get_args(kind)
         kinds = [items[0]] * len(words) if items[1:] == (...,) else items
-        return tuple(_one(each, [word]) for each, word in zip(kinds, words, strict=True))
+        return tuple(_read_part(item_kind, [word]) for item_kind, word in zip(kinds, words, strict=True))
     (word,) = words
     if get_origin(kind) is Literal:
         return get_args(kind)[[str(value) for value in get_args(kind)].index(word)]
@@ -91,7 +95,7 @@ def _one(kind: Any, words: list[str]) -> Any:
 
 
 def _meaning(kind: Any) -> str:
-    """Return the allowed values of a type, in words."""
+    """Return the allowed values of a type for an error message, such as "2 numbers"; empty for types without any."""
     if get_origin(kind) is Literal:
         return f"one of {', '.join(map(str, get_args(kind)))}"
     if get_origin(kind) is tuple:

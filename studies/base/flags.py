@@ -24,7 +24,7 @@ from .flag_words import NOT_GIVEN, flag_of, spec
 
 
 def field_help(settings: type) -> dict[str, str]:
-    """Return the docstring below each field of a dataclass, on one line."""
+    """Return field -> the docstring below it in the source of the dataclass `settings`, on one line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
     return {
         item.target.id: " ".join(str(doc.value.value).split())
@@ -54,25 +54,26 @@ def read_own_gait(words: str, trust_units: bool = False, mass: float | None = No
     """Return the setting `human` for the value of `--human`; `trust_units` as in `read_gait`.
 
     The value is a file of `read_gait`; FILE:CONDITION for one condition of a CSV; or several files of one walk with
-    commas between. Moments in N m are divided by the mass that the forces bear; in files without forces by `mass` [kg],
+    commas between. Moments in N m are divided by the mass that the forces show; in files without forces by `mass` [kg],
     that of the body. Raises `SpringfootError` for a file that cannot be read.
     """
     files = [words]
     condition = None
     if not Path(words).is_file():
-        file, _, last = words.rpartition(":")
+        file, _, after_colon = words.rpartition(":")
         if "," in words:
             files = words.split(",")
         elif Path(file).is_file():
             files = [file]
-            condition = last
-    own = read_gait(*files, condition=condition, trust_units=trust_units)
-    if mass is not None and "grf_vertical" not in own.mean:
-        own = read_gait(*files, condition=condition, trust_units=trust_units, mass=mass)
-    return own.to_json()
+            condition = after_colon
+    gait = read_gait(*files, condition=condition, trust_units=trust_units)
+    if mass is not None and "grf_vertical" not in gait.mean:
+        gait = read_gait(*files, condition=condition, trust_units=trust_units, mass=mass)
+    return gait.to_json()
 
 
 def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | None:
+    """Return None for the word `None` if that is allowed, else the dictionary of `read_json`."""
     return None if may_be_none and words == ["None"] else read_json(words)
 
 
@@ -81,12 +82,12 @@ def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
     return read_json(words) if words[0].lstrip().startswith("{") else words[0]
 
 
-def foot_given(given: str | dict[str, Any]) -> str | dict[str, Any]:
-    """Return the foot setting for a flag's value: the foot of that file if the value is a file's name, else the
-    value."""
-    if isinstance(given, str) and (Path(given).is_file() or Path(given).suffix):
-        return read_foot(given)
-    return given
+def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
+    """Return the foot setting for a flag's value: the foot in the file if the value is a file's name, else the value
+    itself."""
+    if isinstance(value, str) and (Path(value).is_file() or Path(value).suffix):
+        return read_foot(value)
+    return value
 
 
 FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]
@@ -114,7 +115,7 @@ def optional_flags(
     """Return a dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
 
     Args:
-        name: of the dataclass.
+        name: name of the returned dataclass.
         settings: dataclass of the fields; the help of a flag is the docstring of its field.
         defaults: instance of `settings`; the help shows its values.
         leave_out: fields that become no flag.
@@ -128,27 +129,30 @@ def optional_flags(
     metadata = {item.name: item.metadata for item in dataclasses.fields(settings)}
     for item_name, kind in hints.items():
         if item_name not in leave_out:
-            shown = help_of[item_name], f"(default: {_words(getattr(defaults, item_name))})"
+            text = help_of[item_name]
+            hint = f"(default: {_words(getattr(defaults, item_name))})"
             if item_name in refused:
-                shown = f"Refused: {refused[item_name]}.", ""
-            annotation = _optional_flag(item_name, kind, *shown)
-            its_group = themed.get(metadata[item_name].get("theme", ""), flags)
-            its_group.append((item_name, annotation, NOT_GIVEN))
+                text = f"Refused: {refused[item_name]}."
+                hint = ""
+            group_flags = themed.get(metadata[item_name].get("theme", ""), flags)
+            group_flags.append((item_name, _optional_flag(item_name, kind, text, hint), NOT_GIVEN))
             if item_name in FILE_FLAGS:
-                its_group.append((TRUST, _TRUST_FLAG, False))
-    for theme, inside in themed.items():
-        if inside:
-            group = _flags_class(f"{name}{theme.title()}", inside, themes[theme])
+                group_flags.append((TRUST, _TRUST_FLAG, False))
+    for theme, group_flags in themed.items():
+        if group_flags:
+            group = _flags_class(f"{name}{theme.title()}", group_flags, themes[theme])
             flags.append((theme, tyro.conf.OmitArgPrefixes[group], dataclasses.field(default_factory=group)))
     return _flags_class(name, flags, settings.__doc__)
 
 
 def _flags_class(name: str, flags: list[tuple[str, Any, Any]], doc: str | None) -> type:
+    """Return the dataclass of flags (name, annotation, default), with the docstring `doc`."""
     namespace = {"__doc__": doc, "__module__": __name__}
     return dataclasses.make_dataclass(name, flags, frozen=True, kw_only=True, namespace=namespace)
 
 
 def _words(default: Any) -> Any:
+    """Return a default as the user would type it: a tuple as words."""
     return " ".join(map(str, default)) if isinstance(default, tuple) else default
 
 
@@ -156,20 +160,20 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
     """Return the annotation of a flag for a setting of type `kind`, with its help `text` and the `hint` behind it."""
     parts = get_args(kind)
     if name in FILE_FLAGS:
-        how = spec(lambda words: words[0], "FILE")
+        reader = spec(lambda words: words[0], "FILE")
     elif name in FOOT_SETTINGS:
-        how = spec(_read_word_or_json, "WORD|JSON|FILE")
+        reader = spec(_read_word_or_json, "WORD|JSON|FILE")
     elif get_origin(kind) is not dict and StiffnessSchedule not in parts:
-        how = flag_of(kind)
+        reader = flag_of(kind)
     else:
-        how = spec(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
-    return Annotated[Any, how, tyro.conf.arg(help=text, help_behavior_hint=hint)]
+        reader = spec(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
+    return Annotated[Any, reader, tyro.conf.arg(help=text, help_behavior_hint=hint)]
 
 
 def given(flags: Any) -> dict[str, Any]:
-    """Return name -> value of the flags that the user gave, without themes, with files read.
+    """Return setting -> value of the flags that the user gave, in one dictionary for all themes.
 
-    Raises `SpringfootError` for a bad file.
+    Values that name a file are replaced by its content. Raises `SpringfootError` for a bad file.
     """
     values = _given_words(flags)
     trust = values.pop(TRUST, False)
@@ -181,7 +185,7 @@ def given(flags: Any) -> dict[str, Any]:
 
 
 def _given_words(flags: Any) -> dict[str, Any]:
-    """Return name -> value of the flags that the user gave, and `TRUST`, without themes."""
+    """Return flag -> value of the flags that the user gave, and `TRUST`, in one dictionary for all themes."""
     values: dict[str, Any] = {}
     for item in dataclasses.fields(flags):
         value = getattr(flags, item.name)
@@ -193,12 +197,13 @@ def _given_words(flags: Any) -> dict[str, Any]:
 
 
 def _evaluated(theme: str) -> str:
-    """Return the help of a theme in an evaluation: the settings of the theme that a trained policy brings with it."""
-    names = [name for name, its in THEME_OF.items() if its == theme and name != "episode_seconds"]  # given as --seconds
-    own = [f"--{name.replace('_', '-')}" for name in names if name not in CONDITION_SETTINGS]
-    if len(own) == len(names):
+    """Return the help of a theme in an evaluation, which says which of its settings a trained policy brings."""
+    settings = [name for name, its_theme in THEME_OF.items() if its_theme == theme]
+    settings = [name for name in settings if name != "episode_seconds"]  # the flag --seconds
+    brought = [f"--{name.replace('_', '-')}" for name in settings if name not in CONDITION_SETTINGS]
+    if len(brought) == len(settings):
         return f"{THEMES[theme]} A trained policy brings its own."
-    return f"{THEMES[theme]} Of these a trained policy brings {' and '.join(own) or 'nothing'} with it."
+    return f"{THEMES[theme]} Of these a trained policy brings {' and '.join(brought) or 'nothing'} with it."
 
 
 EVALUATED = {theme: _evaluated(theme) for theme in THEMES}

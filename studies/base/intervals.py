@@ -1,6 +1,4 @@
-"""Compute how sure a number is: intervals of means and fractions, and a test of two rows that walked the same
-episodes.
-"""
+"""Compute intervals of means and fractions, and a test of two policies' falls in the same episodes."""
 
 import numpy as np
 from scipy.stats import binomtest, bootstrap, t
@@ -22,7 +20,7 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
     """
     if len(values) < 2:
         return float(values[0]), float(values[0])
-    found = bootstrap(
+    result = bootstrap(
         (values,),
         np.mean,
         n_resamples=RESAMPLES,
@@ -30,30 +28,30 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
         method="percentile",
         rng=np.random.default_rng(0),
     )
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
 def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
-    """Return Student's interval of the mean of a few values (n,), such as training seeds; for a single value all
-    numbers."""
+    """Return Student's interval of the mean of a few values (n,), such as training seeds; -inf to inf for a single
+    value."""
     if len(values) < 2:
         return -np.inf, np.inf
     mean = float(np.mean(values))
-    half = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    half *= float(t.ppf(0.5 + 0.5 * level, len(values) - 1))
+    standard_error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    half = standard_error * float(t.ppf(0.5 + 0.5 * level, len(values) - 1))
     return mean - half, mean + half
 
 
 def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
     """Return Wilson's score interval [0, 1] of the fraction `count` / `total`."""
-    found = binomtest(count, total).proportion_ci(confidence_level=level, method="wilson")
-    return float(found.low), float(found.high)
+    interval = binomtest(count, total).proportion_ci(confidence_level=level, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def paired_p(fell: NDArray, other: NDArray) -> float:
-    """Return p of McNemar's exact test that two rows fall equally often, from falls (n,) in the same episodes.
+    """Return p of McNemar's exact test that two policies fall equally often, from falls (n,) in the same episodes.
 
-    Only episodes in which one row fell and the other did not count; without any p is 1.
+    Only episodes in which one of them fell and the other did not count; without any p is 1.
     """
     alone = int((fell & ~other).sum())
     other_alone = int((other & ~fell).sum())

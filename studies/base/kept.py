@@ -1,4 +1,4 @@
-"""Keep the numbers of a study by the question that they answer, in a file, so that a stopped study goes on."""
+"""Keep a study's results in a file, so that a stopped study goes on without computing them again."""
 
 import json
 from collections.abc import Callable
@@ -11,18 +11,18 @@ from springfoot.files.writing import write_atomically
 
 
 class Kept:
-    """Answers by question, kept in a file if there is a `path`."""
+    """Results by question, kept in the file `path`; in memory only if that is None."""
 
     def __init__(self, path: Path | None):
         self._path = path
         self._known: dict[str, Any] = {}
         if path is not None and path.exists():
             self._known = read_object(path, "file of a study's numbers")
-            if not all(isinstance(answer, dict) for answer in self._known.values()):
+            if not all(isinstance(result, dict) for result in self._known.values()):
                 raise SpringfootError(f"{path} is no file of a study's numbers: each must be an object in braces")
 
     def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Return the kept answer to `question`, a JSON value, or `make` and keep it."""
+        """Return the kept result for `question`, any JSON value; call `make` for it and keep it if there is none."""
         text = json.dumps(question, sort_keys=True)
         if text not in self._known:
             self._known[text] = make()

@@ -15,7 +15,7 @@ from .study import OnProgress
 
 @dataclass(frozen=True, kw_only=True)
 class PushedWalks:
-    """Episodes of each row of a table, undisturbed and pushed."""
+    """Measurement of a policy: episodes undisturbed and pushed, the same seeds for all policies of a table."""
 
     episodes: int = 20
     """Undisturbed episodes of each row and seed, and as many pushed."""
@@ -28,16 +28,21 @@ class PushedWalks:
     threads: int = 2
     """Threads of the physics; the results are the same with any number."""
     progress: OnProgress = lambda seconds: None
+    """Function called with the simulated time [s] of each step."""
 
-    def of(self, policy: str, given: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
-        """Return the policy's metrics `undisturbed` and `pushed`, with the default reward."""
+    def metrics(self, policy: str, settings: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
+        """Record the policy of that name; return its metrics by condition, `undisturbed` and `pushed`.
+
+        The reward is the default one. `settings` are further environment settings; `legs` are leg constants in place of
+        the tuned ones.
+        """
         metrics = {}
         for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
-            wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (given or {})
-            acting, settings = policy_and_settings(policy, wanted, self.seed)
+            wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (settings or {})
+            acting, environment = policy_and_settings(policy, wanted, self.seed)
             names = ("episodes", "seed", "threads", "progress")
-            how: dict[str, Any] = {name: getattr(self, name) for name in names} | {"legs": legs}
-            metrics[condition] = measure(record(acting, settings, name=policy, **how)).metrics
+            arguments: dict[str, Any] = {name: getattr(self, name) for name in names} | {"legs": legs}
+            metrics[condition] = measure(record(acting, environment, name=policy, **arguments)).metrics
         return metrics
 
     @property
@@ -53,7 +58,7 @@ class PushedWalks:
         )
 
 
-def measured(path: Path, how: PushedWalks, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the metrics kept in the file `path` for this `how` and `key`, or `make` and keep them."""
-    asked = json.loads(json.dumps({"how": {**vars(how), "threads": None, "progress": None}, "of": key}))
-    return Kept(path).get(asked, make)
+def kept_metrics(path: Path, walks: PushedWalks, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Return the metrics kept in the file `path` for these `walks` and this `key`; `make` and keep them if missing."""
+    question = json.loads(json.dumps({"how": {**vars(walks), "threads": None, "progress": None}, "of": key}))
+    return Kept(path).get(question, make)

@@ -39,7 +39,7 @@ class Answer:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A question, with the flags that every study has."""
+    """A question asked of walks, with the flags that every study has; a subclass answers it in `ask`."""
 
     quick: tyro.conf.FlagCreatePairsOff[bool] = False
     """See that it runs, in a minute at most: tiny counts in place of what is flagged; its figures then mean nothing."""
@@ -62,7 +62,7 @@ class Study:
         return None
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Do the study and return its answer; call `progress` on the way."""
+        """Do the study and return its answer; call `progress` with each advance."""
         raise NotImplementedError
 
     def run(self, name: str) -> int:
@@ -83,8 +83,8 @@ class Study:
             if study.quick and study.QUICK:
                 answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}")
             print(answer.text)
-            made = f"\n\nMade by `{without_places(self.command)}`." if self.command else ""
-            files = {REPORT_FILE: f"{answer.text}{made}\n", **answer.files}
+            made_by = f"\n\nMade by `{without_places(self.command)}`." if self.command else ""
+            files = {REPORT_FILE: f"{answer.text}{made_by}\n", **answer.files}
             for file, content in files.items():
                 _write(folder / file, content)
         print(f"\nResults: {out} ({', '.join(files)})")
@@ -92,12 +92,12 @@ class Study:
 
 
 def without_places(command: str) -> str:
-    """Return a command without the folders and files that it writes."""
+    """Return a command without the flags that name the folders and files it writes."""
     words = shlex.split(command)
     for flag in ("--out", "--keep", "--feet"):
         if flag in words:
-            place = words.index(flag)
-            del words[place : place + 2]
+            index = words.index(flag)
+            del words[index : index + 2]
     return shlex.join(words)
 
 
@@ -112,7 +112,7 @@ def _write(path: Path, content: str | Callable[[Path], object]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class WalkingStudy(Study):
-    """A study whose rows are episodes of policies, all from the same seeds."""
+    """A study whose tables have a row for each policy or condition, all walked from the same seeds."""
 
     episodes: int = 20
     """Episodes of each row."""
@@ -133,10 +133,10 @@ class WalkingStudy(Study):
 
     @property
     def how(self) -> dict[str, Any]:
-        """Arguments of `springfoot.evaluation.recording.recording.record`."""
+        """Return the arguments of `springfoot.evaluation.recording.recording.record` that the flags decide."""
         return {"episodes": self.episodes, "seed": self.seed, "threads": self.threads}
 
     @property
     def what_ran(self) -> str:
-        """Return the episodes of each row, in words."""
+        """Return number, length and seeds of each row's episodes, in words."""
         return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"

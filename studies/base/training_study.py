@@ -39,7 +39,7 @@ class TrainingStudy(WalkingStudy):
             require_count("timesteps", self.timesteps)
 
     def train_missing(self, jobs: Sequence[tuple[TrainingConfig, Path, str]]) -> bool:
-        """Finish the training of each configuration in its folder; return True if a training failed.
+        """Train the `jobs` (configuration, folder, name) that are not finished; return True if a training failed.
 
         Raises `KeyboardInterrupt` if the user stopped it.
         """

@@ -31,8 +31,8 @@ from springfoot.files.writing import csv_text, write_atomically
 
 from ..base.flags import FootFlag, foot_given
 from ..base.study import Answer, OnProgress, Study, without_places
+from ..searches.cma_search import generations
 from ..searches.constants_file import ADAPTED_FEET, read_feet
-from ..searches.kept_search import generations
 from . import person_cost
 from .foot_walks import ABOUT_STOPS, PUSH_NEWTON, SCHEDULE, TOLD, walked
 from .person_search import Person, PersonSearch
@@ -92,7 +92,7 @@ class Adapt(Study):
     threads: int = 1
     """Threads of the physics."""
     episodes: int = 20
-    """Episodes of the walks that are told of, undisturbed and pushed, not adapted and adapted."""
+    """Episodes of each reported walk: undisturbed and pushed, not adapted and adapted."""
     seconds: float = 20.0
     """Length of each."""
     feet: Annotated[Path, tyro.conf.arg(metavar="FILE")] = ADAPTED_FEET
@@ -123,7 +123,7 @@ class Adapt(Study):
         return self.generations * len(self.searches)
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Search."""
+        """Search, and compare the walks of the person before and after."""
         setting = foot_setting("foot", foot_given(self.foot))
         foot = without_person(setting.plain) if isinstance(setting.plain, dict) else setting.plain
         name = self.name or (setting.kind if self.speed == TUNED_SPEED else f"{setting.kind}, {self.speed:g} m/s")

@@ -22,16 +22,19 @@ SCHEDULE = "untrained", {"action_mode": "residual"}
 
 @dataclass(frozen=True, kw_only=True)
 class Told:
-    """A number of a walk in a table: its name in the CSV files, the head of its column, its format."""
+    """Number of a walk that tables show."""
 
     key: str
+    """Name in the CSV files."""
     label: str
+    """Head of its column."""
     pattern: str
+    """Format."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Asked(Told):
-    """A number that a designer asks for."""
+    """Number of a walk by which feet are compared."""
 
     better: int
     """1 if more is better, -1 if less is."""
@@ -59,7 +62,8 @@ TOLD = (
 )
 """Numbers that tables show of a walk."""
 NAMES = [each.key for each in TOLD]
-"""Keys of these numbers. Kept results are filed under them too, so that a new number measures the walks again."""
+"""Keys of these numbers. They are part of the question of kept results, so that a new number has all walks measured
+again."""
 ABOUT_STOPS = (
     "At a stop: share of time in which a joint of either leg is beyond its stop, which then carries load, in episodes "
     "without a fall."
@@ -67,32 +71,36 @@ ABOUT_STOPS = (
 
 
 def numbers_of(gait: Gait) -> dict[str, float | None]:
-    """Return the numbers of an undisturbed walk, by their names in the CSV files; None if no stride was measured."""
+    """Return the numbers of an undisturbed walk, by their names in the CSV files; None for numbers without a stride.
+
+    The left foot is the sound one, the right one is examined.
+    """
     metrics = gait.metrics
     tally = gait.tally
-    sound, other = leg_numbers(tally).values()
-    apart = asymmetry({"left": sound, "right": other})["step_length"]
-    steps = metrics["step_length_m"]
-    found: dict[str, float | None] = {
+    sound, examined = leg_numbers(tally).values()
+    step_asymmetry = asymmetry({"left": sound, "right": examined})["step_length"]
+    step_length = metrics["step_length_m"]
+    numbers: dict[str, float | None] = {
         "falls": metrics["falls"] / metrics["episodes"],
         "speed_m_s": metrics["speed_m_s"]["mean"],
-        "push_off_J_kg": _sum(other["joint_work_J_kg"][joint]["positive"] for joint in ("ankle", "toe")),
+        "push_off_J_kg": _sum(examined["joint_work_J_kg"][joint]["positive"] for joint in ("ankle", "toe")),
         "sound_peak_bw": sound["vertical_max_mean_bw"],
-        "step_asymmetry": None if apart is None else abs(apart),
+        "step_asymmetry": None if step_asymmetry is None else abs(step_asymmetry),
         "hip_work_J_kg_m": None,
         "fibre_J_kg_m": metrics["effort"]["fibre_J_kg_m"],
         "effort": metrics["effort"]["total"],
-        "ankle_range_deg": other["joint_range_deg"]["ankle"],
-        "toe_range_deg": other["joint_range_deg"]["toe"],
-        "clearance_m": other["toe_clearance_m"],
+        "ankle_range_deg": examined["joint_range_deg"]["ankle"],
+        "toe_range_deg": examined["joint_range_deg"]["toe"],
+        "clearance_m": examined["toe_clearance_m"],
     }
-    hips = _sum(leg["joint_work_J_kg"]["hip"]["positive"] for leg in (sound, other))
-    if hips is not None and steps:
-        found["hip_work_J_kg_m"] = hips / (2 * steps)
-    return found
+    hip_work = _sum(leg["joint_work_J_kg"]["hip"]["positive"] for leg in (sound, examined))
+    if hip_work is not None and step_length:
+        numbers["hip_work_J_kg_m"] = hip_work / (2 * step_length)  # per metre: a stride is two steps
+    return numbers
 
 
 def _sum(values: Any) -> float | None:
+    """Return the sum of values; None if one of them is None."""
     values = list(values)
     return None if None in values else float(sum(values))
 
@@ -100,26 +108,27 @@ def _sum(values: Any) -> float | None:
 def walked(
     policy: str, given: Mapping[str, Any], push_newton: float = PUSH_NEWTON, **how: Any
 ) -> dict[str, float | None]:
-    """Return `numbers_of` a policy's walk, its `beyond_stop`, and `falls_pushed` [0, 1] of the same episodes under
-    pushes.
+    """Record a policy's walk undisturbed, and the same episodes under pushes; return the numbers of both.
 
-    Episodes that end in a fall count until the fall. `how` is passed to `record`.
+    These are `numbers_of` and `beyond_stop` of the undisturbed walk, and `falls_pushed`, the fraction [0, 1] of pushed
+    episodes that fell. Episodes that end in a fall count until the fall. `given` are environment settings; `how` is
+    passed to `record`.
     """
-    found: dict[str, float | None] = {}
+    numbers: dict[str, float | None] = {}
     for push in (0.0, push_newton):
         acting, settings = policy_and_settings(policy, {**given, "push_newton": push})
         recording = record(acting, settings, name=policy, **how)
         if push:
-            found["falls_pushed"] = float(np.mean(recording.fall_reason != ""))
+            numbers["falls_pushed"] = float(np.mean(recording.fall_reason != ""))
         else:
-            found |= {**numbers_of(measure(recording)), "beyond_stop": beyond_stop(recording)}
-    return found
+            numbers |= {**numbers_of(measure(recording)), "beyond_stop": beyond_stop(recording)}
+    return numbers
 
 
 def beyond_stop(recording: Recording) -> float | None:
-    """Return the fraction of time after `WARM_UP` in which a joint of either leg is beyond its stop; None for no time.
+    """Return the fraction of time after `WARM_UP` in which a joint of either leg is beyond its stop.
 
-    Episodes that end in a fall are left out.
+    Episodes that end in a fall are left out; None if no time is left.
     """
     low, high = np.deg2rad(JOINT_RANGE_DEG).T
     angle = recording.series["angle"][recording.fall_reason == "", round(WARM_UP / TICK) :]
@@ -127,11 +136,11 @@ def beyond_stop(recording: Recording) -> float | None:
 
 
 def for_body(foot: Mapping[str, Any], height: float, mass: float) -> dict[str, Any]:
-    """Return the foot for another body: its springs scale with the body's mass x height."""
+    """Return the foot for a body of this height [m] and mass [kg]: stiffness scales with mass x height."""
     ratio = height * mass / (REFERENCE_HEIGHT * REFERENCE_MASS)
-    stiff = {
+    scaled = {
         key: round(float(np.clip(value * ratio, SPRING_NUMBERS[key].low, SPRING_NUMBERS[key].high)), 3)
         for key, value in foot.items()
         if key in SPRING_NUMBERS and key.endswith("_stiffness")
     }
-    return {**foot, **stiff}
+    return {**foot, **scaled}

@@ -108,11 +108,11 @@ class Prosthesis(TrainingStudy):
         failed = self._train() if self.train else False
         kept = Kept(self.keep)
         rows = []
-        for row, policy, given in self._rows():
-            how = self._how(row)
-            asked = [row, policy, _digest(policy, given), given, {**how, "threads": 0}, PUSH_NEWTON, NAMES]
-            found = kept.get(asked, lambda p=policy, g=given, h=how: walked(p, g, progress=progress, **h))
-            rows.append({**row, **found})
+        for labels, policy, settings in self._rows():
+            how = self._how(labels)
+            question = [labels, policy, _digest(policy, settings), settings, {**how, "threads": 0}, PUSH_NEWTON, NAMES]
+            numbers = kept.get(question, lambda p=policy, s=settings, h=how: walked(p, s, progress=progress, **h))
+            rows.append({**labels, **numbers})
         shares = share_rows(rows)
         columns = list(rows[0])
         elsewhere = f"{self.episodes_elsewhere} episodes of each, of {self.seeds_elsewhere} seeds of the trainings"
@@ -120,77 +120,80 @@ class Prosthesis(TrainingStudy):
         text = sections(rows, shares, (self.what_ran, elsewhere, learned))
         files = {
             "prosthesis.csv": csv_text(columns, [[row[name] for name in columns] for row in rows]),
-            "recovered.csv": csv_text(list(shares[0]), [list(each.values()) for each in shares]) if shares else "",
+            "recovered.csv": csv_text(list(shares[0]), [list(row.values()) for row in shares]) if shares else "",
             "prosthesis.png": partial(draw, rows=rows),
         }
         files = {name: content for name, content in files.items() if content}
         return Answer(text="\n\n".join(text.values()), files=files, failed=failed)
 
     def _how(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the arguments of `record` for the episodes of a row."""
-        if not (_here(row) or row["asked_m_s"] == _held_speed()):
+        """Return the arguments of `record` for the episodes of a row; without a trained policy those of its group."""
+        if not (_is_first_place(row) or row["asked_m_s"] == _held_speed()):
             return {**self.how, "episodes": self.episodes_elsewhere}
         if row["person"] == WITH_POLICY:
             return self.how
-        each = self.episodes // self.groups
-        return {**self.how, "episodes": each, "seed": self.seed + each * row["seed"]}
+        group_size = self.episodes // self.groups
+        return {**self.how, "episodes": group_size, "seed": self.seed + group_size * row["seed"]}
 
     def _rows(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Yield the labels of each row, its policy and its settings; the label `seed` is a training's, or a group of
-        episodes."""
+        """Yield the labels of each row, its policy and its environment settings.
+
+        The label `seed` is that of the training or, without a trained policy, the number of the group of episodes.
+        """
         feet = committed_feet()
-        quick = self.quick
-        for (height, mass), speed in PLACES[: 1 if quick else None]:
-            given = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
-            where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
-            groups = range(self.groups if _here(where) else 1)
+        schedule, as_factors = SCHEDULE
+        for (height, mass), speed in PLACES[: 1 if self.quick else None]:
+            settings = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
+            place = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
+            groups = range(self.groups if _is_first_place(place) else 1)
             for group in groups:
-                yield _row("intact", NOT_ADAPTED, where, "", group), "pretrained", given
+                yield _labels("intact", NOT_ADAPTED, place, "", group), "pretrained", settings
             for kind in WORN:
                 for search in SEARCHES:
                     name = kept_name(kind, search)
                     if name not in feet:
                         continue
-                    bare = for_body(without_person(feet[name]), height, mass)
-                    worn = {**bare, ADAPTED: name}
-                    own = {**given, "right_foot": bare}
+                    foot = for_body(without_person(feet[name]), height, mass)
+                    not_adapted = {**settings, "right_foot": foot}
+                    adapted = {**settings, "right_foot": {**foot, ADAPTED: name}}
                     for group in groups:
-                        yield _row(kind, NOT_ADAPTED, where, search, group), "pretrained", own
-                    own = {**given, **SCHEDULE[1], "right_foot": worn}
+                        yield _labels(kind, NOT_ADAPTED, place, search, group), "pretrained", not_adapted
                     for group in groups:
-                        yield _row(kind, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own
-                    seeds = self.seeds if _here(where) else min(self.seeds, self.seeds_elsewhere)
+                        yield _labels(kind, ADAPTED_ALONE, place, search, group), schedule, {**adapted, **as_factors}
+                    seeds = self.seeds if _is_first_place(place) else min(self.seeds, self.seeds_elsewhere)
                     for seed in range(seeds if kind in TRAINED else 0):
                         if policy := self._policy(f"{kind}-{search}-{seed}"):
-                            its = {**given, "right_foot": worn}
-                            yield _row(kind, WITH_POLICY, where, search, seed), policy, its
-        yield from self._held()
+                            yield _labels(kind, WITH_POLICY, place, search, seed), policy, adapted
+        yield from self._rows_with_held_toe()
 
     def _policy(self, name: str) -> str:
-        """Return a trained policy, a file or a name of the package's; no text if there is none."""
+        """Return the path of a trained policy, or its name if it is the package's; an empty text if there is none."""
         if self.policies is None:
             return name if name in SHIPPED else ""
         path = self.policies / f"{name}.safetensors"
         return str(path) if path.is_file() else ""
 
-    def _held(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Yield the rigid foot with a held toe, and the passive feet, at the speed of the held toe's search."""
+    def _rows_with_held_toe(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
+        """Yield, as `_rows` does, the rigid foot with a held toe and the passive feet, at the speed of the held toe's
+        search."""
         if (speed := _held_speed()) is None:
             return
         height, mass = BODIES[0]
         feet = committed_feet()
-        where = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
-        found = [(TOE_HELD, "", TOE_HELD), *(("passive", search, kept_name("passive", search)) for search in SEARCHES)]
-        given = {"speed": speed, "episode_seconds": self.seconds}
+        schedule, as_factors = SCHEDULE
+        place = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
+        settings = {"speed": speed, "episode_seconds": self.seconds}
         for group in range(self.groups):
-            yield _row("intact", NOT_ADAPTED, where, "", group), "pretrained", given
-        for foot, search, name in found:
-            bare = without_person(feet[name])
-            own = {**given, "right_foot": bare}, {**given, **SCHEDULE[1], "right_foot": {**bare, ADAPTED: name}}
+            yield _labels("intact", NOT_ADAPTED, place, "", group), "pretrained", settings
+        passive = [("passive", search, kept_name("passive", search)) for search in SEARCHES]
+        for kind, search, name in [(TOE_HELD, "", TOE_HELD), *passive]:
+            foot = without_person(feet[name])
+            not_adapted = {**settings, "right_foot": foot}
+            adapted = {**settings, **as_factors, "right_foot": {**foot, ADAPTED: name}}
             for group in range(self.groups):
-                yield _row(foot, NOT_ADAPTED, where, search, group), "pretrained", own[0]
+                yield _labels(kind, NOT_ADAPTED, place, search, group), "pretrained", not_adapted
             for group in range(self.groups):
-                yield _row(foot, ADAPTED_ALONE, where, search, group), SCHEDULE[0], own[1]
+                yield _labels(kind, ADAPTED_ALONE, place, search, group), schedule, adapted
 
     def _train(self) -> bool:
         """Train the missing policies and copy them into `policies`; return True if a training failed."""
@@ -202,7 +205,7 @@ class Prosthesis(TrainingStudy):
                     folder = self.runs / f"{kind}-{search}" / f"seed-{seed}"
                     jobs.append((config, folder, f"{kind} {search}, seed {seed}"))
         failed = self.train_missing(jobs)
-        assert self.policies is not None  # as `check` saw to
+        assert self.policies is not None  # `check` refuses None
         self.policies.mkdir(parents=True, exist_ok=True)
         for _, folder, _ in jobs:
             if (folder / BEST).is_file():
@@ -210,18 +213,20 @@ class Prosthesis(TrainingStudy):
         return failed
 
 
-def _here(where: Mapping[str, Any]) -> bool:
-    """Tell whether a row has the body and the speed of the searches and trainings."""
-    return (where["height_m"], where["mass_kg"], where["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
+def _is_first_place(row: Mapping[str, Any]) -> bool:
+    """Return True if a row has the body and the speed of the searches and trainings, the first of `PLACES`."""
+    return (row["height_m"], row["mass_kg"], row["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
 
 
 def _held_speed() -> float | None:
+    """Return the speed at which the person with a held toe was searched for [m/s]; None without that foot."""
     held = committed_feet().get(TOE_HELD)
     return None if held is None else float(next(iter(held[ADAPTED])))
 
 
-def _row(foot: str, person: str, where: Mapping[str, float], search: int | str, seed: int) -> dict[str, Any]:
-    return {"foot": foot, "person": person, "search": search, "seed": seed, **where}
+def _labels(foot: str, person: str, place: Mapping[str, float], search: int | str, seed: int) -> dict[str, Any]:
+    """Return the labels of a row: its first columns in the CSV file."""
+    return {"foot": foot, "person": person, "search": search, "seed": seed, **place}
 
 
 def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
@@ -238,10 +243,10 @@ def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
     )
 
 
-def _digest(policy: str, given: Mapping[str, Any]) -> str:
+def _digest(policy: str, settings: Mapping[str, Any]) -> str:
     """Return a digest of the policy's file, and of the legs and the foot that its settings name."""
     path = find_policy(policy) if policy in SHIPPED else Path(policy)
-    foot = given.get("right_foot")
+    foot = settings.get("right_foot")
     name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
     content = read_bytes(path) if path.is_file() else b""
     return hashlib.sha256(content + json.dumps(committed_feet().get(name)).encode()).hexdigest()
@@ -253,6 +258,7 @@ the same legs with a trained policy."""
 TOE_HELD = "rigid, toe held"
 """Committed rigid foot whose person was searched for with a held toe, at a speed of its own."""
 WHERE = ("height_m", "mass_kg", "asked_m_s")
+"""Labels that make a row's place: body and speed."""
 COLORS = {"intact": "#555555", "rigid": "#7a5195", "passive": "#c26a1b", "adaptive": "#0b6e8f"}
 Row = Mapping[str, Any]
 
@@ -266,70 +272,78 @@ def share_rows(rows: Sequence[Row]) -> list[dict[str, Any]]:
     is not better, or better by no more than the gap's interval over the pairs. The intervals of `both` searches are
     over the means of each search, as searches differ more than seeds.
     """
-    found = []
-    for where in dict.fromkeys(_place(row) for row in rows):
-        here = [row for row in rows if _place(row) == where]
+    lines = []
+    for place in dict.fromkeys(_place(row) for row in rows):
+        at_place = [row for row in rows if _place(row) == place]
         for person in (ADAPTED_ALONE, WITH_POLICY):
-            own = [row for row in here if row["person"] == person or row["foot"] == "intact"]
-            searches = sorted({row["search"] for row in own if row["foot"] == "adaptive"})
+            compared = [row for row in at_place if row["person"] == person or row["foot"] == "intact"]
+            searches = sorted({row["search"] for row in compared if row["foot"] == "adaptive"})
             for asked in ASKED:
-                line = dict(zip(WHERE, where, strict=True)) | {"person": person, "number": asked.key}
-                found += [line | change for change in _changes(own, asked, searches)]
-    return found
+                labels = dict(zip(WHERE, place, strict=True)) | {"person": person, "number": asked.key}
+                lines += [labels | change for change in _changes(compared, asked, searches)]
+    return lines
 
 
 def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list[dict[str, Any]]:
-    """Return the changes of each search by itself, and of both."""
+    """Return the change of one number from passive to adaptive feet, for each search by itself and for both."""
     known = [row[asked.key] for row in rows if row["foot"] == "intact" and row[asked.key] is not None]
     intact = float(np.mean(known)) if known else None
-    pairs = {each: pairs_of(rows, (("passive", each), ("adaptive", each)), asked.key) for each in searches}
-    found = [
-        {"search": search, "pairs": len(own)} | _change(own, intact, asked.better) for search, own in pairs.items()
+    by_search = {search: pairs_of(rows, (("passive", search), ("adaptive", search)), asked.key) for search in searches}
+    changes = [
+        {"search": search, "pairs": len(pairs)} | _change(pairs, intact, asked.better)
+        for search, pairs in by_search.items()
     ]
     if len(searches) > 1:
-        means = np.array([own.mean(0) for own in pairs.values() if len(own)]).reshape(-1, 2)
-        both = {"search": "both", "pairs": sum(map(len, pairs.values()))}
-        found.append(both | _change(means, intact, asked.better, few=True))
-    return found
+        means = np.array([pairs.mean(0) for pairs in by_search.values() if len(pairs)]).reshape(-1, 2)
+        both = {"search": "both", "pairs": sum(map(len, by_search.values()))}
+        changes.append(both | _change(means, intact, asked.better, few=True))
+    return changes
 
 
-def pairs_of(rows: Sequence[Row], worn: Sequence[tuple[str, Any]], key: str) -> np.ndarray:
-    """Return (n, 2) a number of two feet, each with its search, in pairs of the same `seed`."""
-    of = [{row["seed"]: row[key] for row in rows if (row["foot"], row["search"]) == each} for each in worn]
-    pairs = [(of[0][seed], of[1][seed]) for seed in of[0] if seed in of[1]]
+def pairs_of(rows: Sequence[Row], feet: Sequence[tuple[str, Any]], key: str) -> np.ndarray:
+    """Return (n, 2) the number `key` of two `feet` (foot, search), in pairs of rows with the same seed."""
+    first, second = (
+        {row["seed"]: row[key] for row in rows if (row["foot"], row["search"]) == foot_and_search}
+        for foot_and_search in feet
+    )
+    pairs = [(first[seed], second[seed]) for seed in first if seed in second]
     return np.array([pair for pair in pairs if None not in pair], float).reshape(-1, 2)
 
 
 def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = False) -> dict[str, float | None]:
     """Return mean, interval and share of a change, as `share_rows` describes.
 
-    With `few` pairs, the means of searches, each pair must have a gap, as an interval cannot tell.
+    Args:
+        pairs: (n, 2) number of the passive and of the adaptive foot.
+        intact: mean number of the intact foot; None if unknown.
+        better: 1 if more is better, -1 if less is.
+        few: the pairs are means of searches, too few for an interval of the gap: there is a share if each has a gap.
     """
     names = ("passive", "adaptive", "intact", "change", "change_low", "change_high", "share", "share_low", "share_high")
-    found: dict[str, float | None] = dict.fromkeys(names)
+    result: dict[str, float | None] = dict.fromkeys(names)
     if not len(pairs):
-        return found
+        return result
     passive, adaptive = pairs.T
     change = adaptive - passive
     low, high = t_interval(change)
-    found |= {"passive": float(passive.mean()), "adaptive": float(adaptive.mean()), "intact": intact}
-    found |= {"change": float(change.mean()), "change_low": low, "change_high": high}
+    result |= {"passive": float(passive.mean()), "adaptive": float(adaptive.mean()), "intact": intact}
+    result |= {"change": float(change.mean()), "change_low": low, "change_high": high}
     if intact is not None:
         gap = intact - passive
-        sure = (better * gap).min() > 0 if few else min(t_interval(better * gap)) > 0
-        if sure:
+        has_gap = (better * gap).min() > 0 if few else min(t_interval(better * gap)) > 0
+        if has_gap:
             ends = sorted(value / float(gap.mean()) for value in (low, high))
-            found |= {"share": float(change.mean() / gap.mean()), "share_low": ends[0], "share_high": ends[1]}
-    return found
+            result |= {"share": float(change.mean() / gap.mean()), "share_low": ends[0], "share_high": ends[1]}
+    return result
 
 
 def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, str]) -> dict[str, str]:
     """Return the sections of the report, by heading.
 
-    `ran` describes the walks at the first place, the walks elsewhere, and the length of the trainings.
+    `ran` describes, in words, the walks at the first place, the walks elsewhere, and the length of the trainings.
     """
     first = _place(rows[0])
-    here = [row for row in rows if _place(row) == first]
+    at_first = [row for row in rows if _place(row) == first]
     note = (
         f"{ran[0]} of each walk, undisturbed and, for the column `falls, pushed`, pushed by ±{PUSH_NEWTON:g} N; falls "
         "as shares of episodes; numbers of walks that fell are of the strides before. Mean ± SD over rows of the CSV: "
@@ -338,13 +352,14 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, st
         f"left it. Trained: the same, stiffness by policies trained on it for {ran[2]}. Cost of "
         f"transport counts what a passive spring gives back as well. {ABOUT_STOPS}"
     )
-    text = {"PROSTHESIS": f"![Feet](prosthesis.png)\n\n{_where(first)}\n\n{_walks_table(here)}\n\n{note}"}
-    if against := _passive_against(here, "rigid"):
-        text["PROSTHESIS"] += f"\n\n{against}"
+    text = {"PROSTHESIS": f"![Feet](prosthesis.png)\n\n{_place_text(first)}\n\n{_walks_table(at_first)}\n\n{note}"}
+    if comparison := _passive_against(at_first, "rigid"):
+        text["PROSTHESIS"] += f"\n\n{comparison}"
     if held := [row for row in rows if row["foot"] == TOE_HELD]:
-        own = [row for row in rows if _place(row) == _place(held[0])]
-        text["TOE-HELD"] = f"{_where(_place(held[0]))}\n\n{_walks_table(own)}\n\n{_passive_against(own, TOE_HELD)}"
-        rows = [row for row in rows if row not in own]
+        place = _place(held[0])
+        beside = [row for row in rows if _place(row) == place]
+        text["TOE-HELD"] = f"{_place_text(place)}\n\n{_walks_table(beside)}\n\n{_passive_against(beside, TOE_HELD)}"
+        rows = [row for row in rows if row not in beside]
     if shares:
         text["RECOVERED"] = _shares_text([row for row in shares if _place(row) == first])
     if len({_place(row) for row in rows}) > 1:
@@ -353,15 +368,16 @@ def sections(rows: Sequence[Row], shares: Sequence[Row], ran: tuple[str, str, st
 
 
 def _place(row: Row) -> tuple[float, ...]:
+    """Return height [m], mass [kg] and commanded speed [m/s] of a row."""
     return tuple(row[name] for name in WHERE)
 
 
 def _walks_table(rows: Sequence[Row]) -> str:
-    """Return the Markdown table of the walks at the first place, mean ± SD over groups or seeds."""
-    head = ["foot", "person", "search", "rows", *(each.label for each in TOLD)]
+    """Return the Markdown table of the walks at one place, mean ± SD over groups or seeds."""
+    head = ["foot", "person", "search", "rows", *(number.label for number in TOLD)]
     lines = []
     for (foot, person, search), group in _groups(rows).items():
-        cells = [_mean(group, each.key, each.pattern) for each in TOLD]
+        cells = [_mean(group, number.key, number.pattern) for number in TOLD]
         lines.append([foot, person, str(search), str(len(group)), *cells])
     return table(head, lines)
 
@@ -375,7 +391,7 @@ def _groups(rows: Sequence[Row]) -> dict[tuple[str, str, Any], list[Row]]:
 
 
 def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
-    """Return a number of several rows as "mean ± SD", in words."""
+    """Return a number of several rows as "mean ± SD"; the mean alone for one row, a dash if no row has it."""
     values = [row[key] for row in rows if row[key] is not None]
     if not values:
         return MISSING
@@ -385,9 +401,9 @@ def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
 
 
 def _passive_against(rows: Sequence[Row], foot: str) -> str:
-    """Say in which numbers the passive feet are better, worse or not told apart from `foot`, for each search.
+    """Return a sentence on the numbers in which the passive feet are better, worse or not told apart from `foot`.
 
-    A search is one run of the search for the legs that adapt to a foot. People are adapted to both feet. Empty without
+    It has a part for each search, a run of `springfoot study adapt`. The person has adapted to both feet. Empty without
     rows of either foot.
     """
     adapted = [row for row in rows if row["person"] == ADAPTED_ALONE]
@@ -415,10 +431,11 @@ def _passive_against(rows: Sequence[Row], foot: str) -> str:
 
 
 def _shares_text(shares: Sequence[Row]) -> str:
-    """Return the Markdown table of the changes by adaptive stiffness."""
+    """Return the Markdown table of the changes by adaptive stiffness, and its note."""
+    by_key = {asked.key: asked for asked in ASKED}
     lines = []
     for row in shares:
-        asked = next(each for each in ASKED if each.key == row["number"])
+        asked = by_key[row["number"]]
         means = [text_of(row[name], asked.pattern) for name in ("passive", "adaptive", "intact")]
         change = _interval(row, "change", asked.pattern)
         share = _interval(row, "share", ".0%") if row["share"] is not None else "no gap"
@@ -433,6 +450,7 @@ def _shares_text(shares: Sequence[Row]) -> str:
 
 
 def _interval(row: Row, name: str, pattern: str) -> str:
+    """Return a number and its interval, as in "0.12 [0.08, 0.16]"; a dash for None."""
     if row[name] is None:
         return MISSING
     low, high = (format(row[f"{name}_{end}"], pattern) for end in ("low", "high"))
@@ -440,20 +458,20 @@ def _interval(row: Row, name: str, pattern: str) -> str:
 
 
 def _elsewhere(rows: Sequence[Row], ran: str) -> str:
-    """Return the section on other bodies and speeds."""
+    """Return the section on other bodies and speeds: of each foot the rows with policies, else with adapted legs."""
     keys = [("falls", ".2f"), ("speed_m_s", ".2f"), ("falls_pushed", ".2f")]
-    keys += [(each.key, each.pattern) for each in ASKED if each.key != "falls_pushed"]
+    keys += [(asked.key, asked.pattern) for asked in ASKED if asked.key != "falls_pushed"]
     lines = []
-    for where in dict.fromkeys(_place(row) for row in rows):
-        here = [row for row in rows if _place(row) == where]
+    for place in dict.fromkeys(_place(row) for row in rows):
+        at_place = [row for row in rows if _place(row) == place]
         for foot in COLORS:
-            group = [row for row in here if row["foot"] == foot]
-            best = [row for row in group if row["person"] == WITH_POLICY]
-            best = best or [row for row in group if row["person"] == ADAPTED_ALONE] or group
-            if best:
-                label = f"{foot}, {best[0]['person']}"
-                lines.append([_where(where), label, str(len(best)), *(_mean(best, *key) for key in keys)])
-    labels = {each.key: each.label for each in ASKED} | {"falls": "falls", "speed_m_s": "speed m/s"}
+            group = [row for row in at_place if row["foot"] == foot]
+            shown = [row for row in group if row["person"] == WITH_POLICY]
+            shown = shown or [row for row in group if row["person"] == ADAPTED_ALONE] or group
+            if shown:
+                label = f"{foot}, {shown[0]['person']}"
+                lines.append([_place_text(place), label, str(len(shown)), *(_mean(shown, *key) for key in keys)])
+    labels = {asked.key: asked.label for asked in ASKED} | {"falls": "falls", "speed_m_s": "speed m/s"}
     head = ["where", "foot and person", "rows", *(labels[key] for key, _ in keys)]
     return (
         f"{table(head, lines)}\n\nMeans ± SD over searches, and seeds or groups of episodes; {ran}, but for the first "
@@ -464,16 +482,17 @@ def _elsewhere(rows: Sequence[Row], ran: str) -> str:
     )
 
 
-def _where(where: Sequence[float]) -> str:
-    height, mass, speed = where
+def _place_text(place: Sequence[float]) -> str:
+    """Return a place in words."""
+    height, mass, speed = place
     return f"{height:.2f} m, {mass:g} kg, {speed:g} m/s"
 
 
 def draw(path: Path, rows: Sequence[Row]) -> None:
-    """Draw each number of each foot at the first place, a point for each walk."""
-    first = tuple(rows[0][name] for name in WHERE)
-    here = [row for row in rows if _place(row) == first]
-    places = [
+    """Draw each number of each foot at the first place, a point for each row and a line for their mean."""
+    first = _place(rows[0])
+    at_first = [row for row in rows if _place(row) == first]
+    columns = [
         ("intact", NOT_ADAPTED),
         *((foot, ADAPTED_ALONE) for foot in ("rigid", "passive", "adaptive")),
         *((foot, WITH_POLICY) for foot in ("passive", "adaptive")),
@@ -482,14 +501,14 @@ def draw(path: Path, rows: Sequence[Row]) -> None:
         figure = Figure(figsize=(11.0, 5.2), layout="constrained")
         axes = figure.subplots(2, 3)
         for ax, asked in zip(axes.flat, ASKED, strict=True):
-            for place, (foot, person) in enumerate(places):
-                group = [row for row in here if (row["foot"], row["person"]) == (foot, person)]
+            for x, (foot, person) in enumerate(columns):
+                group = [row for row in at_first if (row["foot"], row["person"]) == (foot, person)]
                 values = [row[asked.key] for row in group if row[asked.key] is not None]
-                ax.plot([place] * len(values), values, "o", color=COLORS[foot], ms=4, alpha=0.5)
+                ax.plot([x] * len(values), values, "o", color=COLORS[foot], ms=4, alpha=0.5)
                 if values:
-                    ax.plot(place, np.mean(values), "_", color=COLORS[foot], ms=18, mew=2)
+                    ax.plot(x, np.mean(values), "_", color=COLORS[foot], ms=18, mew=2)
             ax.set_title(asked.label)
-            labels = [f"{foot}\n{'trained' if person == WITH_POLICY else ''}" for foot, person in places]
-            ax.set_xticks(range(len(places)), labels, fontsize=7.5)
+            labels = [f"{foot}\n{'trained' if person == WITH_POLICY else ''}" for foot, person in columns]
+            ax.set_xticks(range(len(columns)), labels, fontsize=7.5)
             ax.grid(axis="y", color="#ededed", lw=0.6)
         figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})

@@ -1,7 +1,7 @@
-"""Run the generations of a CMA-ES search and keep their costs, so that a stopped search goes on with the same bits.
+"""Run the generations of a CMA-ES search, and keep their costs in a file, so that a stopped search goes on.
 
-CMA-ES draws its candidates from its seed and from the costs of earlier candidates. The file therefore holds the costs
-alone.
+CMA-ES draws its candidates from its seed and the costs of earlier candidates. With the costs alone a search therefore
+goes on with the bits of an uninterrupted one.
 """
 
 import json
@@ -19,23 +19,23 @@ from springfoot.files.writing import write_atomically
 
 from ..base.study import Study
 
-NOT_ASKED = frozenset(
+WITHOUT_EFFECT = frozenset(
     {"threads", "quick", "out", "page", "command", "log", "generations", "styles", "constants", "plan_file", "keep"}
 )
 """Flags that do not change the cost of any candidate."""
 
 
 def asked_of(study: Study) -> dict[str, Any]:
-    """Return the settings of a search that change its costs, as plain JSON values."""
-    asked = {name: value for name, value in vars(study).items() if name not in NOT_ASKED}
-    return {name: str(value) if isinstance(value, Path) else value for name, value in asked.items()}
+    """Return the flags of a search that change its costs, as plain JSON values: `asked` of `generations`."""
+    flags = {name: value for name, value in vars(study).items() if name not in WITHOUT_EFFECT}
+    return {name: str(value) if isinstance(value, Path) else value for name, value in flags.items()}
 
 
 def generations(
     strategy: cma.CMAEvolutionStrategy,
     count: int,
-    price: Callable[[int, list[NDArray]], NDArray],
-    kept: Path | None = None,
+    costs_of: Callable[[int, list[NDArray]], NDArray],
+    file: Path | None = None,
     asked: Any = None,
 ) -> Iterator[tuple[int, list[NDArray], NDArray]]:
     """Run `count` generations and yield the number of each, from 0, its candidates and their costs.
@@ -43,37 +43,37 @@ def generations(
     Args:
         strategy: the search, not yet begun.
         count: generations to run, kept ones included.
-        price: generation and candidates -> costs (candidates,).
-        kept: file of the costs. If it exists, its generations are not computed again.
-        asked: plain JSON values that describe the search. Raises `SpringfootError` if `kept` belongs to another search.
+        costs_of: function of the generation's number and its candidates that returns their costs (candidates,).
+        file: file of the costs. If it exists, the generations in it are not computed again.
+        asked: plain JSON values that describe the search. Raises `SpringfootError` if `file` belongs to another search.
     """
     asked = json.loads(json.dumps(asked))
     known: list[NDArray] = []
-    if kept is not None and kept.exists():
-        table = read_object(kept, "file of a search's costs")
+    if file is not None and file.exists():
+        table = read_object(file, "file of a search's costs")
         try:
-            before = table["asked"]
-            known = [_costs(paid, strategy.popsize) for paid in table["paid"]]
+            asked_before = table["asked"]
+            known = [_read_costs(costs, strategy.popsize) for costs in table["paid"]]
         except (ValueError, TypeError, KeyError, OverflowError) as error:
-            raise SpringfootError(f"{kept} is no file of a search's costs: {error}") from None
-        if json.dumps(before, sort_keys=True) != json.dumps(asked, sort_keys=True):
-            raise SpringfootError(f"{kept} is of a search with other settings; choose another place")
+            raise SpringfootError(f"{file} is no file of a search's costs: {error}") from None
+        if json.dumps(asked_before, sort_keys=True) != json.dumps(asked, sort_keys=True):
+            raise SpringfootError(f"{file} is of a search with other settings; choose another place")
     for generation in range(count):
         vectors = [np.asarray(vector) for vector in strategy.ask()]
         if generation < len(known):
-            paid = known[generation]
+            costs = known[generation]
         else:
-            paid = np.asarray(price(generation, vectors), float)
-            known.append(paid)
-            if kept is not None:
-                table = {"asked": asked, "paid": [each.tolist() for each in known]}
-                write_atomically(kept, (json.dumps(table) + "\n").encode())
-        strategy.tell(vectors, paid.tolist())
-        yield generation, vectors, paid
+            costs = np.asarray(costs_of(generation, vectors), float)
+            known.append(costs)
+            if file is not None:
+                table = {"asked": asked, "paid": [of_generation.tolist() for of_generation in known]}
+                write_atomically(file, (json.dumps(table) + "\n").encode())
+        strategy.tell(vectors, costs.tolist())
+        yield generation, vectors, costs
 
 
-def _costs(paid: Any, candidates: int) -> NDArray:
-    """Return the costs of a kept generation; raise `ValueError` unless they are so many finite numbers."""
-    if not isinstance(paid, list) or len(paid) != candidates or not all(type(cost) in (int, float) for cost in paid):
+def _read_costs(costs: Any, candidates: int) -> NDArray:
+    """Return the costs of a generation in a file; raise `ValueError` unless they are a number for each candidate."""
+    if not isinstance(costs, list) or len(costs) != candidates or not all(type(cost) in (int, float) for cost in costs):
         raise ValueError(f"each generation must have {candidates} costs, which are numbers")
-    return np.array(paid, float)
+    return np.array(costs, float)

@@ -17,29 +17,29 @@ ADAPTED_FEET = CONSTANTS.with_name("adapted.json")
 
 
 def read_constants(path: Path) -> dict[str, Any]:
-    """Return a file of constants."""
+    """Return the content of a file of leg constants: `constants` by name, and `found_by`, the commands."""
     return _read(path, "constants", "leg constants")
 
 
 def read_feet(path: Path) -> dict[str, Any]:
-    """Return a file of adapted feet; an empty table if there is no file."""
+    """Return the content of a file of adapted feet, as `feet` and `found_by`; empty ones if there is no file."""
     return _read(path, "feet", "adapted feet") if path.exists() else {"found_by": {}, "feet": {}}
 
 
 def read_styles(path: Path) -> dict[str, Any]:
-    """Return a file of styles of walks; an empty table if there is no file."""
+    """Return the content of a file of styles of walks, as `styles` and `found_by`; empty ones if there is no file."""
     return _read(path, "styles", "styles of walks") if path.exists() else {"found_by": {}, "styles": {}}
 
 
-def _read(path: Path, key: str, what: str) -> dict[str, Any]:
-    """Return a JSON file with the entry `key`, and `found_by`; raise `SpringfootError` for any other, calling it no
-    `what`."""
+def _read(path: Path, key: str, content: str) -> dict[str, Any]:
+    """Return the object of a JSON file with the entries `key` and `found_by`; raise `SpringfootError`, which says that
+    it is no file of `content`, for any other."""
     try:
-        table = read_object(path, what)
+        table = read_object(path, content)
     except (OSError, SpringfootError):
         table = {}
     if not isinstance(table.get(key), dict) or not isinstance(table.setdefault("found_by", {}), dict):
-        raise SpringfootError(f"{path} is not a file of {what}")
+        raise SpringfootError(f"{path} is not a file of {content}")
     return table
 
 

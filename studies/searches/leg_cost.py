@@ -83,6 +83,19 @@ TOLERANCE = {
     "foreign_speed": 0.15,  # m/s, of the walks with springs that nobody tuned
 }
 """Unit in which each distance counts; for a curve, of its root mean square over the stride."""
+ALLOWED = {
+    "late_hip_moment": 0.1,
+    "vertical": 0.05,
+    "fore_aft": 0.03,
+    "peak_moment": 0.07,
+    "work": 0.03,
+    "force_peak": 0.07,
+}
+"""Differences from people that cost nothing, in the units of `TOLERANCE`."""
+BAND_SD = 1.9
+"""Standard deviations of people's hip moment within which `beyond_sd` is 0 [-]."""
+MOST_WORK, LEAST_ANKLE_R = 1.2, 0.985
+"""Positive work over people's beyond which `effort` counts, and r of the ankle's curve below which `ankle_r` counts."""
 LATE_SWING = 0.8
 """Stride phase from which the hip holds the leg back before it lands."""
 FOREIGN_SHARE = 0.3
@@ -107,13 +120,13 @@ def cost(
     """Return the cost of each candidate, (C,).
 
     Args:
-        settings: of the environment.
+        settings: settings of the environment.
         candidates: C leg constants.
-        seed: of the first walk.
-        threads: of the physics.
+        seed: seed of the first walk.
+        threads: threads of the physics.
         push: size of the pushes in the pushed walks [N]; 0 leaves these walks out.
         ease: as in `leg_walks.walk`.
-        foreign: price of walks with foreign springs.
+        foreign: factor on the cost of walks with foreign springs.
         pays: cost of an undisturbed walk.
         impact: price of impact over that of effort, where walks pay for effort (`walk_effort`).
     """
@@ -130,20 +143,20 @@ def cost(
     for index in range(walks * count):
         candidate = index // walks
         if index % walks >= SCHEDULED:
-            total[candidate] += foreign * FOREIGN_SHARE * _paid_with_foreign(walked, index, missing[index])
+            total[candidate] += foreign * FOREIGN_SHARE * _foreign_cost(walked, index, missing[index])
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
-            paid = _paid(walked.episode(index), walked.biped, pays, impact)
-            total[candidate] += (FALL_COST if paid is None else paid) / SCHEDULED
+            of_walk = _walk_cost(walked.episode(index), walked.biped, pays, impact)
+            total[candidate] += (FALL_COST if of_walk is None else of_walk) / SCHEDULED
 
     # The thesis's constant springs, which only people's guide walks with.
     if settings.equilibrium == "planned" and not settings.follows_plan:
         thesis = replace(settings, **own_settings("thesis", settings))
         walked = walk(thesis, candidates, [seed] * count, threads, foreign=())
-        total += [foreign * _paid_with_foreign(walked, index, lost) for index, lost in enumerate(walked.missing)]
+        total += [foreign * _foreign_cost(walked, index, lost) for index, lost in enumerate(walked.missing)]
 
-    # Standing starts: the slowest set alone carries a body off.
+    # Standing starts, for which only the constants of the slowest speed are used.
     if settings.speed <= SLOW_SPEED:
         seeds = [seed + index % SET_OFF for index in range(SET_OFF * count)]
         standing = replace(settings, start="standing")
@@ -161,43 +174,44 @@ def cost(
     return total + FALL_COST * fallen
 
 
-def _paid(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -> float | None:
+def _walk_cost(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -> float | None:
     """Return the cost of a walk without a fall; None if a leg takes fewer than two strides."""
     tally = measured(series, biped)
     if tally is None:
         return None
-    missed = misses(tally, biped)
+    distances = misses(tally, biped)
     if pays == "likeness":
-        return float(np.linalg.norm(missed))
-    return effort_price(series, tally, biped, missed, impact)
+        return float(np.linalg.norm(distances))
+    return effort_price(series, tally, biped, distances, impact)
 
 
-def _paid_with_foreign(walked: Walks, index: int, missing: float) -> float:
-    """Return the cost of walk `index` with foreign springs: of its fall (`missing`), or of its error of speed."""
+def _foreign_cost(walked: Walks, index: int, missing: float) -> float:
+    """Return the cost of walk `index` with foreign springs: of its fall, by its entry `missing` of `Walks.missing`, or
+    of its error of speed."""
     if missing > 0:
         return missing * FALL_COST / len(FOREIGN)
     return abs(walked.speed(index) - walked.biped.settings.speed) / TOLERANCE["foreign_speed"]
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
-    """Return the misses of each candidate over the walks of `REFINED`; None for a candidate that falls."""
-    found: list[list[NDArray] | None] = [[] for _ in candidates]
+    """Return the misses of each candidate over the walks of `REFINED`, one vector; None for a candidate that falls."""
+    by_candidate: list[list[NDArray] | None] = [[] for _ in candidates]
     for start, seed in REFINED:
-        own = replace(settings, start=start, unevenness_m=UNEVENNESS)
-        walked = walk(own, candidates, [seed] * len(candidates), threads, foreign=(), seconds=REFINED_SECONDS)
+        refined = replace(settings, start=start, unevenness_m=UNEVENNESS)
+        walked = walk(refined, candidates, [seed] * len(candidates), threads, foreign=(), seconds=REFINED_SECONDS)
         missing = walked.missing
-        for index, own_misses in enumerate(found):
+        for index, of_candidate in enumerate(by_candidate):
             fell = missing[index] > 0
             tally = None if fell else measured(walked.episode(index), walked.biped, REFINED_SETTLED)
-            if tally is None or own_misses is None:
-                found[index] = None
+            if tally is None or of_candidate is None:
+                by_candidate[index] = None
             else:
-                own_misses.append(misses(tally, walked.biped) / np.sqrt(len(REFINED)))
-    return [None if each is None else np.concatenate(each) for each in found]
+                of_candidate.append(misses(tally, walked.biped) / np.sqrt(len(REFINED)))
+    return [None if of_walks is None else np.concatenate(of_walks) for of_walks in by_candidate]
 
 
 def misses(tally: StrideTally, biped: Biped) -> NDArray:
-    """Return the distances of a walk from its target and its plan, in units of `TOLERANCE`.
+    """Return the distances of a walk from its target and its plan, each in its unit of `TOLERANCE`, as one vector.
 
     The walk's numbers are those of an evaluation (`springfoot.evaluation.numbers`).
     """
@@ -205,9 +219,9 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     both = tally.both
     phase = PERCENT / 100
     mean = {curve: both.mean(column) * unit for curve, (column, unit) in CURVES.items()}
-    theirs, their_work, band = _target(target)
+    target_mean, target_work, band = _target(target)
     # Curves: joints, forces and moments from the target, CoM and CoP from the plan.
-    off: dict[str, Any] = {curve: values - theirs[curve] for curve, values in mean.items()}
+    off: dict[str, Any] = {curve: values - target_mean[curve] for curve, values in mean.items()}
     course = planned_course(biped.plan)
     planned_speed = biped.plan.com_velocity(np.minimum(phase, 1 - 1e-9))[0]
     off["com_x"] = tally.com.mean("x") - course["plan_com"][:, 0]
@@ -218,21 +232,24 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off = {name: values / np.sqrt(len(values)) for name, values in off.items()}  # so that the length is an RMS
     # Numbers: timing, peaks, work, and the properties of a good walk.
     late = phase > LATE_SWING
-    off["late_hip_moment"] = np.maximum(mean["hip_moment"][late] - theirs["hip_moment"][late].max() - 0.1, 0.0)
+    late_hip_moment = mean["hip_moment"][late] - target_mean["hip_moment"][late].max()
+    off["late_hip_moment"] = np.maximum(late_hip_moment - ALLOWED["late_hip_moment"], 0.0)
     off["speed"] = mean_speed(tally) - biped.settings.speed
     off["period"] = np.mean(tally.stride_time) / biped.plan.stride_time - 1
     off["double_support"] = np.mean(tally.double_support) - (target.toe_off - 0.5) * target.stride_time
     features = astuple(force_features(mean["grf_vertical"], mean["grf_forward"]))
-    people = astuple(force_features(theirs["grf_vertical"], theirs["grf_forward"]))
-    for name, part, allowed in (("vertical", slice(0, 3), 0.05), ("fore_aft", slice(3, 5), 0.03)):
-        off[name] = _beyond(np.subtract(features[part], people[part]), allowed)
-    off["peak_moment"] = _beyond(mean["ankle_moment"].max() - theirs["ankle_moment"].max(), 0.07)
+    target_features = astuple(force_features(target_mean["grf_vertical"], target_mean["grf_forward"]))
+    for name, part in (("vertical", slice(0, 3)), ("fore_aft", slice(3, 5))):
+        off[name] = _beyond(np.subtract(features[part], target_features[part]), ALLOWED[name])
+    peak_moment = mean["ankle_moment"].max() - target_mean["ankle_moment"].max()
+    off["peak_moment"] = _beyond(peak_moment, ALLOWED["peak_moment"])
     work = np.abs(np.mean(tally.joint_work, axis=0))
-    off["work"] = _beyond(work[: len(their_work)] - their_work, 0.03)
-    ankle_r = np.corrcoef(mean["ankle"], theirs["ankle"])[0, 1]
-    off["ankle_r"] = max(0.985 - ankle_r, 0.0)
-    off["effort"] = max(work[:, 0].sum() - 1.2 * their_work[:, 0].sum(), 0.0)
-    off["force_peak"] = np.mean(np.maximum(np.array(tally.vertical_max) - theirs["grf_vertical"].max() - 0.07, 0.0))
+    off["work"] = _beyond(work[: len(target_work)] - target_work, ALLOWED["work"])
+    ankle_r = np.corrcoef(mean["ankle"], target_mean["ankle"])[0, 1]
+    off["ankle_r"] = max(LEAST_ANKLE_R - ankle_r, 0.0)
+    off["effort"] = max(work[:, 0].sum() - MOST_WORK * target_work[:, 0].sum(), 0.0)
+    force_peak = np.array(tally.vertical_max) - target_mean["grf_vertical"].max()
+    off["force_peak"] = np.mean(np.maximum(force_peak - ALLOWED["force_peak"], 0.0))
     off["travel"] = np.mean(tally.travel)
     off["unsteady"] = np.sqrt(np.mean(both.sd("grf_vertical_bw") ** 2))
     return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
@@ -245,12 +262,12 @@ def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
 
 @lru_cache(maxsize=16)
 def _target(gait: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
-    """Return the target's mean curves, work and spread.
+    """Return a target's mean curves (101,) by the names of `CURVES`, its work and its band of hip moments.
 
-    The curves (101,) have the names of `CURVES`. The work (3, 2) [J/kg] is positive and negative, of hip, knee and
-    ankle, from the mean power. The spread is 1.9 SD of the hip moment (101,) [N m/kg].
+    The work (3, 2) [J/kg] is positive and negative, of hip, knee and ankle, from the mean power. The band (101,) is
+    `BAND_SD` of the hip moment [N m/kg].
     """
     curves = {name: gait.mean(name, PERCENT / 100) for name in CURVES}
-    power = [gait.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
-    work = [np.concatenate(stride_work(each, np.array([gait.stride_time]))) for each in power]
-    return curves, np.stack(work), 1.9 * gait.sd("hip_moment", PERCENT / 100)
+    powers = [gait.mean(f"{joint}_power", PERCENT / 100)[None] for joint in FED]
+    work = [np.concatenate(stride_work(power, np.array([gait.stride_time]))) for power in powers]
+    return curves, np.stack(work), BAND_SD * gait.sd("hip_moment", PERCENT / 100)

@@ -30,11 +30,10 @@ LEAST = {"ankle_schedule": LOWEST_STIFFNESS[0], "toe_schedule": LOWEST_STIFFNESS
 
 
 class Search:
-    """Leg constants as a vector of unit steps from the start of a search; the last three entries lead whole target
-    curves.
+    """Vectors of a search, in unit steps from its start, and the leg constants that they stand for.
 
-    `names` (size,) has the constant of each entry. With `placing` the vector has an entry for `swing_place_gain`, which
-    only bodies that follow their plan use.
+    The last three entries of a vector lead whole target curves (`LED`). `names` (size,) has the constant of each entry.
+    With `placing` there is an entry for `swing_place_gain`, which only bodies that follow their plan use.
     """
 
     def __init__(
@@ -45,23 +44,24 @@ class Search:
         *,
         placing: bool = False,
     ):
-        sought = {name: value for name, value in asdict(start).items() if placing or name != "swing_place_gain"}
-        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in sought.items()}
+        varied = {name: value for name, value in asdict(start).items() if placing or name != "swing_place_gain"}
+        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in varied.items()}
         target = target or human_gait(speed)
-        self._led = {name: LEAD_STEP * np.rad2deg(target.rate(curve, KNOTS)) for name, curve in LED.items()}
+        # Change of the knots [deg] that shifts a target curve by one `LEAD_STEP`: the step times the curve's rate.
+        self._lead = {name: LEAD_STEP * np.rad2deg(target.rate(curve, KNOTS)) for name, curve in LED.items()}
         self.names = tuple(name for name, value in self._start.items() for _ in value) + tuple(LED)
         self.size = len(self.names)
 
     def constants(self, vector: NDArray) -> LegConstants:
-        """Return the constants at a vector (size,)."""
+        """Return the constants at a vector (size,): start plus steps, or for gains start times e^(`GAIN_STEP` step)."""
         values = {}
-        place = 0
+        first = 0
         leads = dict(zip(LED, vector[-len(LED) :], strict=True))
         for name, start in self._start.items():
-            step = vector[place : place + start.size]
-            place += start.size
+            step = vector[first : first + start.size]
+            first += start.size
             if name in LED:
-                value = start + KNOT_STEP * step + leads[name] * self._led[name]
+                value = start + KNOT_STEP * step + leads[name] * self._lead[name]
             elif name == "neutral_deg":
                 value = start + KNOT_STEP * step
             elif name in ADDITIVE_STEP:

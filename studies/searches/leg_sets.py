@@ -114,12 +114,14 @@ class LegSets(WalkingStudy):
         return Answer(text=f"{picture}\n\n{text}", files=files)
 
     def _walk(self, name: str, given: Mapping[str, Any], legs: LegConstants, progress: OnProgress) -> dict[str, Any]:
+        """Return the metrics of a policy's walk on these legs."""
         policy, settings = policy_and_settings(name, {"episode_seconds": self.seconds, **given})
         return measure(record(policy, settings, name=name, legs=legs, progress=progress, **self.how)).metrics
 
     def _misses(self, given: Mapping[str, Any], legs: LegConstants) -> float | None:
-        (found,) = all_misses(BipedSettings(episode_seconds=REFINED_SECONDS + 1, **given), [legs], self.threads)
-        return None if found is None else float(np.linalg.norm(found))
+        """Return the length of the vector `all_misses` of these legs; None if they fall."""
+        (misses,) = all_misses(BipedSettings(episode_seconds=REFINED_SECONDS + 1, **given), [legs], self.threads)
+        return None if misses is None else float(np.linalg.norm(misses))
 
 
 def _sets(known: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], LegConstants]]:

@@ -27,9 +27,9 @@ from springfoot.files.writing import csv_text
 from springfoot.gait.plan import Cadence, least_work
 
 from ..base.study import Answer, OnProgress, Study
+from .cma_search import asked_of, generations
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .generic_constants import GENERIC, generic_constants
-from .kept_search import asked_of, generations
 from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
 from .leg_search import Search
 
@@ -39,7 +39,9 @@ step."""
 STEEPEST = 5.0
 """Largest derivative that the refinement uses [tolerances per unit]; a steeper one comes from a fall."""
 DAMPINGS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
-"""Dampings that a step of the refinement tries, as factors on the last one that served [-]; chosen."""
+"""Dampings that a step of the refinement tries, as factors on the damping of the last improvement [-]; chosen."""
+PARTS_OF_STEP = (1.0, 0.4)
+"""Fractions of each step that the refinement tries [-]; chosen."""
 LONGEST_STEP = 1.5
 """Largest change of a constant in a step of the refinement [units of the search]; chosen."""
 KEPT = 0.17
@@ -145,16 +147,17 @@ class LegTuning(Study):
             )
         begin = constants_from(known[start])
         target = reference_walk_at(settings, self.speed, [begin]).target
-        told = ""
+        report = ""
         if self.refinements:
-            begin, misses = self._refined(begin, settings, lambda better: self._keep(name, better), progress)
-            told = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
+            begin, misses = self._refine(begin, settings, lambda better: self._keep(name, better), progress)
+            report = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
         search = Search(begin, self.speed, target, placing=settings.follows_plan)
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
 
-        def price(generation: int, vectors: list[NDArray]) -> NDArray:
+        def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
+            """Return the costs of a generation's candidates, which all walk from the same seeds."""
             ease = max(0.0, 1.0 - generation / self.ease) if self.ease else 0.0
             candidates = [search.constants(v) for v in vectors]
             push = self.push_newton if generation >= self.pushed_from else 0.0
@@ -162,33 +165,34 @@ class LegTuning(Study):
             return cost(settings, candidates, seed, self.threads, push, ease, self.foreign, self.pays, self.impact)
 
         asked = asked_of(self) | {"from": asdict(begin), "style": self._style(settings)}
-        for generation, _, paid in generations(strategy, self.generations, price, self.log, asked):
-            lines.append([generation + 1, paid.min(), np.median(paid)])
+        for generation, _, costs in generations(strategy, self.generations, costs_of, self.log, asked):
+            lines.append([generation + 1, costs.min(), np.median(costs)])
             progress(1)
             if generation % 10 == 9 or generation == self.generations - 1:
                 self._keep(name, search.constants(strategy.mean))
-                tqdm.write(_told(*lines[-1]))
-        found = search.constants(strategy.mean)
-        text = f"{json.dumps({name: asdict(found)})}\n\n{told}{_told(*lines[-1])}"
+                tqdm.write(_generation_text(*lines[-1]))
+        result = search.constants(strategy.mean)
+        text = f"{json.dumps({name: asdict(result)})}\n\n{report}{_generation_text(*lines[-1])}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
     def _style(self, settings: BipedSettings) -> dict[str, Any] | None:
         """Return the style of the plan that the body follows; None if it follows people."""
         return least_work(self.speed, self.plan_file).to_json() if settings.follows_plan else None
 
-    def _refined(
+    def _refine(
         self,
         start: LegConstants,
         settings: BipedSettings,
         keep: Callable[[LegConstants], None],
         progress: OnProgress,
     ) -> tuple[LegConstants, list[float]]:
-        """Minimise the sum of squares of `leg_cost.all_misses` from `start`, and hand each improvement to `keep`.
+        """Minimise the sum of squares of `leg_cost.all_misses` from `start`; call `keep` with each improvement.
 
         Returns the constants, and the length of the vector of misses at the start and after each step.
 
-        Damped Gauss-Newton (Levenberg-Marquardt). One batch walks the finite differences of all constants, and one the
-        steps at all dampings, whole and in part: a walk scatters too much to follow a single step.
+        The method is damped Gauss-Newton (Levenberg-Marquardt): (J'J + damping (1 + diag J'J)) step = -J' misses. One
+        batch walks the finite differences of all constants, and another the steps at all dampings, whole and in part:
+        walks scatter too much to rely on a single step.
         """
         target = reference_walk_at(settings, settings.speed, [start]).target
         search = Search(start, settings.speed, target, placing=settings.follows_plan)
@@ -219,17 +223,19 @@ class LegTuning(Study):
             downhill = -jacobian.T @ misses
             # Steps at every damping, whole and in part; the best of all is taken if it is an improvement.
             tried = []
-            for stronger in damping * DAMPINGS:
-                step = np.linalg.solve(normal + stronger * (identity + np.diag(np.diag(normal))), downhill)
+            for tried_damping in damping * DAMPINGS:
+                step = np.linalg.solve(normal + tried_damping * (identity + np.diag(np.diag(normal))), downhill)
                 step *= min(1.0, LONGEST_STEP / np.abs(step).max())
-                tried += [(stronger, vector + part * step) for part in (1.0, 0.4)]
-            found = misses_at(np.array([candidate for _, candidate in tried]))
-            costs = [np.inf if each is None else float(np.linalg.norm(each)) for each in found]
-            best = int(np.argmin(costs))
-            better = found[best]
-            if better is not None and costs[best] < lengths[-1]:
+                tried += [(tried_damping, vector + part * step) for part in PARTS_OF_STEP]
+            tried_misses = misses_at(np.array([candidate for _, candidate in tried]))
+            tried_lengths = [
+                np.inf if tried_miss is None else float(np.linalg.norm(tried_miss)) for tried_miss in tried_misses
+            ]
+            best = int(np.argmin(tried_lengths))
+            best_misses = tried_misses[best]
+            if best_misses is not None and tried_lengths[best] < lengths[-1]:
                 damping, vector = tried[best]
-                misses = better
+                misses = best_misses
                 keep(search.constants(vector))
             else:
                 damping *= 10.0
@@ -237,17 +243,19 @@ class LegTuning(Study):
             progress(1)
         return search.constants(vector), lengths
 
-    def _keep(self, name: str, found: LegConstants) -> None:
-        """Write the best constants so far and this command into the file of constants; with --quick nothing."""
+    def _keep(self, name: str, constants: LegConstants) -> None:
+        """Write the best constants so far, as `name`, and this command into the file of constants; with --quick
+        nothing."""
         if self.quick:
             return
-        known = read_constants(self.constants)  # anew: another search may have written its own
+        known = read_constants(self.constants)  # anew: another search may have written its constants
         name = f"{name}, --foreign {self.foreign:g}" if self.keep == "front" else name
-        known.setdefault(self.keep, {})[name] = asdict(found)
+        known.setdefault(self.keep, {})[name] = asdict(constants)
         label = f"{name}, second search" if self.keep == "second" else name
         known.setdefault("found_by", {})[label] = self.command
         write_constants(self.constants, known)
 
 
-def _told(generation: int, best: float, median: float) -> str:
+def _generation_text(generation: int, best: float, median: float) -> str:
+    """Return the costs of a generation in words."""
     return f"generation {generation}: best {best:.2f}, median {median:.2f}"

@@ -63,34 +63,38 @@ def walk(
     """Record the walks of C candidate leg constants, side by side: N / C walks of each candidate, one for each seed.
 
     Args:
-        settings: of the environment.
+        settings: settings of the environment.
         candidates: C leg constants, of both legs unless `right` is given.
-        seeds: N, those of the first candidate first.
-        threads: of the physics.
+        seeds: N seeds, those of the first candidate first.
+        threads: threads of the physics.
         ease: fraction [0, 1] by which the rest angles move from the settings' to the planned ones.
-        foreign: stiffness curves (SAMPLES, 2) on `GRID` for the last walks of each candidate, a walk each; the walks
-            before them have the schedule.
+        foreign: stiffness curves (SAMPLES, 2) on `GRID`, one for each of the last walks of a candidate; its first walks
+            have the schedule.
         seconds: length of each walk [s].
         right: C leg constants of the right leg.
         feet: C feet, in place of the settings' feet.
     """
     num = len(seeds)
-    walks = num // len(candidates)
-    variant = np.repeat(np.arange(len(candidates)), walks)
+    walks_each = num // len(candidates)
+    variant = np.repeat(np.arange(len(candidates)), walks_each)
     rest = _eased(settings, candidates, ease) if ease else None
-    worn = feet and [feet[index] for index in variant.tolist()]
-    biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest, feet=worn, right_legs=right)
+    feet_of_walks = feet and [feet[index] for index in variant.tolist()]
+    biped = Biped(
+        settings, num, threads, legs=candidates, variant=variant, rest=rest, feet=feet_of_walks, right_legs=right
+    )
     biped.reset(np.arange(num), seeds)
-    role = np.tile(np.arange(walks), len(candidates)) - (walks - len(foreign))
+    # (N,) index of the foreign springs that a walk has; negative for the schedule.
+    springs = np.tile(np.arange(walks_each), len(candidates)) - (walks_each - len(foreign))
 
     def act(_observation: NDArray) -> NDArray:
+        """Return the actions (N, 4) that set the schedule, or the foreign springs, at each leg's phase."""
         if settings.action_mode == "residual":
             action = np.zeros((num, 2, 2))
         else:
             action = action_of(biped.scheduled_stiffness(), settings, biped.body)
         for index, stiffness in enumerate(foreign):
-            place = (biped.leg_phase[role == index] * len(GRID)).astype(int)
-            action[role == index] = action_of(stiffness[place], settings, biped.body)
+            sample = (biped.leg_phase[springs == index] * len(GRID)).astype(int)
+            action[springs == index] = action_of(stiffness[sample], settings, biped.body)
         return action.reshape(num, -1)
 
     steps = round(seconds / biped.dt)
@@ -106,19 +110,20 @@ class Walks:
     biped: Biped
     """The batch that walked."""
     episodes: Episodes
-    """One of each walk."""
+    """Record of each walk, as one episode."""
     seconds: float
-    """Their length without falls [s]."""
+    """Length of a walk without a fall [s]."""
 
     @property
     def missing(self) -> NDArray:
-        """(N,) how early each walk fell: 0 without a fall, 1 for a fall at once, falling to 1/3 at the end.
+        """Return (N,) how early each walk fell: 0 without a fall, else 1 for a fall at once, decreasing with the
+        distance walked to 1/3 for a fall at the end.
 
         A walk that covers less than half of the commanded distance counts as a fall.
         """
         com = self.episodes.series["com"][..., 0].astype(float)
-        way = com[np.arange(len(com)), self.episodes.ticks - 1]
-        walked = way / (self.biped.settings.speed * self.seconds)
+        distance = com[np.arange(len(com)), self.episodes.ticks - 1]
+        walked = distance / (self.biped.settings.speed * self.seconds)  # as a fraction of the commanded distance
         stood = self.episodes.fall_reason == ""
         return np.where(stood & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0))
 
@@ -132,15 +137,15 @@ class Walks:
 
 
 def tally_from(series: dict[str, NDArray], settings: BipedSettings, settled: float) -> StrideTally:
-    """Return the evaluation's tally of one walk from `settled` [s] on."""
+    """Return the evaluation's measurements of one walk from `settled` [s] on; `series` as from `Walks.episode`."""
     tally = StrideTally()
     add_episode(tally, series, settings, (settled, np.inf))
     return tally
 
 
 def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED) -> StrideTally | None:
-    """Return the evaluation's tally of one walk from `settled` [s] on; None if a leg takes fewer than two strides, or
-    the body gets no further."""
+    """Return the evaluation's measurements of one walk from `settled` [s] on; None if a leg takes fewer than two
+    strides, or if the body does not advance."""
     tally = tally_from(series, biped.settings, settled)
     walked = min(curves.count for curves in tally.feet) >= 2 and tally.distance > 0.0
     return tally if walked else None
@@ -155,8 +160,8 @@ def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: fl
     """Return (C, SAMPLES, 2) rest angles of ankle and toe [rad], moved by the fraction `ease` to the planned ones."""
     walk = reference_walk_at(settings, settings.speed, candidates)
     curves = [
-        [foot_curves(kind, c, walk)[0] for c in candidates]
-        for kind in (settings, replace(settings, equilibrium="planned"))
+        [foot_curves(variant, constants, walk)[0] for constants in candidates]
+        for variant in (settings, replace(settings, equilibrium="planned"))
     ]
-    own, planned = np.array(curves)
-    return own + ease * (planned - own)
+    by_settings, planned = np.array(curves)
+    return by_settings + ease * (planned - by_settings)

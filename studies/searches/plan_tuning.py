@@ -39,8 +39,8 @@ from springfoot.gait.plan import (
 )
 
 from ..base.study import Answer, OnProgress, Study
+from .cma_search import asked_of, generations
 from .constants_file import read_styles
-from .kept_search import asked_of, generations
 from .prediction_table import numbers_of, prediction_table
 
 CHOICES: dict[str, tuple[float, float, float, float]] = {
@@ -76,11 +76,13 @@ CHOICES: dict[str, tuple[float, float, float, float]] = {
 }
 """Choice of the search -> its start, one unit step, and its least and largest value."""
 GROUPS = {"via_forward": 3, "via_up": 3, "via_pitch": 3, "heel_rise": 2, "zmp_way": 2, "rise_again": 2}
-"""Numbers of a style that have several entries -> how many."""
+"""Entry of a style that holds several numbers -> how many; `CHOICES` has them one by one, as `NAME_1`, `NAME_2`."""
 LEAST_ADVANCE = 0.005
 """Least fraction of its travel that the ZMP advances in the second third of single support [-]; chosen."""
 LEAST_CLEARANCE = 0.015
 """Least height of ball and heel in mid-swing [m at 1.70 m]; chosen, to clear uneven ground."""
+LOWEST_SOLE = -0.001
+"""Height of the lowest point of the swing foot below which it counts as too low [m]; chosen."""
 PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 """Cost of a swing foot that is too low [1/m], and of a choice outside its bounds, squared; chosen."""
 IMPOSSIBLE = 30.0
@@ -88,7 +90,7 @@ IMPOSSIBLE = 30.0
 
 
 def style_at(vector: NDArray) -> WalkStyle:
-    """Return the style at a vector of the search."""
+    """Return the style at a vector (len(CHOICES),) of the search, in unit steps from the start of each choice."""
     values = {}
     for (name, (start, unit, least, most)), step in zip(CHOICES.items(), vector, strict=True):
         values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
@@ -96,21 +98,22 @@ def style_at(vector: NDArray) -> WalkStyle:
     travel = [values.pop("zmp_from"), values.pop("zmp_to")]
     way = groups["zmp_way"]
     way[1] = max(way[1], way[0] + LEAST_ADVANCE)
-    both = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
-    walk = {field.name: both.pop(field.name) for field in fields(WalkStyle) if field.name in both}
-    return style_from(walk | {"foot": both})
+    # A style has entries of the walk, and the others in an object `foot`.
+    of_foot = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
+    of_walk = {field.name: of_foot.pop(field.name) for field in fields(WalkStyle) if field.name in of_foot}
+    return style_from(of_walk | {"foot": of_foot})
 
 
 def vector_of(style: WalkStyle) -> NDArray:
-    """Return the vector of the search for a style; the inverse of `style_at`."""
+    """Return the vector of the search for a style, the inverse of `style_at`."""
     values: dict[str, Any] = style.to_json()
     values |= values.pop("foot")
     values["zmp_from"], values["zmp_to"] = values.pop("zmp_travel")
     for name, count in GROUPS.items():
-        given = values.pop(name) or ()
-        if len(given) != count:
-            raise SpringfootError(f"a search cannot begin at a style with {len(given)} of {name}, it needs {count}")
-        values |= {f"{name}_{k + 1}": each for k, each in enumerate(given)}
+        group = values.pop(name) or ()
+        if len(group) != count:
+            raise SpringfootError(f"a search cannot begin at a style with {len(group)} of {name}, it needs {count}")
+        values |= {f"{name}_{k + 1}": value for k, value in enumerate(group)}
     return np.array([(values[name] - start) / unit for name, (start, unit, *_) in CHOICES.items()])
 
 
@@ -119,7 +122,15 @@ def price(
 ) -> tuple[float, WalkPlan | None, Effort | None]:
     """Return the cost of the plan at a vector, the plan and its effort; None for both if the plan is impossible.
 
-    `weights` are those of work, activation, its rate, and acceleration.
+    Args:
+        body: body that walks.
+        speed: speed of the plan [m/s].
+        vector: vector of the search (`style_at`).
+        weights: weights of work, activation, its rate, and acceleration.
+        muscle: muscles whose effort counts.
+
+    The cost is the weighted effort and a price for a low swing foot, joints beyond their range, and choices beyond
+    their bounds.
     """
     outside = sum(
         max(0.0, least - start - unit * x, start + unit * x - most) ** 2
@@ -131,14 +142,14 @@ def price(
     except SpringfootError:
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
     lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())
-    low = max(0.0, -0.001 - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
-    paid = (
+    too_low = max(0.0, LOWEST_SOLE - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
+    cost = (
         float(np.dot(weights, effort.terms))
-        + PER_METRE_LOW * low
+        + PER_METRE_LOW * too_low
         + PER_DEGREE * effort.beyond_range
         + PER_UNIT * outside
     )
-    return paid, plan, effort
+    return cost, plan, effort
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,19 +204,22 @@ class PlanTuning(Study):
         begin = np.zeros(len(CHOICES)) if self.start is None else vector_of(least_work(self.speed, self.start))
         strategy = cma.CMAEvolutionStrategy(begin, self.sigma, options)
         lines = []
-        best = (np.inf, begin)
+        best_cost = np.inf
+        best_vector = begin
 
-        def priced(_: int, vectors: list[NDArray]) -> NDArray:
+        def costs_of(_: int, vectors: list[NDArray]) -> NDArray:
             return np.array([self._price(body, vector)[0] for vector in vectors])
 
-        for generation, vectors, paid in generations(strategy, self.generations, priced, self.log, asked_of(self)):
-            best = min(best, (float(paid.min()), vectors[int(np.argmin(paid))]), key=lambda each: each[0])
-            lines.append([generation + 1, float(paid.min()), float(np.median(paid))])
+        for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked_of(self)):
+            if costs.min() < best_cost:
+                best_cost = float(costs.min())
+                best_vector = vectors[int(np.argmin(costs))]
+            lines.append([generation + 1, float(costs.min()), float(np.median(costs))])
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
-        cost, plan, effort = self._price(body, best[1])
-        style = style_at(best[1])
+        cost, plan, effort = self._price(body, best_vector)
+        style = style_at(best_vector)
         self._keep(style)
         text = f"{json.dumps(style.to_json())}\n\npaid {cost:.4f}: {effort}"
         if plan is not None:
@@ -215,6 +229,7 @@ class PlanTuning(Study):
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
 
     def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
+        """Return cost, plan and effort at a vector, by the flags (see `price`)."""
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon)
         return price(body, self.speed, vector, self.weights, muscle)
 

@@ -27,7 +27,7 @@ from springfoot.files.locks import owned
 from springfoot.files.markdown import table
 from springfoot.files.writing import make_folder
 
-from ..base.pushed_walks import PushedWalks, measured
+from ..base.pushed_walks import PushedWalks, kept_metrics
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
 from .constants_file import read_constants, write_constants
 from .generic_constants import GENERIC
@@ -105,20 +105,21 @@ class Predict(WalkingStudy):
         return self.runs.with_name(f"{self.runs.name}-quick") if self.quick else self.runs
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Run the stages that are not finished."""
+        """Run the stages, in a folder that no other process can write into."""
         make_folder(self.folder)
         with owned(self.folder):
-            return self._staged(progress)
+            return self._run_stages(progress)
 
-    def _staged(self, progress: OnProgress) -> Answer:
-        """Run the stages in order, each from its kept result if there is one."""
+    def _run_stages(self, progress: OnProgress) -> Answer:
+        """Run the stages in order; each goes on from its result in the folder, if there is one."""
         found = self.folder / FOUND
-        took = {}
+        seconds = {}  # wall time of each stage
 
         def stage(name: str, make: Callable[[], Any]) -> Any:
+            """Make a stage's result, and note its wall time."""
             began = perf_counter()
             result = make()
-            took[name] = perf_counter() - began
+            seconds[name] = perf_counter() - began
             return result
 
         if not found.is_file():
@@ -170,18 +171,18 @@ class Predict(WalkingStudy):
         for name, search in searches.items():
             text = stage(name, lambda search=search: search.ask(progress)).text
             (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
-        # More generations of a search make other constants, and those another policy.
-        sets = read_constants(found)
-        digest = hashlib.sha256(json.dumps([sets["styles"], sets["constants"]]).encode()).hexdigest()
+        # The policy's folder is named after plan and constants, so that other constants train another policy.
+        constants = read_constants(found)
+        digest = hashlib.sha256(json.dumps([constants["styles"], constants["constants"]]).encode()).hexdigest()
         policy = self.folder / f"policy-{digest[:8]}"
         settings = replace(PRESETS["predict"].environment, plan_file=str(found))
         stage("policy", lambda: self._train(settings, policy))
-        text = stage("evaluation", lambda: self._evaluated(found, digest, policy, settings))
-        spent = table(["stage", *took], [["seconds, this time", *(f"{each:.0f}" for each in took.values())]])
-        return Answer(text=f"{text}\n\n{spent}")
+        text = stage("evaluation", lambda: self._evaluate(found, digest, policy, settings))
+        times = table(["stage", *seconds], [["seconds, this time", *(f"{time:.0f}" for time in seconds.values())]])
+        return Answer(text=f"{text}\n\n{times}")
 
     def _train(self, settings: BipedSettings, out: Path) -> None:
-        """Run the rest of the training in `out`."""
+        """Train a policy in the folder `out`, or what is left of its training."""
         from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
 
         preset = PRESETS["predict"]
@@ -199,17 +200,22 @@ class Predict(WalkingStudy):
         if record["status"] == "interrupted":
             raise KeyboardInterrupt
 
-    def _evaluated(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
-        """Walk with the policy, undisturbed and pushed, and return the report's text; kept by the policy's `digest`."""
-        how = PushedWalks(
+    def _evaluate(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
+        """Walk with schedule and policy, undisturbed and pushed, and return the report's text.
+
+        `found` is the file of plan and constants; `digest` is that of its content, by which metrics are kept.
+        """
+        walks = PushedWalks(
             episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads
         )
-        given = {"guide": "plan", "plan_file": str(found)}
+        guided = {"guide": "plan", "plan_file": str(found)}
         columns = {"people": people_numbers(settings), "the plan": plan_numbers(settings)}
         pushed = []
         for name, label in (("schedule", "schedule"), (str(policy), "policy")):
             key = [name, digest, self.timesteps]
-            metrics = measured(self.folder / f"{label}.json", how, key, lambda name=name: how.of(name, given))
+            metrics = kept_metrics(
+                self.folder / f"{label}.json", walks, key, lambda name=name: walks.metrics(name, guided)
+            )
             columns[label] = walk_numbers(metrics["undisturbed"])
             pushed.append(f"{label} {metrics['pushed']['falls']} of {metrics['pushed']['episodes']}")
         return "\n\n".join(

@@ -19,6 +19,7 @@ JOINT_LIMITS = {"thigh": (3.5, 0.95), "knee": (5.0, 0.95), "ankle": (5.5, 0.93)}
 
 
 def _force(label: str, name: str, low: float, high: float = np.inf) -> Criterion:
+    """Return a criterion on a number of the ground reaction force."""
     return Criterion(name=label, path=("grf", name), low=low, high=high)
 
 
@@ -51,12 +52,12 @@ PREDICTION = (
 
 def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers of `PREDICTION` from the metrics of a walk."""
-    found = with_derived(dict(metrics))
+    values = with_derived(dict(metrics))
     settings = BipedSettings(speed=metrics["environment"]["speed"], height=metrics["environment"]["height"])
-    support = found["double_support_s"]
+    support = values["double_support_s"]
     human = reference_gait(settings)
-    away = None if support is None else abs(support - _double_support(human))
-    return found | {"off": found["off"] | {"double_support_s": away}}
+    off = None if support is None else abs(support - _double_support(human))
+    return values | {"off": values["off"] | {"double_support_s": off}}
 
 
 def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
@@ -70,19 +71,22 @@ def people_numbers(settings: BipedSettings) -> dict[str, Any]:
     return numbers_of(human, human)
 
 
-def prediction_table(columns: Mapping[str, Mapping[str, Any]], held: Sequence[str]) -> str:
-    """Return the Markdown table of `PREDICTION`, a column for each walk; the columns in `held` show missed numbers in
-    bold."""
+def prediction_table(columns: Mapping[str, Mapping[str, Any]], judged: Sequence[str]) -> str:
+    """Return the Markdown table of `PREDICTION`: a column for each entry of `columns` (head -> numbers).
+
+    In the `judged` columns missed numbers are bold, and the last line counts them.
+    """
     lines = []
     for criterion in PREDICTION:
         cells = []
         for name, values in columns.items():
             value = _value(criterion, values)
             text = MISSING if value is None else format(value, criterion.pattern)
-            cells.append(f"**{text}**" if name in held and not _holds(criterion, values) else text)
+            cells.append(f"**{text}**" if name in judged and not _holds(criterion, values) else text)
         lines.append([criterion.name, criterion.text, *cells])
     missed = [
-        str(sum(not _holds(each, columns[name]) for each in PREDICTION)) if name in held else "" for name in columns
+        str(sum(not _holds(criterion, values) for criterion in PREDICTION)) if name in judged else ""
+        for name, values in columns.items()
     ]
     lines.append(["missed", f"of {len(PREDICTION)}", *missed])
     return table(["", "wanted", *columns], lines)
@@ -97,25 +101,31 @@ def _value(criterion: Criterion, values: Mapping[str, Any]) -> float | None:
 
 
 def _holds(criterion: Criterion, values: Mapping[str, Any]) -> bool:
+    """Return True if the column has the criterion's number, within its limits."""
     value = _value(criterion, values)
     return value is not None and criterion.low <= value <= criterion.high
 
 
 def _double_support(gait: HumanGait) -> float:
+    """Return the time of one double support [s], from half a stride to toe-off."""
     return (gait.toe_off - 0.5) * gait.stride_time
 
 
 def _positive_work(gait: HumanGait) -> float:
-    """Return the positive work of hip, knee and ankle of both legs in a stride, over body weight [m]."""
+    """Return the positive work of hip, knee and ankle of both legs in a stride over body weight [J/N = m]."""
     power = np.stack([gait.mean(f"{joint}_power", PERCENT / 100) for joint in ("hip", "knee", "ankle")])
     return 2 * float(stride_work(power, np.full(3, gait.stride_time))[0].sum()) / GRAVITY
 
 
 def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
-    """Return the numbers of `PREDICTION` for a gait's mean curves against people's; without falls and speed."""
+    """Return the numbers of `PREDICTION` but falls and speed, for the mean curves of `gait` against those of `human`.
+
+    They are nested as metrics of a walk are.
+    """
     phase = PERCENT / 100
 
     def pair(name: str) -> tuple[Any, Any]:
+        """Return the curve of that name (101,) in both gaits."""
         return gait.mean(name, phase), human.mean(name, phase)
 
     vertical = pair("grf_vertical")

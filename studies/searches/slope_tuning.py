@@ -28,8 +28,8 @@ from springfoot.files.writing import csv_text
 from springfoot.gait.body import GRAVITY, Body
 
 from ..base.study import Answer, OnProgress, Study
+from .cma_search import generations
 from .constants_file import CONSTANTS, read_constants, write_constants
-from .kept_search import generations
 from .leg_walks import tally_from
 
 SLOPES_DEG = (-5.0, -2.5, 2.5, 5.0)
@@ -63,9 +63,9 @@ def walk(
 ) -> dict[str, NDArray]:
     """Walk `walks` times at each slope with the fixed schedule, and measure each walk.
 
-    Returns name -> (slopes, walks): `missing`, how early a walk fell, 0 without a fall, 1 for one at once; `speed`
-    above the commanded one [m/s] and peak force of the `heel` [body weights], both from `SETTLED` on; mean `reward` of
-    a step. `constants` None takes the committed constants.
+    Returns four quantities by name, (slopes, walks) each: `missing`, 0 without a fall, else 1 for a fall at once,
+    decreasing to 1/3 at the end; `speed`, the error of speed [m/s], and `heel`, the peak force of the heel [body
+    weights], both from `SETTLED` on; `reward`, the mean of a step. `constants` None takes the committed constants.
     """
     settings = BipedSettings(episode_seconds=seconds + 1)
     num = len(slopes_deg) * walks
@@ -159,29 +159,30 @@ class SlopeTuning(Study):
             raise SpringfootError(f"{self.constants} has no constants for slopes to begin with") from None
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(vector_of(began), self.sigma, options)
-        how = self.walks, self.seconds
+        length = self.walks, self.seconds
 
-        def price(generation: int, vectors: list[NDArray]) -> NDArray:
+        def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
             seed = self.seed + 1000 * generation
-            level = walk(None, (0.0,), *how, seed, self.threads)["reward"].mean()
-            found = [walk(constants_of(vector), SLOPES_DEG, *how, seed, self.threads) for vector in vectors]
-            return np.array([cost(walked, level) for walked in found])
+            level_reward = walk(None, (0.0,), *length, seed, self.threads)["reward"].mean()
+            walks = [walk(constants_of(vector), SLOPES_DEG, *length, seed, self.threads) for vector in vectors]
+            return np.array([cost(walked, level_reward) for walked in walks])
 
         lines = []
-        for generation, _, paid in generations(strategy, self.generations, price):
-            lines.append([generation + 1, paid.min(), np.median(paid)])
-            tqdm.write(f"generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}")
+        for generation, _, costs in generations(strategy, self.generations, costs_of):
+            lines.append([generation + 1, costs.min(), np.median(costs)])
+            tqdm.write(f"generation {generation + 1}: best {costs.min():.2f}, median {np.median(costs):.2f}")
             progress(1)
-        pays, told = self._judge(began)
-        verdict = "wrote nothing: what it began with pays no more"
+        start_cost, report = self._judge(began)
+        verdict = "wrote nothing: the constants it began with cost no more"
         if self.generations:
-            found_pays, found_told = self._judge(mean := constants_of(strategy.mean))
-            told = f"{told}\n{found_told}"
-            if found_pays < pays:
-                verdict = "wrote nothing: --quick" if self.quick else "wrote what it found"
-                self._keep(mean)
+            result = constants_of(strategy.mean)
+            result_cost, result_report = self._judge(result)
+            report = f"{report}\n{result_report}"
+            if result_cost < start_cost:
+                verdict = "wrote nothing: --quick" if self.quick else "wrote the constants it ended with"
+                self._keep(result)
         files = {"generations.csv": csv_text(["generation", "best", "median"], lines)}
-        return Answer(text=f"{told}\n{verdict}", files=files)
+        return Answer(text=f"{report}\n{verdict}", files=files)
 
     def _keep(self, found: SlopeConstants) -> None:
         """Write the constants and this command into the file of constants; with --quick nothing."""
@@ -195,14 +196,15 @@ class SlopeTuning(Study):
         """Return the cost of these constants on walks from seeds that the search did not use, and a report."""
         walks, seconds = (1, 3.0) if self.quick else (JUDGED_WALKS, JUDGED_SECONDS)
         seed = self.seed + 1_000_000
-        level = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()
+        level_reward = walk(constants, (0.0,), walks, seconds, seed, self.threads)["reward"].mean()
         walked = walk(constants, SLOPES_DEG, walks, seconds, seed, self.threads)
-        paid = cost(walked, level)
-        told = [f"{json.dumps(asdict(constants))} pays {paid:.2f} in {walked['missing'].size} walks of {seconds:g} s"]
+        total = cost(walked, level_reward)
+        count = walked["missing"].size
+        lines = [f"{json.dumps(asdict(constants))} costs {total:.2f} in {count} walks of {seconds:g} s"]
         for row, slope_deg in enumerate(SLOPES_DEG):
             missing, speed, heel, reward = (walked[name][row] for name in ("missing", "speed", "heel", "reward"))
-            told.append(
-                f"  {slope_deg:+.1f} deg: {(missing > 0).sum()} fall, {speed.mean():+.3f} m/s too fast, heel peak "
-                f"{heel.mean():.2f} body weights, reward {reward.mean() / level:.2f} of the level walk's"
+            lines.append(
+                f"  {slope_deg:+.1f} deg: {(missing > 0).sum()} fall, speed error {speed.mean():+.3f} m/s, heel peak "
+                f"{heel.mean():.2f} body weights, reward {reward.mean() / level_reward:.2f} of the level walk's"
             )
-        return paid, "\n".join(told)
+        return total, "\n".join(lines)

@@ -35,7 +35,7 @@ from ..base.study import Answer, OnProgress, WalkingStudy
 
 LOADED = 0.1
 """A joint carries load where its moment is beyond this fraction of its largest."""
-MOST = 0.15
+AGREES = 0.15
 """Largest coefficient of variation of K under load at which policies agree."""
 SPRING_COLUMNS = {
     "ankle": ("ankle_stiffness_Nm_per_rad", "ankle_equilibrium_deg", "ankle_moment_Nm_per_kg"),
@@ -47,9 +47,10 @@ COLORS = {"ankle": "#0b6e8f", "toe": "#c26a1b"}
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Agreement:
-    """One joint's springs over the stride, of S policies; curves (S, 101) over percent."""
+    """Springs of one joint in S policies; curves (S, 101) over percent of the stride."""
 
     joint: str
+    """Joint, one of `SPRING_COLUMNS`."""
     stiffness: NDArray
     """K [N m/rad]."""
     equilibrium: NDArray
@@ -59,13 +60,13 @@ class Agreement:
 
     @property
     def loaded(self) -> NDArray:
-        """(101,) where the joint carries load: the mean moment is beyond `LOADED` of its largest."""
+        """Return (101,) True where the joint carries load: the mean moment is beyond `LOADED` of its largest."""
         size = np.abs(self.torque.mean(axis=0))
         return size > LOADED * size.max()
 
     @property
     def variation(self) -> NDArray:
-        """(101,) coefficient of variation of K over the policies, SD with n - 1."""
+        """Return (101,) the coefficient of variation of K over the policies, SD with n - 1."""
         return self.stiffness.std(axis=0, ddof=1) / self.stiffness.mean(axis=0)
 
     @property
@@ -76,49 +77,50 @@ class Agreement:
 
     @property
     def agree(self) -> bool:
-        """Tell whether the policies agree at every percent under load."""
-        return self.worst[0] <= MOST
+        """Return True if the policies agree at every percent under load."""
+        return self.worst[0] <= AGREES
 
 
 def agreements(gaits: Sequence[Gait]) -> list[Agreement]:
-    """Return the agreement of two gaits or more on ankle and toe.
+    """Return the agreement of two gaits or more, one for the ankle and one for the toe.
 
     Raises `SpringfootError` for fewer gaits, and for a gait without strides.
     """
     _require_two(len(gaits))
-    if idle := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
-        raise SpringfootError(f"{idle[0]} walks no strides to compare")
-    found = []
+    if without := [gait.metrics["policy"] for gait in gaits if not gait.both.count]:
+        raise SpringfootError(f"{without[0]} walks no strides to compare")
+    of_joints = []
     for joint, names in SPRING_COLUMNS.items():
         stiffness, equilibrium, torque = (np.stack([gait.both.mean(name) for gait in gaits]) for name in names)
-        found.append(Agreement(joint=joint, stiffness=stiffness, equilibrium=equilibrium, torque=torque))
-    return found
+        of_joints.append(Agreement(joint=joint, stiffness=stiffness, equilibrium=equilibrium, torque=torque))
+    return of_joints
 
 
 def _require_two(policies: int) -> None:
+    """Raise `SpringfootError` for fewer than two policies."""
     if policies < 2:
         raise SpringfootError(f"agreement needs two policies or more, got {policies}")
 
 
-def agreement_table(found: Sequence[Agreement]) -> str:
+def agreement_table(of_joints: Sequence[Agreement]) -> str:
     """Return the Markdown table of the variation of each joint's springs where it carries load."""
-    head = ["joint", "carries load at", "CV of K: mean", "95th percentile", "worst", f"≤ {100 * MOST:.0f} %"]
+    head = ["joint", "carries load at", "CV of K: mean", "95th percentile", "worst", f"≤ {100 * AGREES:.0f} %"]
     head += ["SD of θ_eq: mean, worst", "SD of torque / peak: mean, worst"]
     lines = []
-    for each in found:
-        loaded = each.loaded
-        worst, percent = each.worst
-        variation = 100 * each.variation[loaded]
-        rest = each.equilibrium.std(axis=0, ddof=1)[loaded]
-        torque = 100 * each.torque.std(axis=0, ddof=1)[loaded] / np.abs(each.torque.mean(axis=0)).max()
+    for agreement in of_joints:
+        loaded = agreement.loaded
+        worst, percent = agreement.worst
+        variation = 100 * agreement.variation[loaded]
+        rest = agreement.equilibrium.std(axis=0, ddof=1)[loaded]
+        torque = 100 * agreement.torque.std(axis=0, ddof=1)[loaded] / np.abs(agreement.torque.mean(axis=0)).max()
         lines.append(
             [
-                each.joint,
+                agreement.joint,
                 f"{_stretches(loaded)} % of the stride",
                 f"{variation.mean():.1f} %",
                 f"{np.percentile(variation, 95):.1f} %",
                 f"{100 * worst:.1f} % at {percent} %",
-                "agree" if each.agree else "**do not agree**",
+                "agree" if agreement.agree else "**do not agree**",
                 f"{rest.mean():.2f}°, {rest.max():.2f}°",
                 f"{torque.mean():.1f} %, {torque.max():.1f} %",
             ]
@@ -127,7 +129,7 @@ def agreement_table(found: Sequence[Agreement]) -> str:
 
 
 def _stretches(mask: NDArray) -> str:
-    """Return the percents at which a mask is true, as "2–60, 95–100"."""
+    """Return the percents at which a mask (101,) is True, as in "2–60, 95–100"."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
 
@@ -137,8 +139,12 @@ def criteria_table(
 ) -> str:
     """Return the Markdown table of every criterion and its number in each evaluation.
 
-    Bold numbers miss the loosened criterion, bracketed ones meet it alone; the row `missed` counts the misses. Falls
-    and angles of the policies' open-loop `copies` follow, unless all are None.
+    Args:
+        names: labels of the policies.
+        metrics: metrics of each policy.
+        copies: metrics of each policy's open-loop copy, None without one; falls and angles form the last rows.
+
+    Bracketed numbers meet only the loosened criterion, bold ones not even that; the row `missed` counts the bold ones.
     """
     measured = [with_derived(each) for each in metrics]
     lines = []
@@ -166,40 +172,42 @@ def _state(criterion: Criterion, values: dict[str, Any]) -> str:
     return "(" if criterion.loosened().holds(values) else "**"
 
 
-def curves_csv(found: Sequence[Agreement]) -> str:
-    """Return the CSV over percent of the stride: mean and SD of K, theta_eq and torque over the policies, CV of K,
-    load."""
+def curves_csv(of_joints: Sequence[Agreement]) -> str:
+    """Return the CSV over percent of the stride, for each joint: mean and SD of K, theta_eq and torque over the
+    policies, CV of K, and whether it carries load."""
     columns: dict[str, NDArray] = {"percent": PERCENT}
-    for each in found:
-        for name, curves in zip(
-            SPRING_COLUMNS[each.joint], (each.stiffness, each.equilibrium, each.torque), strict=True
-        ):
+    for agreement in of_joints:
+        joint = agreement.joint
+        curves_of_joint = (agreement.stiffness, agreement.equilibrium, agreement.torque)
+        for name, curves in zip(SPRING_COLUMNS[joint], curves_of_joint, strict=True):
             columns |= {name: curves.mean(axis=0), f"{name}_sd": curves.std(axis=0, ddof=1)}
-        columns |= {f"{each.joint}_stiffness_cv": each.variation, f"{each.joint}_loaded": each.loaded.astype(int)}
+        columns |= {f"{joint}_stiffness_cv": agreement.variation, f"{joint}_loaded": agreement.loaded.astype(int)}
     return csv_text(list(columns), zip(*columns.values(), strict=True))
 
 
-def save_figure(path: Path, found: Sequence[Agreement]) -> None:
-    """Draw K, rest angle and torque of each policy over the stride, grey where the joint carries no load."""
+def save_figure(path: Path, of_joints: Sequence[Agreement]) -> None:
+    """Draw K, rest angle and torque of each policy over the stride, a row for each joint, grey where it carries no
+    load."""
     titles = ("stiffness K", "equilibrium θ_eq", "torque")
     units = ("N·m/rad", "dorsiflexion, toe up (deg)", "plantarflexion (N·m/kg)")
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 5.6), layout="constrained")
-        for row, each in zip(figure.subplots(len(found), 3, squeeze=False), found, strict=True):
-            for ax, curves, title, unit in zip(
-                row, (each.stiffness, each.equilibrium, each.torque), titles, units, strict=True
-            ):
+        for row, agreement in zip(figure.subplots(len(of_joints), 3, squeeze=False), of_joints, strict=True):
+            joint = agreement.joint
+            curves_of_joint = (agreement.stiffness, agreement.equilibrium, agreement.torque)
+            for ax, curves, title, unit in zip(row, curves_of_joint, titles, units, strict=True):
                 mean = curves.mean(axis=0)
                 sd = curves.std(axis=0, ddof=1)
-                ax.fill_between(PERCENT, mean - sd, mean + sd, color=COLORS[each.joint], alpha=0.22, lw=0)
-                ax.plot(PERCENT, curves.T, color=COLORS[each.joint], lw=0.9, alpha=0.8)
+                ax.fill_between(PERCENT, mean - sd, mean + sd, color=COLORS[joint], alpha=0.22, lw=0)
+                ax.plot(PERCENT, curves.T, color=COLORS[joint], lw=0.9, alpha=0.8)
+                whole_height = ax.get_xaxis_transform()
                 ax.fill_between(
-                    PERCENT, 0, 1, where=~each.loaded, transform=ax.get_xaxis_transform(), color="#f1f1f1", zorder=0
+                    PERCENT, 0, 1, where=~agreement.loaded, transform=whole_height, color="#f1f1f1", zorder=0
                 )
-                ax.set(title=f"{each.joint.capitalize()} {title}", ylabel=unit, xlabel="% of stride", xlim=(0, 100))
+                ax.set(title=f"{joint.capitalize()} {title}", ylabel=unit, xlabel="% of stride", xlim=(0, 100))
             row[0].set_ylim(0, None)
-            worst, percent = each.worst
-            row[0].set_title(f"{each.joint.capitalize()} K, worst CV under load {100 * worst:.0f} % at {percent} %")
+            worst, percent = agreement.worst
+            row[0].set_title(f"{joint.capitalize()} K, worst CV under load {100 * worst:.0f} % at {percent} %")
         handles = {
             "each policy": Line2D([], [], color="#777777", lw=0.9),
             "mean ± SD over policies": Patch(color="#777777", alpha=0.22, lw=0),
@@ -230,24 +238,25 @@ class SeedAgreement(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with every policy, and compare them."""
-        walked = [[self._walk(each, progress) for each in and_copy(name)] for name in self.policies]
-        gaits = [first for first, *_ in walked]
-        copies = [rest[0].metrics if rest else None for _, *rest in walked]
-        found = agreements(gaits)
+        walked = [[self._walk(row, progress) for row in and_copy(name)] for name in self.policies]
+        gaits = [gait for gait, *_ in walked]
+        copies = [copy[0].metrics if copy else None for _, *copy in walked]
+        of_joints = agreements(gaits)
         labels = [policy_label(name) for name in self.policies]
-        ran = (
+        note = (
             f"{self.episodes} episodes × {self.seconds:g} s each. (Brackets): met by the loosened criterion alone; "
             "**bold**: missed."
         )
         if any(copies):
-            ran += " Open loop: each policy's mean K over the stride at the same θ_eq, without feedback."
+            note += " Open loop: each policy's mean K over the stride at the same θ_eq, without feedback."
         table_of_criteria = criteria_table(labels, [gait.metrics for gait in gaits], copies)
-        text = "\n\n".join([agreement_table(found), table_of_criteria, ran])
-        walks = walks_csv([({"policy": gait.metrics["policy"]}, gait.metrics) for each in walked for gait in each])
-        draw = partial(save_figure, found=found)
-        files = {"agreement.csv": curves_csv(found), "policies.csv": walks, "agreement.png": draw}
+        text = "\n\n".join([agreement_table(of_joints), table_of_criteria, note])
+        walks = walks_csv([({"policy": gait.metrics["policy"]}, gait.metrics) for pair in walked for gait in pair])
+        draw = partial(save_figure, of_joints=of_joints)
+        files = {"agreement.csv": curves_csv(of_joints), "policies.csv": walks, "agreement.png": draw}
         return Answer(text=text, files=files)
 
     def _walk(self, name: str, progress: OnProgress) -> Gait:
+        """Record and measure the policy of that name."""
         policy, settings = policy_and_settings(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
         return measure(record(policy, settings, name=policy_label(name), progress=progress, **self.how))

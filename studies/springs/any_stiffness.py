@@ -45,10 +45,13 @@ its own reversed in time; people's quasi-stiffness."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeanSprings:
-    """Mean springs of a recording at ankle and toe of both legs, over the phase of the leg controller: (PHASE_SEGMENTS,
-    2)."""
+    """Mean springs of a recorded gait over the phase of the leg controller, both legs together.
+
+    Arrays are (PHASE_SEGMENTS, (ankle, toe)).
+    """
 
     body: Body
+    """Body that walked."""
     angle: NDArray
     """Angle at the ends of the control windows that began in each segment [rad]."""
     velocity: NDArray
@@ -60,21 +63,25 @@ class MeanSprings:
 
 
 def mean_springs(recording: Recording) -> MeanSprings:
-    """Return the mean springs of a recorded gait at each phase, without the first `WARM_UP` seconds of each episode."""
+    """Return the mean springs of a recorded gait, without the first `WARM_UP` seconds of each episode.
+
+    Raises `SpringfootError` for a gait without samples in half of the segments or more.
+    """
     begin = round(WARM_UP / TICK)
     phase = recording.series["phase"][:, begin:].ravel()
-    walked = np.isfinite(phase)
-    segment = np.minimum((phase[walked] * PHASE_SEGMENTS).astype(int), PHASE_SEGMENTS - 1)
+    valid = np.isfinite(phase)
+    segment = np.minimum((phase[valid] * PHASE_SEGMENTS).astype(int), PHASE_SEGMENTS - 1)
     count = np.bincount(segment, minlength=PHASE_SEGMENTS)
-    if not walked.any() or (count > 0).sum() < PHASE_SEGMENTS / 2:
+    seen = count > 0  # a leg that lands early skips the last segments: they are interpolated
+    if not valid.any() or seen.sum() < PHASE_SEGMENTS / 2:
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be rebuilt")
 
     def mean(name: str) -> NDArray:
+        """Return the mean of a series over the samples of each segment."""
         values = recording.series[name][:, begin:]
-        values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[walked].astype(float)
-        totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[count > 0] for joint in range(2)]
-        at = STARTS[count > 0]  # a leg that lands early skips the last phases
-        return np.stack([np.interp(STARTS, at, total / count[count > 0], period=1.0) for total in totals], -1)
+        values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[valid].astype(float)
+        totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[seen] for joint in range(2)]
+        return np.stack([np.interp(STARTS, STARTS[seen], total / count[seen], period=1.0) for total in totals], -1)
 
     return MeanSprings(
         body=body_of(recording.settings),
@@ -83,7 +90,8 @@ def mean_springs(recording: Recording) -> MeanSprings:
 
 
 def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
-    """Return the schedule of K (PHASE_SEGMENTS, 2) > 0 [N m/rad], with the rest angles that give the gait's torque."""
+    """Return the schedule of K (PHASE_SEGMENTS, 2) > 0 [N m/rad], with the rest angles that give the gait's torque:
+    theta_eq = theta + beta dtheta/dt + tau/K."""
     beta = np.array(damping_times(springs.body))[FEET]
     rest = springs.angle + beta * springs.velocity + springs.torque / stiffness
     columns = zip(SPRINGS, stiffness.T, rest.T, strict=True)
@@ -91,7 +99,8 @@ def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
 
 
 def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
-    """Return K of ankle and toe (PHASE_SEGMENTS, 2) [N m/rad] for a name as in `STIFFNESSES`, with any number."""
+    """Return K of ankle and toe (PHASE_SEGMENTS, 2) [N m/rad] for a name as in `STIFFNESSES`, with any positive number
+    after the colon; raise `SpringfootError` for another name."""
     kind, _, text = name.partition(":")
     try:
         number = float(text) if text else nan
@@ -118,6 +127,7 @@ class Row:
     """Measurements of one stiffness, under every condition."""
 
     name: str
+    """Name of the stiffness, or of the policy for its own."""
     metrics: dict[str, dict[str, Any]]
     """Condition -> metrics, as in metrics.json."""
     work: dict[str, float | None]
@@ -142,42 +152,46 @@ def any_stiffness(
     progress: OnProgress = lambda seconds: None,
     **how: Any,
 ) -> tuple[list[Row], dict[str, StiffnessSchedule]]:
-    """Walk with the policy `name` and with its gait rebuilt at each of `stiffnesses`; return rows, and schedules by
-    name.
+    """Walk with the policy `name`, then with its gait rebuilt at each of `stiffnesses`.
+
+    Returns a row for each walk, and the schedule of each stiffness by name.
 
     Args:
         name: any policy of `policies.policy_and_settings`.
         given: environment settings that differ from the evaluation's standard conditions and the policy's own.
-        stiffnesses: as in `STIFFNESSES`; values outside the action's range become its end.
+        stiffnesses: as in `STIFFNESSES`; K beyond the range of the actions is clipped to it.
         disturbances: further conditions, by name: settings that differ from the undisturbed condition's.
         progress, how: as for `recording.record`.
     """
     policy, settings = policy_and_settings(name, given, how.get("seed", 0))
     conditions = {"undisturbed": {}} | (disturbances or {})
 
-    def walk(name: str, make: Callable[[BipedSettings], Any], settings: BipedSettings) -> dict[str, Recording]:
+    def walk(
+        row_name: str, make_policy: Callable[[BipedSettings], Any], settings: BipedSettings
+    ) -> dict[str, Recording]:
+        """Record one row under every condition."""
         recordings = {}
-        for condition, other in conditions.items():
-            changed = replace(settings, **other)
-            recordings[condition] = record(make(changed), changed, name=name, progress=progress, **how)
+        for condition, changes in conditions.items():
+            changed = replace(settings, **changes)
+            recordings[condition] = record(make_policy(changed), changed, name=row_name, progress=progress, **how)
         return recordings
 
-    own = walk(name, lambda _: policy, settings)
-    springs = mean_springs(own["undisturbed"])
-    rows = [walk_row(name, own)]
+    recordings = walk(name, lambda _: policy, settings)
+    springs = mean_springs(recordings["undisturbed"])
+    rows = [walk_row(name, recordings)]
     schedules = {}
     lowest, highest = stiffness_ranges(settings, springs.body)
-    for each in stiffnesses:
-        schedules[each] = rebuilt(springs, np.clip(stiffness_named(each, springs), lowest, highest))
-        own_springs = {"schedule": schedules[each], "equilibrium": "phase", "decisions": "100hz"}
-        changed = replace(settings, action_mode="absolute", **own_springs)
-        rows.append(walk_row(each, walk(each, schedule, changed)))
+    for stiffness in stiffnesses:
+        schedules[stiffness] = rebuilt(springs, np.clip(stiffness_named(stiffness, springs), lowest, highest))
+        rebuilt_springs = {"schedule": schedules[stiffness], "equilibrium": "phase", "decisions": "100hz"}
+        changed = replace(settings, action_mode="absolute", **rebuilt_springs)
+        rows.append(walk_row(stiffness, walk(stiffness, schedule, changed)))
     return rows, schedules
 
 
 def stiffness_table(rows: Sequence[Row]) -> str:
-    """Return the Markdown table with a row for each stiffness: the undisturbed walk, and falls and likeness when
-    disturbed."""
+    """Return the Markdown table with a row for each stiffness: the undisturbed walk in full, then falls and RMSE under
+    each disturbance."""
     undisturbed, *disturbed = rows[0].metrics
     head = [
         "K",
@@ -213,12 +227,12 @@ def _numbers(rows: Sequence[Row]) -> str:
     return walks_csv(
         [
             (
-                {"stiffness": row.name, "condition": name}
-                | {f"work_by_{by}_J_kg": work for by, work in row.work.items()},
-                m,
+                {"stiffness": row.name, "condition": condition}
+                | {f"work_by_{source}_J_kg": work for source, work in row.work.items()},
+                metrics,
             )
             for row in rows
-            for name, m in row.metrics.items()
+            for condition, metrics in row.metrics.items()
         ]
     )
 
@@ -263,6 +277,7 @@ class AnyStiffness(WalkingStudy):
             f"same seeds in every row; RMSE to people's mean; work put into one ankle's spring a stride, net."
         )
         files = {
-            f"{name.replace(':', '-')}.json": json.dumps(each.to_json()) + "\n" for name, each in schedules.items()
+            f"{name.replace(':', '-')}.json": json.dumps(springs.to_json()) + "\n"
+            for name, springs in schedules.items()
         }
         return Answer(text=text, files={"stiffness.csv": _numbers(rows)} | files)

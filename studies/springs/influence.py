@@ -45,7 +45,7 @@ from .stiffness_responses import (
     Response,
     csv_rows,
     link_rows,
-    response,
+    summarise,
 )
 from .stiffness_steps import CELLS, DURATIONS, PHASES, SPRINGS, paired_walks
 
@@ -65,26 +65,28 @@ INFLUENCE_CONDITIONS = (
 
 
 def walk_under(condition: str, policy: str, change: float, unevenness: float, seed: int = 0) -> tuple[Any, Any, float]:
-    """Return policy, settings and change of K for one of `INFLUENCE_CONDITIONS`, given those of the first condition.
+    """Return policy, settings and change of K (a fraction of it) for one of `INFLUENCE_CONDITIONS`.
 
-    Policies without feedback decide at 100 Hz, as often as the body is controlled: at 50 Hz a walk on level ground
-    falls into one of two rhythms with the decisions.
+    `policy`, `change` and `unevenness` [m] are those of the condition "as it is". Policies without feedback decide at
+    100 Hz, as often as the body is controlled: at 50 Hz a walk on level ground falls into one of two rhythms with the
+    decisions.
     """
     if condition not in INFLUENCE_CONDITIONS:
         raise SpringfootError(f"conditions must be of {', '.join(map(repr, INFLUENCE_CONDITIONS))}, got {condition!r}")
     name = condition if condition == "pretrained" else policy
-    given: dict[str, Any] = {"unevenness_m": 0.0 if condition == "level ground" else unevenness}
+    changes: dict[str, Any] = {"unevenness_m": 0.0 if condition == "level ground" else unevenness}
     if not has_feedback(name):
-        given["decisions"] = "100hz"
+        changes["decisions"] = "100hz"
     if condition in BODIES:
         height, mass = BODIES[condition]
         speed = policy_and_settings(name, {})[1].speed * sqrt(height / REFERENCE_HEIGHT)
-        given |= {"height": height, "mass": mass, "speed": speed}
+        changes |= {"height": height, "mass": mass, "speed": speed}
     elif condition == "θ_eq neutral":
-        given["equilibrium"] = "neutral"
+        changes["equilibrium"] = "neutral"
     elif condition == "θ_eq by phase":
-        given |= {"equilibrium": "phase", "schedule": phase_schedule(policy_and_settings("schedule", {})[1]).to_json()}
-    return *policy_and_settings(name, given, seed), -change if condition == "opposite change" else change
+        of_schedule = policy_and_settings("schedule", {})[1]
+        changes |= {"equilibrium": "phase", "schedule": phase_schedule(of_schedule).to_json()}
+    return *policy_and_settings(name, changes, seed), -change if condition == "opposite change" else change
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,12 +122,13 @@ class Influence(Study):
             self._under(condition)
 
     def _under(self, condition: str) -> tuple[Any, Any, float]:
+        """Return policy, settings and change of K under a condition, by the flags."""
         return walk_under(condition, self.policy, self.change_percent / 100, self.unevenness_m, self.seed)
 
     @property
     def total(self) -> float:
         """Simulated time [s], without falls."""
-        walks = (1 + len(CELLS) * len(DURATIONS)) * self.seeds
+        walks = (1 + len(CELLS) * len(DURATIONS)) * self.seeds  # 1: unchanged
         stride = reference_gait(BipedSettings()).stride_time
         return len(self.conditions) * walks * (WARM_UP + (self.strides + 1) * stride)
 
@@ -136,7 +139,7 @@ class Influence(Study):
         for condition in self.conditions:
             policy, settings, change = self._under(condition)
             how = {"strides": self.strides, "threads": self.threads, "progress": progress}
-            responses[condition] = response(paired_walks(policy, settings, change, seeds, **how), change)
+            responses[condition] = summarise(paired_walks(policy, settings, change, seeds, **how), change)
         picture = f"![Stiffness, torque, CoM acceleration and movement]({FIGURE})"
         text = f"{picture}\n\n{headline(self, responses)}\n\n{tables(self, responses)}"
         return Answer(
@@ -150,53 +153,56 @@ class Influence(Study):
 
 
 def headline(study: Influence, responses: Mapping[str, Response]) -> str:
-    """Return the change of stiffness that moves the walk most, and how well acceleration foretells the walk, in
-    words."""
+    """Return, in words, the changes of stiffness that move the walk most under the first condition, and how well
+    acceleration foretells the walk."""
     first = next(iter(responses.values()))
     mean = first.mean[MANY_STRIDES_SPEED]
-    most = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
-    rest = np.nanmax(np.abs(np.delete(mean, most)))
-    effects = [f"{_cell(cell)}, {_number(first, MANY_STRIDES_SPEED, cell, '+.1f', 1e3)} mm/s" for cell in most]
+    largest = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
+    largest_elsewhere = np.nanmax(np.abs(np.delete(mean, largest)))
+    effects = [f"{_cell(cell)}, {_number(first, MANY_STRIDES_SPEED, cell, '+.1f', 1e3)} mm/s" for cell in largest]
     r, low, high, scrambled = first.links["∫Δa dt → Δspeed of many strides"]
     return (
         f"**{study.change_percent:+g} % of stiffness in one joint and phase of every stride, θ_eq kept, changes the "
         f"speed of `{study.policy}` ({first.speed:.3f} m/s) most here: {'; '.join(effects) or 'nowhere'}. Elsewhere by "
-        f"at most {1e3 * rest:.1f} mm/s.** What it does to the CoM's forward acceleration at once foretells this with "
-        f"r = {r:.2f} [{low:.2f}, {high:.2f}] over the {len(CELLS)} joints and phases (a scrambled order of them does "
-        f"as well in {100 * scrambled:.1f} % of cases), and with the right sign in {first.foretold.sum()} of the "
-        f"{first.moved.sum()} that change speed by {1e3 * LEAST_MOVEMENT:g} mm/s or more."
+        f"at most {1e3 * largest_elsewhere:.1f} mm/s.** What it does to the CoM's forward acceleration at once "
+        f"foretells this with r = {r:.2f} [{low:.2f}, {high:.2f}] over the {len(CELLS)} joints and phases "
+        f"(a scrambled order of them does as well in {100 * scrambled:.1f} % of cases), and with the right sign in "
+        f"{first.foretold.sum()} of the {first.moved.sum()} that change speed by {1e3 * LEAST_MOVEMENT:g} mm/s or more."
     )
 
 
 def _cell(cell: int) -> str:
-    """Return joint and phase of a cell, in words."""
+    """Return joint and phase of one of `CELLS`, in words."""
     joint, phase = CELLS[cell]
     begin, end = PHASES[phase]
     return f"{SPRINGS[joint]}, {phase} ({100 * begin:.0f}–{100 * end:.0f} %)"
 
 
-def _number(own: Response, key: Key, cell: int, pattern: str, unit: float = 1.0, interval: bool = True) -> str:
-    mean, low, high = (_signed(unit * value, pattern) for value in (own.mean[key][cell], *own.interval[key][cell]))
+def _number(response: Response, key: Key, cell: int, pattern: str, unit: float = 1.0, interval: bool = True) -> str:
+    """Return the mean of a quantity in a cell, times `unit`, as in "+1.2 [+0.9, +1.5]"; the mean alone without
+    `interval`."""
+    values = (response.mean[key][cell], *response.interval[key][cell])
+    mean, low, high = (_signed(unit * value, pattern) for value in values)
     return f"{mean} [{low}, {high}]" if interval and mean != MISSING else mean
 
 
 def _signed(value: float, pattern: str) -> str:
-    """Return a number of a table with its sign; 0 has none."""
+    """Return a number of a table with its sign; none for 0, a dash for NaN."""
     text = format(value, pattern)
     return MISSING if not isfinite(value) else text.lstrip("+-") if float(text) == 0 else text
 
 
 def tables(study: Influence, responses: Mapping[str, Response]) -> str:
-    """Return the Markdown tables: the first condition link by link, the lasting speed under each, links, and the
-    walks."""
+    """Return three Markdown tables and a note: the first condition link by link, the lasting speed under each
+    condition, and the correlations of the links."""
     return "\n\n".join(
-        [_chain(responses), _everywhere(responses), _foretelling(responses), _what_ran(study, responses)]
+        [_chain_table(responses), _speed_table(responses), _links_table(responses), _note(study, responses)]
     )
 
 
-def _chain(responses: Mapping[str, Response]) -> str:
-    """Return the table of the first condition, link by link."""
-    own = next(iter(responses.values()))
+def _chain_table(responses: Mapping[str, Response]) -> str:
+    """Return the table of the first condition: a row for each cell, a column for each link of the chain."""
+    first = next(iter(responses.values()))
     head = [
         *("joint", "phase %", "Δτ N·m", "Δa forward m/s²", "Δa up m/s²", "∫Δa dt forward mm/s"),
         *("Δv as the phase ends mm/s", "one stride: Δspeed 1 / 2 / many mm/s", "every stride: Δspeed 1 / 2 mm/s"),
@@ -206,10 +212,10 @@ def _chain(responses: Mapping[str, Response]) -> str:
     for cell, (joint, phase) in enumerate(CELLS):
         begin, end = PHASES[phase]
 
-        def several(changed: str, name: str, when: tuple[str, ...], pattern: str = "+.1f", cell: int = cell) -> str:
-            return " / ".join(_number(own, (changed, name, each), cell, pattern, 1e3, False) for each in when)
+        def several(duration: str, name: str, times: tuple[str, ...], pattern: str = "+.1f", cell: int = cell) -> str:
+            return " / ".join(_number(first, (duration, name, time), cell, pattern, 1e3, False) for time in times)
 
-        number = partial(_number, own, cell=cell)
+        number = partial(_number, first, cell=cell)
         rows.append(
             [
                 SPRINGS[joint],
@@ -230,34 +236,36 @@ def _chain(responses: Mapping[str, Response]) -> str:
     return table(head, rows)
 
 
-def _everywhere(responses: Mapping[str, Response]) -> str:
-    """Return the table of the lasting change of speed under each condition."""
+def _speed_table(responses: Mapping[str, Response]) -> str:
+    """Return the table of the lasting change of speed: a row for each cell, a column for each condition."""
     rows = [
-        [_cell(cell), *(_number(own, MANY_STRIDES_SPEED, cell, "+.1f", 1e3) for own in responses.values())]
+        [_cell(cell), *(_number(response, MANY_STRIDES_SPEED, cell, "+.1f", 1e3) for response in responses.values())]
         for cell in range(len(CELLS))
     ]
-    rows.append(["unchanged m/s", *(f"{own.speed:.3f}" for own in responses.values())])
-    rows.append(["falls of all changed walks", *(str(own.falls.sum()) for own in responses.values())])
+    rows.append(["unchanged m/s", *(f"{response.speed:.3f}" for response in responses.values())])
+    rows.append(["falls of all changed walks", *(str(response.falls.sum()) for response in responses.values())])
     return table(["Δspeed of many strides, mm/s", *responses], rows)
 
 
-def _foretelling(responses: Mapping[str, Response]) -> str:
-    """Return the table of the links: correlations over joints and phases."""
-    rows = [
-        [name, *(MISSING if not isfinite(r) else f"{r:.2f} [{low:.2f}, {high:.2f}]" for r, low, high, _ in each)]
-        for name, each in ((name, [own.links[name] for own in responses.values()]) for name in LINKS)
-    ]
-    signs = (f"{own.foretold.sum()} of {own.moved.sum()}" for own in responses.values())
+def _links_table(responses: Mapping[str, Response]) -> str:
+    """Return the table of the links' correlations over joints and phases: a column for each condition."""
+    rows = []
+    for name in LINKS:
+        correlations = [response.links[name] for response in responses.values()]
+        cells = (f"{r:.2f} [{low:.2f}, {high:.2f}]" if isfinite(r) else MISSING for r, low, high, _ in correlations)
+        rows.append([name, *cells])
+    signs = (f"{response.foretold.sum()} of {response.moved.sum()}" for response in responses.values())
     rows.append(["right sign of ∫Δa dt, where speed changes", *signs])
     return table(["r over joints and phases", *responses], rows)
 
 
-def _what_ran(study: Influence, responses: Mapping[str, Response]) -> str:
-    """Return the sentences on the walks: numbers, falls, cut changes."""
-    short = "".join(
-        f" The range of the actions cuts up to {own.cut.max():.0%} of a cell's changes short in `{name}`."
-        for name, own in responses.items()
-        if own.cut.any()
+def _note(study: Influence, responses: Mapping[str, Response]) -> str:
+    """Return the note below the tables: what their columns mean, how many walks there are, and which changes the range
+    of the actions cut short."""
+    cut_short = "".join(
+        f" The range of the actions cuts up to {response.cut.max():.0%} of a cell's changes short in `{name}`."
+        for name, response in responses.items()
+        if response.cut.any()
     )
     return (
         f"First table: `{next(iter(responses))}`. Δτ (plantarflexion positive) and Δa (of the CoM), means over the "
@@ -266,7 +274,7 @@ def _what_ran(study: Influence, responses: Mapping[str, Response]) -> str:
         f"{study.seeds} starts, ground uneven by ±{1e3 * study.unevenness_m:g} mm. K changes in the left leg's first "
         f"stride alone, or in every stride of both; strides 1, 2 and {study.strides // 2 + 1}–{study.strides} (many). "
         f"[95 % intervals]: bootstrap over starts. θ_eq is planned where nothing else is said; bodies walk at the "
-        f"Froude-equal speed.{short}"
+        f"Froude-equal speed.{cut_short}"
     )
 
 
@@ -310,22 +318,28 @@ def save_influence_figure(path: Path, responses: Mapping[str, Response]) -> None
         figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
 
 
-def _bars(ax: Axes, own: Response, key: Key, label: str, title: str, unit: float = 1.0) -> None:
-    mean = unit * own.mean[key]
+def _bars(ax: Axes, response: Response, key: Key, label: str, title: str, unit: float = 1.0) -> None:
+    """Draw a quantity, times `unit`, as a bar with its interval for each joint and phase."""
+    mean = unit * response.mean[key]
     ax.barh(
-        ROWS, mean, 0.62, color=np.where(mean < 0, PLAN, MODEL), xerr=_whiskers(own, key, unit), error_kw={"lw": 0.9}
+        ROWS,
+        mean,
+        0.62,
+        color=np.where(mean < 0, PLAN, MODEL),
+        xerr=_whiskers(response, key, unit),
+        error_kw={"lw": 0.9},
     )
     ax.set(xlabel=label, title=title)
 
 
-def _speeds(ax: Axes, own: Response) -> None:
+def _speeds(ax: Axes, response: Response) -> None:
     """Draw the change of speed in the strides of `DRAWN_STRIDES`, by joint and phase."""
-    for label, (when, color, shift) in DRAWN_STRIDES.items():
-        key: Key = ("every stride", "speed_m_s", when)
+    for label, (time, color, shift) in DRAWN_STRIDES.items():
+        key: Key = ("every stride", "speed_m_s", time)
         ax.errorbar(
-            1e3 * own.mean[key],
+            1e3 * response.mean[key],
             ROWS + shift,
-            xerr=_whiskers(own, key, 1e3),
+            xerr=_whiskers(response, key, 1e3),
             fmt="o",
             ms=3.2,
             lw=0.9,
@@ -336,21 +350,22 @@ def _speeds(ax: Axes, own: Response) -> None:
     ax.legend(frameon=False, fontsize=7.5, loc="center right", bbox_to_anchor=(1.0, 0.33))
 
 
-def _whiskers(own: Response, key: Key, unit: float) -> np.ndarray:
-    return np.abs(unit * (own.interval[key].T - own.mean[key]))
+def _whiskers(response: Response, key: Key, unit: float) -> np.ndarray:
+    """Return (2, C) the distances from the mean to the ends of its interval, times `unit`."""
+    return np.abs(unit * (response.interval[key].T - response.mean[key]))
 
 
 def _draw_prediction(ax: Axes, responses: Mapping[str, Response]) -> None:
-    """Draw, for each change of K, the change of speed that lasts over the one that the unchanged walk predicts.
+    """Draw, for each change of K, the lasting change of speed (y) against its prediction from the unchanged walk (x).
 
     The prediction integrates the change of the CoM's acceleration over the phase in which K changes, with the angles
     and rates of the unchanged walk. The first condition of `responses` is drawn large, with labels.
     """
     (name, first), *others = responses.items()
-    for number, (_, own) in enumerate(others):
+    for number, (_, response) in enumerate(others):
         ax.plot(
-            1e3 * own.mean[IMPULSE],
-            1e3 * own.mean[MANY_STRIDES_SPEED],
+            1e3 * response.mean[IMPULSE],
+            1e3 * response.mean[MANY_STRIDES_SPEED],
             "o",
             ms=2.6,
             color=PEOPLE,
@@ -361,10 +376,15 @@ def _draw_prediction(ax: Axes, responses: Mapping[str, Response]) -> None:
     ax.plot(x, y, "o", ms=5, color=MODEL, label=name)
     for cell, (joint, phase) in enumerate(CELLS):
         if abs(y[cell]) >= 1e3 * LABELLED:
-            right = x[cell] < 0.5 * x.max()
-            place = {"xytext": (6 if right else -6, 0), "textcoords": "offset points", "va": "center"}
+            label_right = x[cell] < 0.5 * x.max()  # of the point, where there is room
             ax.annotate(
-                f"{SPRINGS[joint]}, {phase}", (x[cell], y[cell]), ha="left" if right else "right", fontsize=7.5, **place
+                f"{SPRINGS[joint]}, {phase}",
+                (x[cell], y[cell]),
+                xytext=(6 if label_right else -6, 0),
+                textcoords="offset points",
+                ha="left" if label_right else "right",
+                va="center",
+                fontsize=7.5,
             )
     r, low, high, _ = first.links["∫Δa dt → Δspeed of many strides"]
     ax.axhline(0, color="#555555", lw=0.8)

@@ -32,7 +32,7 @@ course."""
 LAST_SECOND = 1.0
 """Time left out at the end of an episode that fell [s]."""
 COURSE = 100
-"""Parts of the stride for the mean course of the torque."""
+"""Samples of a joint's mean torque over the stride, its course."""
 NOISE_LASTS = 0.05
 """Correlation time of the noise on the torque [s]."""
 REFLEX_DELAY = 0.02
@@ -42,14 +42,14 @@ REFLEX_DELAY = 0.02
 def prepare_pushed(
     name: str, given: dict[str, Any], seed: int = 0, threads: int = 2
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """Return policy and settings as `policy_and_settings` does; without feedback `decisions` is `DECISIONS`, if not
-    `given`."""
+    """Return the policy of that name and its environment settings; without feedback it decides at `DECISIONS` unless
+    `given` says otherwise."""
     return policy_and_settings(name, given if has_feedback(name) else {"decisions": DECISIONS} | given, seed, threads)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """Records that a laboratory would have of n instants of walking, both legs together."""
+    """Measurements that a laboratory would have at n instants of walking, both legs together, and the truth."""
 
     trial: NDArray
     """(n,) episode of the instant."""
@@ -71,7 +71,7 @@ class Samples:
 
 
 def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> Samples:
-    """Return the instants after the warm-up, without the last second of an episode that fell.
+    """Return the samples of a recording after the warm-up, without the last second of an episode that fell.
 
     The noise of the torque has a standard deviation of `noise_percent` of the largest torque of the joint's mean
     course, and a correlation time of `NOISE_LASTS`.
@@ -94,9 +94,10 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
     segment = (phase[keep] * COURSE).astype(int)
     count = np.maximum(np.bincount(segment, minlength=COURSE), 1)
     course = np.stack([np.bincount(segment, column, COURSE) / count for column in torque[keep].T], -1)
-    kept = np.exp(-TICK / NOISE_LASTS)
+    # Noise of standard deviation 1 and correlation exp(-t / NOISE_LASTS): x' = a x + sqrt(1 - a^2) w, w white.
+    a = np.exp(-TICK / NOISE_LASTS)
     white = np.random.default_rng(seed).standard_normal(torque.shape)
-    noise = lfilter([np.sqrt(1 - kept**2)], [1, -kept], white, axis=1)[keep]
+    noise = lfilter([np.sqrt(1 - a**2)], [1, -a], white, axis=1)[keep]
     trial = np.broadcast_to(np.arange(len(phase))[:, None, None], phase.shape)
     return Samples(
         trial=trial[keep],
@@ -112,7 +113,7 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """The spring of one joint in one phase: applied, and found."""
+    """Spring of one joint in one phase: the applied one, and its estimates."""
 
     joint: str
     """Joint, one of `SPRINGS`."""
@@ -131,38 +132,43 @@ class Row:
 
     @property
     def loaded(self) -> bool:
-        """Tell whether the joint carries load."""
+        """Return True if the joint carries load in this phase."""
         return self.load > LOADED
 
 
 def identified(pushed: Samples, undisturbed: Samples | None = None, margin: float = 0.0) -> list[Row]:
-    """Find the springs of ankle and toe in every phase of `BOUNDS`, leaving out `margin` [stride] at both ends of a
-    phase."""
+    """Find the springs of ankle and toe in every phase of `BOUNDS`; return a row for each joint and phase.
+
+    Args:
+        pushed: samples of walking under pushes.
+        undisturbed: samples without pushes, for the usual estimator; None leaves it out.
+        margin: part of the stride to leave out at both ends of a phase.
+    """
     rows = []
-    at = (np.arange(COURSE) + 0.5) / COURSE
+    course_phase = (np.arange(COURSE) + 0.5) / COURSE
     for column, joint in enumerate(SPRINGS):
         data = {name: getattr(pushed, name)[:, column] for name in ("torque", "angle", "velocity")}
-        found = identify_pushed(
+        by_pushes = identify_pushed(
             **data, phase=pushed.phase, trial=pushed.trial, bounds=BOUNDS, states=pushed.states, margin=margin
         )
-        still: Sequence[PhaseSpring | None] = [None] * len(found)
+        usual: Sequence[PhaseSpring | None] = [None] * len(by_pushes)
         if undisturbed is not None:
             data = {name: getattr(undisturbed, name)[:, column] for name in data}
-            still = identify(**data, phase=undisturbed.phase, bounds=BOUNDS, margin=margin)
-        force = np.abs(pushed.course[:, column])
-        for spring, other in zip(found, still, strict=True):
+            usual = identify(**data, phase=undisturbed.phase, bounds=BOUNDS, margin=margin)
+        mean_torque = np.abs(pushed.course[:, column])
+        for spring, usual_spring in zip(by_pushes, usual, strict=True):
             inside = (pushed.phase >= spring.start + margin) & (pushed.phase < spring.end - margin)
-            truth = pushed.stiffness[inside, column]
-            here = force[(at >= spring.start) & (at < spring.end)]
+            applied = pushed.stiffness[inside, column]
+            in_phase = mean_torque[(course_phase >= spring.start) & (course_phase < spring.end)]
             rows.append(
                 Row(
                     joint=joint,
                     start=spring.start,
                     end=spring.end,
-                    applied=(float(truth.mean()), float(truth.min()), float(truth.max())),
-                    load=float(here.mean() / force.max()),
+                    applied=(float(applied.mean()), float(applied.min()), float(applied.max())),
+                    load=float(in_phase.mean() / mean_torque.max()),
                     pushed=spring,
-                    undisturbed=other,
+                    undisturbed=usual_spring,
                 )
             )
     return rows

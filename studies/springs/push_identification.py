@@ -1,4 +1,4 @@
-"""Find springs of ankle and toe from pushes, beside the applied K, and tell whether the joints are springs at all.
+"""Find springs of ankle and toe from pushes, beside the applied K, and test whether the joints are springs at all.
 
     springfoot study identify
     springfoot study identify schedule frozen:pretrained pretrained
@@ -34,7 +34,7 @@ REPEAT_EPISODES, REPEAT_SECONDS = 28, 6.0
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """Experiment on one policy, and its results."""
+    """Results of the experiment on one policy."""
 
     policy: str
     """Pushed policy."""
@@ -59,7 +59,7 @@ class Experiment:
 
 
 def springs_table(experiment: Experiment) -> str:
-    """Return the Markdown table with a line for each joint and phase under load."""
+    """Return the Markdown table with a line for each joint and phase under load: applied K, estimates, verdict."""
     head = (
         "",
         "% of stride",
@@ -75,58 +75,59 @@ def springs_table(experiment: Experiment) -> str:
     lines = []
     for row in (row for joint in SPRINGS for row in experiment.of(joint)):
         mean, low, high = row.applied
-        found = row.pushed
-        alone = row.undisturbed and row.undisturbed.stiffness
+        spring = row.pushed
+        undisturbed = row.undisturbed and row.undisturbed.stiffness
+        varies = high - low > 0.01 * mean
         lines.append(
             (
                 row.joint,
                 f"{100 * row.start:.0f}–{100 * row.end:.0f}",
-                f"{mean:.1f}" + (f" ({low:.0f}–{high:.0f})" if high - low > 0.01 * mean else ""),
-                _interval(found.stiffness, 1.0),
-                f"{100 * (found.stiffness.value / mean - 1):+.1f} %" if found.stiffness else MISSING,
-                _interval(found.damping_time, 1000.0),
-                f"{100 * found.explained:.0f} %",
-                f"{100 * found.reaction:.1f} %",
-                found.verdict,
-                f"{alone.value:.0f}" if alone else MISSING,
+                f"{mean:.1f} ({low:.0f}–{high:.0f})" if varies else f"{mean:.1f}",
+                _interval(spring.stiffness, 1.0),
+                f"{100 * (spring.stiffness.value / mean - 1):+.1f} %" if spring.stiffness else MISSING,
+                _interval(spring.damping_time, 1000.0),
+                f"{100 * spring.explained:.0f} %",
+                f"{100 * spring.reaction:.1f} %",
+                spring.verdict,
+                f"{undisturbed.value:.0f}" if undisturbed else MISSING,
             )
         )
     return table(head, lines)
 
 
 def sentence(experiment: Experiment) -> str:
-    """Return the table's verdict on each joint, in a sentence."""
-    said = []
+    """Return the verdict on each joint over all its phases under load, and the falls, in a sentence."""
+    clauses = []
     for joint in SPRINGS:
         rows = experiment.of(joint)
-        counts = [sum(row.pushed.verdict == verdict for row in rows) for verdict in (REACTS, SPRING)]
-        if counts[0]:
-            said.append(f"{joint} **{REACTS}**, in {counts[0]} of {len(rows)} phases")
+        reacting, springs = (sum(row.pushed.verdict == verdict for row in rows) for verdict in (REACTS, SPRING))
+        if reacting:
+            clauses.append(f"{joint} **{REACTS}**, in {reacting} of {len(rows)} phases")
             continue
-        off = [abs(row.pushed.stiffness.value / row.applied[0] - 1) for row in rows if row.pushed.stiffness]
-        within = f", K within {100 * max(off):.1f} % of what was applied" if off else ""
-        said.append(f"{joint} a spring in {counts[1]} of {len(rows)} phases{within}")
-    return f"`{experiment.policy}`: {'; '.join(said)}. {experiment.falls} of {experiment.episodes} episodes fell."
+        errors = [abs(row.pushed.stiffness.value / row.applied[0] - 1) for row in rows if row.pushed.stiffness]
+        within = f", K within {100 * max(errors):.1f} % of what was applied" if errors else ""
+        clauses.append(f"{joint} a spring in {springs} of {len(rows)} phases{within}")
+    return f"`{experiment.policy}`: {'; '.join(clauses)}. {experiment.falls} of {experiment.episodes} episodes fell."
 
 
 def coverage_table(experiments: Sequence[Experiment]) -> str:
-    """Return the Markdown table of the repeats under load: how often intervals hold the truth, and how often each
-    verdict."""
+    """Return the Markdown table of the repeats under load: how often the intervals hold the applied K and beta, and how
+    often each verdict comes."""
     head = ("", "", "phases", "repeats", "K in its interval", "β in its interval", "called a spring", "called reacting")
     lines = []
     for experiment in experiments:
         for column, joint in enumerate(SPRINGS):
             rows = experiment.of(joint)
             beta = experiment.damping_time[column]
-            found = [experiment.repeated(row) for row in rows]
-            shares = [
-                [[_holds(row.pushed.stiffness, row.applied[0]) for row in each] for each in found],
-                [[_holds(row.pushed.damping_time, beta) for row in each] for each in found],
-                [[row.pushed.verdict == SPRING for row in each] for each in found],
-                [[row.pushed.verdict == REACTS for row in each] for each in found],
+            phases = [experiment.repeated(row) for row in rows]  # the repeats' rows of each phase
+            columns = [
+                [[_holds(row.pushed.stiffness, row.applied[0]) for row in repeats] for repeats in phases],
+                [[_holds(row.pushed.damping_time, beta) for row in repeats] for repeats in phases],
+                [[row.pushed.verdict == SPRING for row in repeats] for repeats in phases],
+                [[row.pushed.verdict == REACTS for row in repeats] for repeats in phases],
             ]
             counts = (f"{len(rows)}", f"{len(experiment.repeats)}")
-            lines.append((f"`{experiment.policy}`", joint, *counts, *map(_share, shares)))
+            lines.append((f"`{experiment.policy}`", joint, *counts, *map(_percent_true, columns)))
     return table(head, lines)
 
 
@@ -142,35 +143,37 @@ def springs_csv(experiments: Sequence[Experiment]) -> str:
     for experiment in experiments:
         for repeat, rows in enumerate((experiment.rows, *experiment.repeats)):
             for row in rows:
-                found = row.pushed
-                alone = row.undisturbed and row.undisturbed.stiffness
-                estimates = [*(found.stiffness or [None] * 3), *(found.damping_time or [None] * 3)]
-                numbers = (found.explained, found.reaction, found.reaction_p, found.angle_spread)
-                where = (experiment.policy, repeat, row.joint, row.start, row.end, row.load, *row.applied)
-                told = (found.samples, found.trials, *estimates, *numbers, found.verdict, found.reason)
-                lines.append((*where, *told, alone and alone.value))
+                spring = row.pushed
+                undisturbed = row.undisturbed and row.undisturbed.stiffness
+                estimates = [*(spring.stiffness or [None] * 3), *(spring.damping_time or [None] * 3)]
+                numbers = (spring.explained, spring.reaction, spring.reaction_p, spring.angle_spread)
+                labels = (experiment.policy, repeat, row.joint, row.start, row.end, row.load, *row.applied)
+                result = (spring.samples, spring.trials, *estimates, *numbers, spring.verdict, spring.reason)
+                lines.append((*labels, *result, undisturbed and undisturbed.value))
     return csv_text(head, lines)
 
 
 def _interval(estimate: Estimate | None, scale: float) -> str:
+    """Return an estimate and its interval, times `scale`, as in "310.2 [301.5, 318.9]"; a dash for None."""
     return MISSING if estimate is None else "{:.1f} [{:.1f}, {:.1f}]".format(*(scale * number for number in estimate))
 
 
 def _holds(estimate: Estimate | None, truth: float) -> bool:
+    """Return True if the estimate's interval contains the truth."""
     return estimate is not None and estimate.low <= truth <= estimate.high
 
 
-def _share(found: Sequence[Sequence[bool]]) -> str:
-    """Return the percentage of true entries over all phases, and over the phases with fewest and with most."""
-    if not found:
+def _percent_true(phases: Sequence[Sequence[bool]]) -> str:
+    """Return the percentage of True over all repeats and phases, and in brackets its lowest and highest in a phase."""
+    if not phases:
         return MISSING
-    each = 100 * np.mean(found, axis=1)
-    return f"{each.mean():.1f} % ({each.min():.1f}–{each.max():.1f})"
+    percent = 100 * np.mean(phases, axis=1)
+    return f"{percent.mean():.1f} % ({percent.min():.1f}–{percent.max():.1f})"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Identify(WalkingStudy):
-    """Find springs of ankle and toe from walking under random pushes, and tell whether they are springs at all."""
+    """Find springs of ankle and toe from walking under random pushes, and test whether they are springs at all."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("pretrained",)
     """Policies of evaluate.py, or frozen:POLICY, a policy's mean K over the phase played open loop."""
@@ -206,21 +209,23 @@ class Identify(WalkingStudy):
     @property
     def total(self) -> float:
         """Simulated time [s], without falls."""
-        own = (self.episodes + UNDISTURBED_EPISODES) * self.seconds + self.repeats * REPEAT_EPISODES * REPEAT_SECONDS
-        return len(self.policies) * own
+        once = (self.episodes + UNDISTURBED_EPISODES) * self.seconds
+        repeats = self.repeats * REPEAT_EPISODES * REPEAT_SECONDS
+        return len(self.policies) * (once + repeats)
 
     def ask(self, progress: OnProgress) -> Answer:
         """Push every policy, and find its springs."""
         experiments = [self._push(name, progress) for name in self.policies]
         if self.repeats:
-            text = f"{coverage_table(experiments)}\n\n{self._repeats_ran} {self._pushes}"
+            text = f"{coverage_table(experiments)}\n\n{self._coverage_note} {self._pushes}"
         else:
-            parts = [f"{sentence(each)}\n\n{springs_table(each)}" for each in experiments]
-            text = "\n\n".join([*parts, f"{self._ran} {self._pushes}"])
+            parts = [f"{sentence(experiment)}\n\n{springs_table(experiment)}" for experiment in experiments]
+            text = "\n\n".join([*parts, f"{self._springs_note} {self._pushes}"])
         return Answer(text=text, files={"springs.csv": springs_csv(experiments)})
 
     @property
-    def _ran(self) -> str:
+    def _springs_note(self) -> str:
+        """Return the note below `springs_table`."""
         return (
             "K in N·m/rad, with its range where it ramps. Rows: where the joint carries load, more than a tenth of its "
             "largest torque; the CSV file has all. K undisturbed: what the estimator without pushes makes of the same "
@@ -228,7 +233,8 @@ class Identify(WalkingStudy):
         )
 
     @property
-    def _repeats_ran(self) -> str:
+    def _coverage_note(self) -> str:
+        """Return the note below `coverage_table`."""
         return (
             "Percent of all phases in which the joint carries load, and (of the phase with fewest – with most). "
             f"{self.repeats} experiments of {REPEAT_EPISODES} episodes × {REPEAT_SECONDS:g} s each, no episode twice."
@@ -236,32 +242,32 @@ class Identify(WalkingStudy):
 
     @property
     def _pushes(self) -> str:
-        """Return the pushes of the experiment, in words."""
-        decided = f" K decided at {self.decisions}." if self.decisions else ""
-        decided += f" {100 * self.margin:g} % of the stride left out at both ends of each phase." if self.margin else ""
+        """Return the pushes of the experiment and its noise, decisions and margin, in words."""
+        further = f" K decided at {self.decisions}." if self.decisions else ""
+        further += f" {100 * self.margin:g} % of the stride left out at both ends of each phase." if self.margin else ""
         return (
             f"A push of ±{self.push_newton:g} N × {self.push_seconds:g} s at a random time in each "
             f"{self.push_interval:g} s; both legs together; noise on the torque of {self.noise_percent:g} % of the "
-            f"mean stride's largest, lasting 50 ms.{decided}"
+            f"mean stride's largest, lasting 50 ms.{further}"
         )
 
     def _push(self, name: str, progress: OnProgress) -> Experiment:
-        """Return the experiment on one policy, with its repeats."""
+        """Push one policy, find its springs, and repeat the experiment on other episodes."""
         pushes = ("push_newton", "push_seconds", "push_interval")
-        given: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
-        given |= {"decisions": self.decisions} if self.decisions else {}
-        policy, settings = prepare_pushed(name, given, self.seed, self.threads)
-        said: dict[str, Any] = {"name": name, "threads": self.threads, "progress": progress}
-        pushed = record(policy, settings, episodes=self.episodes, seed=self.seed, **said)
-        alone = replace(settings, push_newton=0.0)
-        quiet = record(policy, alone, episodes=UNDISTURBED_EPISODES, seed=self.seed, **said)
-        rows = identified(samples(pushed, self.noise_percent, self.seed), samples(quiet), self.margin)
+        conditions: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
+        conditions |= {"decisions": self.decisions} if self.decisions else {}
+        policy, settings = prepare_pushed(name, conditions, self.seed, self.threads)
+        common: dict[str, Any] = {"name": name, "threads": self.threads, "progress": progress}
+        pushed = record(policy, settings, episodes=self.episodes, seed=self.seed, **common)
+        without_pushes = replace(settings, push_newton=0.0)
+        undisturbed = record(policy, without_pushes, episodes=UNDISTURBED_EPISODES, seed=self.seed, **common)
+        rows = identified(samples(pushed, self.noise_percent, self.seed), samples(undisturbed), self.margin)
         repeats = []
         shorter = replace(settings, episode_seconds=REPEAT_SECONDS)
         for repeat in range(self.repeats):
-            first = self.seed + self.episodes + repeat * REPEAT_EPISODES
-            again = record(policy, shorter, episodes=REPEAT_EPISODES, seed=first, **said)
-            repeats.append(tuple(identified(samples(again, self.noise_percent, first), margin=self.margin)))
+            first_seed = self.seed + self.episodes + repeat * REPEAT_EPISODES
+            again = record(policy, shorter, episodes=REPEAT_EPISODES, seed=first_seed, **common)
+            repeats.append(tuple(identified(samples(again, self.noise_percent, first_seed), margin=self.margin)))
         ankle, toe = damping_times(body_of(settings))[FEET]
         return Experiment(
             policy=name,

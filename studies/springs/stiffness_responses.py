@@ -17,8 +17,8 @@ LEAST_MOVEMENT = 1e-3
 """Least change of speed that counts as a movement [m/s], a thousandth of a walk's speed."""
 
 Key = tuple[str, str, str]
-"""Duration of the change, or "fixed state"; measured quantity; time: at the end of the "phase", in stride "1", "2",
-"many"."""
+"""Duration of the change, or "fixed state" for the effect at the unchanged walk's states; measured quantity; time: at
+the end of the "phase", or in stride "1", "2" or "many" (the second half of the strides)."""
 TORQUE: Key = ("fixed state", "torque_Nm", "")
 ACCELERATION: Key = ("fixed state", "forward_m_s2", "")
 IMPULSE: Key = ("fixed state", "forward_m_s", "")
@@ -56,33 +56,32 @@ class Response:
 
     @property
     def moved(self) -> NDArray:
-        """Tell in which cells, (C,), the speed of many strides changes: an interval off 0, a mean of `LEAST_MOVEMENT`
-        or more."""
-        return (self.interval[MANY_STRIDES_SPEED].prod(-1) > 0) & (
-            np.abs(self.mean[MANY_STRIDES_SPEED]) >= LEAST_MOVEMENT
-        )
+        """Return (C,) True for cells that change the speed of many strides: by `LEAST_MOVEMENT` or more in the mean,
+        with both ends of the interval on the same side of 0."""
+        off_zero = self.interval[MANY_STRIDES_SPEED].prod(-1) > 0
+        return off_zero & (np.abs(self.mean[MANY_STRIDES_SPEED]) >= LEAST_MOVEMENT)
 
     @property
     def foretold(self) -> NDArray:
-        """Tell in which cells, (C,), the walk moved with the sign of the acceleration at the unchanged walk's
-        states."""
+        """Return (C,) True for moved cells whose change of speed has the sign of the acceleration at the unchanged
+        walk's states."""
         return self.moved & (self.mean[IMPULSE] * self.mean[MANY_STRIDES_SPEED] > 0)
 
 
-def response(walks: PairedWalks, change: float) -> Response:
-    """Return means, intervals and links of paired walks with `change`."""
+def summarise(walks: PairedWalks, change: float) -> Response:
+    """Compute means, intervals and links of paired walks with a `change` of K, as a fraction of it."""
     values = _values(walks)
     mean = {key: np.full(len(CELLS), np.nan) for key in values}
     interval = {key: np.full((len(CELLS), 2), np.nan) for key in values}
     for cell in range(len(CELLS)):
-        rows = np.stack([each[cell] for each in values.values()])
-        rows = rows[:, np.isfinite(rows).all(0)]
+        rows = np.stack([quantity[cell] for quantity in values.values()])  # (quantities, S)
+        rows = rows[:, np.isfinite(rows).all(0)]  # seeds that do not fall
         if rows.shape[1] < 2:
             continue
-        how = {"n_resamples": RESAMPLES, "method": "percentile", "rng": np.random.default_rng(0)}
-        spread = bootstrap((rows,), np.mean, axis=-1, **how).confidence_interval
-        for key, own, low, high in zip(values, rows.mean(-1), spread.low, spread.high, strict=True):
-            mean[key][cell] = own
+        options = {"n_resamples": RESAMPLES, "method": "percentile", "rng": np.random.default_rng(0)}
+        spread = bootstrap((rows,), np.mean, axis=-1, **options).confidence_interval
+        for key, cell_mean, low, high in zip(values, rows.mean(-1), spread.low, spread.high, strict=True):
+            mean[key][cell] = cell_mean
             interval[key][cell] = (low, high)
     return Response(
         change=change,
@@ -96,38 +95,40 @@ def response(walks: PairedWalks, change: float) -> Response:
 
 
 def _values(walks: PairedWalks) -> dict[Key, NDArray]:
-    """Return quantity -> (C, S); "many" is the mean over the second half of the strides, and the end for
-    `com_ahead_m`."""
-    found: dict[Key, NDArray] = {("fixed state", name, ""): walks.fixed[..., k] for k, name in enumerate(FIXED)}
-    found[VELOCITY] = walks.velocity
+    """Return the measured quantities by key, (C, S) each; "many" is the mean over the second half of the strides, but
+    the last stride for `com_ahead_m`."""
+    values: dict[Key, NDArray] = {("fixed state", name, ""): walks.fixed[..., k] for k, name in enumerate(FIXED)}
+    values[VELOCITY] = walks.velocity
     half = walks.movement.shape[3] // 2
     for d, duration in enumerate(DURATIONS):
         for m, name in enumerate(MOVEMENT):
-            own = walks.movement[:, d, :, :, m]
-            found[duration, name, "1"] = own[..., 0]
-            found[duration, name, "2"] = own[..., 1]
-            found[duration, name, "many"] = own[..., -1] if name == "com_ahead_m" else own[..., half:].mean(-1)
-    return found
+            by_stride = walks.movement[:, d, :, :, m]
+            values[duration, name, "1"] = by_stride[..., 0]
+            values[duration, name, "2"] = by_stride[..., 1]
+            last = by_stride[..., -1] if name == "com_ahead_m" else by_stride[..., half:].mean(-1)
+            values[duration, name, "many"] = last
+    return values
 
 
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
-    """Return an entry of `Response.links` from the two quantities, (C, S) each."""
-    whole = np.isfinite(x + y).all(0)
-    x = x[:, whole]
-    y = y[:, whole]
+    """Correlate two quantities, (C, S) each, over the cells; return an entry of `Response.links`."""
+    complete = np.isfinite(x + y).all(0)
+    x = x[:, complete]
+    y = y[:, complete]
     if x.shape[1] < 2 or not (np.ptp(x.mean(1)) > 0 and np.ptp(y.mean(1)) > 0):
         return np.nan, np.nan, np.nan, np.nan
 
     def r(seeds: NDArray, axis: int = -1) -> Any:
-        ends: Any = pearsonr(x[:, seeds].mean(axis), y[:, seeds].mean(axis), axis=0)
-        return ends.statistic
+        """Return r of the means over these seeds; `bootstrap` gives many resamples of seeds at once."""
+        result: Any = pearsonr(x[:, seeds].mean(axis), y[:, seeds].mean(axis), axis=0)
+        return result.statistic
 
     seeds = np.arange(x.shape[1])
     rng = np.random.default_rng(0)
     spread = bootstrap((seeds,), r, n_resamples=RESAMPLES, method="percentile", rng=rng)
     low, high = spread.confidence_interval
-    how = PermutationMethod(n_resamples=RESAMPLES, rng=rng)
-    scrambled: Any = pearsonr(x.mean(1), y.mean(1), method=how)
+    method = PermutationMethod(n_resamples=RESAMPLES, rng=rng)
+    scrambled: Any = pearsonr(x.mean(1), y.mean(1), method=method)
     return float(r(seeds)), float(low), float(high), float(scrambled.pvalue)
 
 
@@ -140,16 +141,17 @@ LINKS_HEAD = ("condition", "link", "r", "low", "high", "scrambled_p")
 
 def csv_rows(responses: Mapping[str, Response]) -> Iterator[tuple[Any, ...]]:
     """Yield the rows under `CSV_HEAD`: one for each condition, cell and quantity."""
-    for condition, own in responses.items():
+    for condition, response in responses.items():
         for cell, (joint, phase) in enumerate(CELLS):
-            for key, mean in own.mean.items():
-                fell = int(own.falls[cell, DURATIONS.index(key[0])]) if key[0] in DURATIONS else 0
-                numbers = float(mean[cell]), *map(float, own.interval[key][cell]), fell, float(own.cut[cell])
-                yield condition, own.change, SPRINGS[joint], phase, *PHASES[phase], *key, *numbers
+            for key, mean in response.mean.items():
+                fell = int(response.falls[cell, DURATIONS.index(key[0])]) if key[0] in DURATIONS else 0
+                interval = map(float, response.interval[key][cell])
+                numbers = float(mean[cell]), *interval, fell, float(response.cut[cell])
+                yield condition, response.change, SPRINGS[joint], phase, *PHASES[phase], *key, *numbers
 
 
 def link_rows(responses: Mapping[str, Response]) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows under `LINKS_HEAD`."""
-    for condition, own in responses.items():
-        for name, numbers in own.links.items():
+    """Yield the rows under `LINKS_HEAD`: one for each condition and link."""
+    for condition, response in responses.items():
+        for name, numbers in response.links.items():
             yield condition, name, *numbers

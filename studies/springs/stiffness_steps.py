@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from math import ceil
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -76,7 +77,10 @@ class PairedWalks:
 
 
 def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
-    """Return (2,) the change of ankle and toe actions that multiplies stiffness by 1 + `change`."""
+    """Return (2,) the change of ankle and toe actions that multiplies stiffness by 1 + `change`.
+
+    K = K_schedule e^a in residual mode; else a = -1 to 1 is the range of K on a log scale.
+    """
     if settings.action_mode == "residual":
         return np.full(len(SPRINGS), np.log1p(change))
     low, high = stiffness_ranges(settings, body)
@@ -84,35 +88,36 @@ def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
 
 
 def step_at(model: mujoco.MjModel, data: mujoco.MjData, change: float) -> tuple[NDArray, NDArray]:
-    """Compute the effect of K (1 + `change`) in each spring by itself at the state of `data`, its rest angle unchanged.
+    """Compute the effect at the state of `data` of changing one spring's K to K (1 + `change`), its rest angle kept.
 
-    Contacts respond as the solver has them respond. Returns the change of torque (side, (ankle, toe)) [N m],
-    dorsiflexion positive, and of the CoM's acceleration (side, (ankle, toe), (forward, up)) [m/s^2]. Leaves `data`
-    after `mj_forward`.
+    Each spring changes by itself; contacts respond by MuJoCo's solver. Returns the change of the spring's torque (side,
+    (ankle, toe)) [N m], dorsiflexion positive, and of the CoM's acceleration (side, (ankle, toe), (forward, up))
+    [m/s^2]. Leaves `data` after `mj_forward`, with its own control.
     """
-    control = data.ctrl.reshape(len(SIDES), len(JOINTS), 2)[:, FEET]
-    joints = model.nv - len(SIDES) * len(JOINTS)  # those of the base come first
-    guess = data.qacc_warmstart.copy()
+    control = data.ctrl.reshape(len(SIDES), len(JOINTS), 2)[:, FEET]  # a view: K and K theta_eq of each spring
+    first_joint = model.nv - len(SIDES) * len(JOINTS)  # after the degrees of freedom of the base
+    warm_start = data.qacc_warmstart.copy()
     jacobian = np.zeros((3, model.nv))
 
     def forward() -> tuple[NDArray, NDArray]:
-        data.qacc_warmstart[:] = guess  # so that no change gives the same bits
+        """Return the torques of the springs (side, (ankle, toe)) and the accelerations (nv,) under `control`."""
+        data.qacc_warmstart[:] = warm_start  # so that the same control gives the same bits
         mujoco.mj_forward(model, data)
-        return data.qfrc_actuator[joints:].reshape(len(SIDES), len(JOINTS))[:, FEET].copy(), data.qacc.copy()
+        return data.qfrc_actuator[first_joint:].reshape(len(SIDES), len(JOINTS))[:, FEET].copy(), data.qacc.copy()
 
     torque, acceleration = forward()
     mujoco.mj_jacSubtreeCom(model, data, jacobian, model.body("trunk").id)
-    torques = np.zeros((len(SIDES), len(SPRINGS)))
-    accelerations = np.zeros((len(SIDES), len(SPRINGS), 2))
-    for spring in np.ndindex(*torques.shape):
-        kept = control[spring].copy()
-        control[spring] *= 1.0 + change  # K and K theta_eq
+    torque_changes = np.zeros((len(SIDES), len(SPRINGS)))
+    com_changes = np.zeros((len(SIDES), len(SPRINGS), 2))
+    for spring in np.ndindex(*torque_changes.shape):
+        unchanged = control[spring].copy()
+        control[spring] *= 1.0 + change
         changed_torque, changed_acceleration = forward()
-        torques[spring] = (changed_torque - torque)[spring]
-        accelerations[spring] = (jacobian @ (changed_acceleration - acceleration))[[0, 2]]
-        control[spring] = kept
+        torque_changes[spring] = (changed_torque - torque)[spring]
+        com_changes[spring] = (jacobian @ (changed_acceleration - acceleration))[[0, 2]]  # x, z
+        control[spring] = unchanged
     forward()
-    return torques, accelerations
+    return torque_changes, com_changes
 
 
 def paired_walks(
@@ -129,34 +134,36 @@ def paired_walks(
 
     Args:
         policy, settings: from `springfoot.evaluation.recording.policies.policy_and_settings`.
-        change: of K, as a fraction of it: 0.1 for 10 % more.
-        seeds: S of them; each draws the phase at which the walk starts.
-        strides: K, from the left foot's first heel strike after `WARM_UP` on.
-        threads: of the physics; any number gives the same bits.
+        change: change of K, as a fraction of it: 0.1 for 10 % more.
+        seeds: S seeds; each draws the phase at which its walks start.
+        strides: number K of strides, from the left foot's first heel strike after `WARM_UP` on.
+        threads: threads of the physics; any number gives the same bits.
         progress: called with the simulated time [s] of all walks together after every step.
 
     Raises `SpringfootError` if fewer than two unchanged walks stay up.
     """
+    # One batch: S unchanged walks, then S walks for each cell and duration.
     num = len(seeds)
     copies = 1 + len(CELLS) * len(DURATIONS)
     biped = Biped(settings, copies * num, threads)
     biped.reset(np.arange(copies * num), list(seeds) * copies)
     changes = _Changes(action_step(settings, biped.body, change), num)
     record = _Record(biped, change, num)
-    before = np.zeros((copies * num, len(SIDES)))
-    stride = np.full(copies * num, -1)
-    asked, cut = np.zeros((2, copies), int)
+    previous_phase = np.zeros((copies * num, len(SIDES)))
+    stride = np.full(copies * num, -1)  # of the left foot; 0 begins at its first heel strike after the warm-up
+    changed, cut = np.zeros((2, copies), int)  # changed actions, and those that the range of the actions cuts
     steps = 0
 
     def act(observation: NDArray) -> NDArray:
+        """Return the policy's actions with the changes added; count strides and cut changes."""
         phase = leg_phase(observation)
         if steps * biped.dt >= WARM_UP:
-            stride[:] += phase[:, LEFT] < before[:, LEFT]
-        before[:] = phase
+            stride[:] += phase[:, LEFT] < previous_phase[:, LEFT]
+        previous_phase[:] = phase
         record.stride = stride[:num]
         added = changes.added(phase, stride)
         action = policy(observation) + added
-        asked[:] += (added != 0.0).reshape(copies, -1).sum(1)
+        changed[:] += (added != 0.0).reshape(copies, -1).sum(1)
         cut[:] += ((added != 0.0) & (np.abs(action) > 1.0)).reshape(copies, -1).sum(1)
         return action
 
@@ -170,28 +177,51 @@ def paired_walks(
             break
     stood &= stride > strides
     if stood[:num].sum() < 2:
-        raise SpringfootError(f"of {num} unchanged walks fewer than two stay up: nothing can be held against them")
-    asked, cut = (each[1:].reshape(len(CELLS), -1).sum(1) for each in (asked, cut))
-    return record.paired(strides, stood, cut / np.maximum(asked, 1))
+        raise SpringfootError(
+            f"of {num} unchanged walks fewer than two stay up: changed walks have nothing to be compared with"
+        )
+    changed, cut = (of_copies[1:].reshape(len(CELLS), -1).sum(1) for of_copies in (changed, cut))
+    return record.paired(strides, stood, cut / np.maximum(changed, 1))
 
 
 class _Changes:
-    """Changes of action in each walk: none in the first S walks, then S walks for each cell and duration."""
+    """Changes of the actions in each of N walks: none in the first S, then S walks for each cell and duration."""
 
     def __init__(self, step: NDArray, num: int):
         rows = [(np.zeros(len(SPRINGS)), (0.0, 0.0), False)]
         for (joint, name), duration in product(CELLS, DURATIONS):
             rows.append((step * (np.arange(len(SPRINGS)) == joint), PHASES[name], duration == "every stride"))
-        own, edges, self._lasts = (np.repeat(each, num, axis=0) for each in map(np.array, zip(*rows, strict=True)))
-        self._step = own[:, None]
+        steps, edges, self._lasts = (
+            np.repeat(column, num, axis=0) for column in map(np.array, zip(*rows, strict=True))
+        )
+        self._step = steps[:, None]
         self._begin, self._end = edges.T[..., None]
 
     def added(self, phase: NDArray, stride: NDArray) -> NDArray:
-        """Return the changes (N, 4) of the actions at `phase` (N, side) of the left foot's `stride` (N,), 0 the
-        first."""
+        """Return the changes (N, 4) of the actions at `phase` (N, side), in the left foot's `stride` (N,), 0 the first.
+
+        A change of one stride is made in the left leg alone, a lasting one in both.
+        """
         left = (stride == 0) | (self._lasts & (stride > 0))
         due = np.stack([left, left & self._lasts], -1)
         return ((due & (phase >= self._begin) & (phase < self._end))[..., None] * self._step).reshape(len(phase), -1)
+
+
+class _Series(NamedTuple):
+    """Quantities of N walks, of which the first S are unchanged, at one tick, or at T ticks with a first axis T."""
+
+    com: NDArray
+    """(N, (x, z)) position of the CoM [m]."""
+    velocity: NDArray
+    """(N,) forward velocity of the CoM [m/s]."""
+    ankle: NDArray
+    """(N, side) forward position of the ankles [m]."""
+    load: NDArray
+    """(N, side) vertical force on each foot [N]."""
+    phase: NDArray
+    """(S,) phase of the left leg."""
+    stride: NDArray
+    """(S,) stride of the left foot, 0 the first, -1 before."""
 
 
 class _Record:
@@ -199,26 +229,37 @@ class _Record:
 
     def __init__(self, biped: Biped, change: float, num: int):
         self.stride = np.full(num, -1)
-        """(S,) of each unchanged walk, before the next step; 0 is the first."""
+        """(S,) stride of each unchanged walk, set before each step; 0 is the first."""
         self._biped = biped
         self._change = change
         self._num = num
-        self._ticks: list[tuple[NDArray, ...]] = []
+        self._ticks: list[_Series] = []
         self._samples = np.zeros((len(CELLS), num, 4))  # count; sums of torque [N m], acceleration (x, z) [m/s^2]
         biped.on_tick = self._keep
 
     def _keep(self, tick: Tick) -> None:
-        """Keep positions, forces and phases of a tick, and sample the first stride of unchanged walks."""
+        """Keep all walks' positions and forces, and phase and stride of the unchanged ones.
+
+        In their first stride also compute what each change would do to the present state (`_sample`).
+        """
         m = tick.measurement
-        own = slice(self._num)
-        walks = m.com.copy(), m.com_velocity[:, 0].copy(), m.ankle[..., 0].copy(), m.force[..., 1].sum(-1)
-        self._ticks.append((*walks, tick.phase[own, LEFT].copy(), self.stride.copy()))
+        unchanged = slice(self._num)  # they come first
+        self._ticks.append(
+            _Series(
+                com=m.com.copy(),
+                velocity=m.com_velocity[:, 0].copy(),
+                ankle=m.ankle[..., 0].copy(),
+                load=m.force[..., 1].sum(-1),
+                phase=tick.phase[unchanged, LEFT].copy(),
+                stride=self.stride.copy(),
+            )
+        )
         for index in np.flatnonzero(self.stride == 0).tolist():
             self._sample(index, tick.phase[index])
 
     def _sample(self, index: int, phase: NDArray) -> None:
-        """Add the effect of each change at the present state of an unchanged walk, for legs in the phase of the
-        change."""
+        """Add the effect of each change at the present state of an unchanged walk, for each leg whose `phase` (side,)
+        is that of the change."""
         torque, acceleration = step_at(self._biped.model, self._biped.data(index), self._change)
         for cell, (joint, name) in enumerate(CELLS):
             begin, end = PHASES[name]
@@ -226,34 +267,40 @@ class _Record:
                 self._samples[cell, index] += 1.0, -torque[side, joint], *acceleration[side, joint]
 
     def paired(self, strides: int, active: NDArray, cut: NDArray) -> PairedWalks:
-        """Return each changed walk less the unchanged walk of its seed."""
-        com, velocity, ankle, load, phase, stride = (np.stack(each) for each in zip(*self._ticks, strict=True))
-        # The movement of each walk; the unchanged walks come first and give the clock.
+        """Return the differences of each changed walk from the unchanged walk of its seed.
+
+        `strides` is K, `active` (N,) is True for walks that stayed up, `cut` as in `PairedWalks`.
+        """
+        series = _Series(*(np.stack(ticks) for ticks in zip(*self._ticks, strict=True)))
+        # Movement of each walk; the unchanged ones come first, and their mean strides are the clock of all.
         movement = np.full((len(active), strides, len(MOVEMENT)), np.nan)
         clocks = np.zeros((self._num, strides))
         for index in range(len(active)):
-            own = index % self._num
-            first = TICK * np.argmax(stride[:, own] == 0)
-            contacts = foot_contacts(load[:, index], self._biped.body)
+            seed = index % self._num
+            first_stride = TICK * np.argmax(series.stride[:, seed] == 0)
+            contacts = foot_contacts(series.load[:, index], self._biped.body)
             landed = contacts[LEFT].heel_strikes
-            landed = landed[landed > first - PHASE_LAG][: strides + 1]
+            landed = landed[landed > first_stride - PHASE_LAG][: strides + 1]
             if not active[index] or len(landed) <= strides:
                 continue
-            if index == own:
-                clocks[own] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
-            movement[index] = _movement(com[:, index], ankle[:, index], contacts, landed, clocks[own])
-        movement = movement.reshape(-1, self._num, *movement.shape[1:])
-        # The velocity of all copies of a seed when each phase of its unchanged first stride ends.
-        ends = np.stack([_ends(*each) for each in zip(phase.T, stride.T, strict=True)], -1)  # (phases, S)
-        now = velocity.reshape(len(velocity), -1, self._num)[ends, :, np.arange(self._num)]  # (phases, S, copies)
-        single = 1 + np.arange(len(CELLS)) * len(DURATIONS)
-        place = [list(PHASES).index(name) for _, name in CELLS]
+            if index == seed:
+                clocks[seed] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
+            com = series.com[:, index]
+            movement[index] = _movement(com, series.ankle[:, index], contacts, landed, clocks[seed])
+        movement = movement.reshape(-1, self._num, *movement.shape[1:])  # (copies, S, K, len(MOVEMENT))
+        # Velocity of all copies of a seed when each phase of its unchanged first stride ends.
+        ends = np.stack([_ends(*of_seed) for of_seed in zip(series.phase.T, series.stride.T, strict=True)], -1)
+        velocity = series.velocity.reshape(len(series.velocity), -1, self._num)  # (T, copies, S)
+        at_ends = velocity[ends, :, np.arange(self._num)]  # (phases, S, copies)
+        one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
+        phase_index = [list(PHASES).index(name) for _, name in CELLS]
         stood = np.isfinite(movement[0]).all((1, 2))
-        windows, torque_acceleration = np.split(self._samples, [1], axis=-1)
-        mean = torque_acceleration / np.where(stood[:, None], windows, np.nan)
+        # Means over the sampled windows, and the acceleration's integral over the phase of one leg.
+        windows, sums = np.split(self._samples, [1], axis=-1)
+        mean = sums / np.where(stood[:, None], windows, np.nan)
         return PairedWalks(
             fixed=np.concatenate([mean, mean[..., 1:] * windows * TICK / len(SIDES)], -1),
-            velocity=np.where(stood, now[place, :, single] - now[place, :, 0], np.nan),
+            velocity=np.where(stood, at_ends[phase_index, :, one_stride] - at_ends[phase_index, :, 0], np.nan),
             movement=(movement[1:] - movement[0]).reshape(len(CELLS), len(DURATIONS), *movement.shape[1:]),
             unchanged=movement[0],
             cut=cut,
@@ -262,9 +309,9 @@ class _Record:
 
 def _ends(phase: NDArray, stride: NDArray) -> list[int]:
     """Return the last tick of each of `PHASES` in the first stride, from a leg's `phase` and `stride` (T,)."""
-    gone = np.where(stride <= 0, phase, 1.0)
-    begun = np.argmax(stride == 0)
-    return [int(begun + np.argmax(gone[begun:] >= end)) - 1 for _, end in PHASES.values()]
+    until_next = np.where(stride <= 0, phase, 1.0)  # 1 once the first stride is over
+    begin = np.argmax(stride == 0)
+    return [int(begin + np.argmax(until_next[begin:] >= end)) - 1 for _, end in PHASES.values()]
 
 
 def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: NDArray, clock: NDArray) -> NDArray:
@@ -273,14 +320,16 @@ def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: ND
     `com` (T, 2) and `ankle` (T, side) are positions [m], `landed` (K + 1,) the left foot's heel strikes [s], and
     `clock` (K,) the ends of the unchanged walk's mean strides [s].
     """
-    place = sample(com[:, 0], landed, TICK, TICK)
+    com_at_strikes = sample(com[:, 0], landed, TICK, TICK)
+    speed = np.diff(com_at_strikes) / np.diff(landed)
+    # A step goes from one ankle at its beginning to the other ankle at its end.
     times, side = find_steps(contacts[LEFT], contacts[RIGHT], landed[0])
-    ends = sample(ankle, times, TICK, TICK)  # (steps, (begin, end), side)
-    length = np.take_along_axis(ends[:, 1], 1 - side[:, None], 1) - np.take_along_axis(ends[:, 0], side[:, None], 1)
-    own = np.searchsorted(landed, times[:, 0], side="right") - 1
-    total, count = (np.bincount(own, each, len(landed))[: len(clock)] for each in (length[:, 0], None))
-    with np.errstate(invalid="ignore"):  # a stride without a step of both feet has none
+    ankles = sample(ankle, times, TICK, TICK)  # (steps, (begin, end), side)
+    length = np.take_along_axis(ankles[:, 1], 1 - side[:, None], 1) - np.take_along_axis(ankles[:, 0], side[:, None], 1)
+    stride = np.searchsorted(landed, times[:, 0], side="right") - 1
+    total, count = (np.bincount(stride, weights, len(landed))[: len(clock)] for weights in (length[:, 0], None))
+    with np.errstate(invalid="ignore"):  # a stride without a whole step has NaN
         step_length = total / count
     height = on_percent(com[:, 1], landed[:-1], landed[1:], TICK, TICK).mean(1)
     ahead = sample(com[:, 0], clock, TICK, TICK)
-    return np.stack([np.diff(place) / np.diff(landed), step_length, ahead, height], -1)
+    return np.stack([speed, step_length, ahead, height], -1)

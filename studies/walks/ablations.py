@@ -29,7 +29,7 @@ from springfoot.gait.people import mean_sd
 from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 
 from ..base.columns import COMPARED_JOINTS, Column
-from ..base.pushed_walks import PushedWalks, measured
+from ..base.pushed_walks import PushedWalks, kept_metrics
 from ..base.study import Answer, OnProgress
 from ..base.training_study import TrainingStudy
 
@@ -101,111 +101,120 @@ RESULT = "ablation.json"
 
 
 def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
-    """Return the planned equilibrium and fixed schedule of `settings` as ten springs, constant on and between K's
-    plateaus.
+    """Return planned rest angles and fixed schedule of `settings` as ten springs of constant K and theta_eq.
 
-    Each spring has the mean K of its stretch, and the rest angle of its mean K theta_eq. With fewer springs, as between
-    gait events, the fixed schedule falls.
+    Each stretch of the stride between two of `PLATEAUS` has one spring: its mean K, and the rest angle with the same
+    mean K theta_eq. With fewer springs, as between gait events, the walk falls.
     """
     walk = reference_walk_at(settings, settings.speed)
     planned = replace(settings, equilibrium="planned", schedule=None)
     rest, stiffness = foot_curves(planned, walk.constants[0], walk)
-    place = np.searchsorted(PLATEAUS, GRID, side="right") - 1
-    segments: list[list[Segment]] = [[], []]
+    stretch = np.searchsorted(PLATEAUS, GRID, side="right") - 1
+    of_joints: list[list[Segment]] = [[], []]
     for index, start in enumerate(PLATEAUS):
-        for joint, own in enumerate(segments):
-            k = stiffness[place == index, joint]
-            theta = rest[place == index, joint]
-            own.append(Segment(start, float(k.mean()), float((k * theta).mean() / k.mean())))
-    return StiffnessSchedule(**dict(zip(SPRINGS, map(tuple, segments), strict=True)))
+        for joint, segments in enumerate(of_joints):
+            k = stiffness[stretch == index, joint]
+            theta = rest[stretch == index, joint]
+            segments.append(Segment(start, float(k.mean()), float((k * theta).mean() / k.mean())))
+    return StiffnessSchedule(**dict(zip(SPRINGS, map(tuple, of_joints), strict=True)))
 
 
 def config_of(name: str, seed: int = 0, timesteps: int | None = None) -> TrainingConfig:
-    """Return the training of a row: as much walking as the preset's, or `timesteps` of 20 ms, whatever the row's
-    step."""
+    """Return the training of a row of `ABLATIONS`: simulated time as in the preset, or `timesteps` of 20 ms.
+
+    A row that decides more often takes more, shorter steps.
+    """
     preset = PRESETS["walk"]
-    own = dict(ABLATIONS[name])
+    changes = dict(ABLATIONS[name])
     if name == "phase":
-        own["schedule"] = phase_schedule(preset.environment)
-    environment = settings_from(**settings_to_json(preset.environment) | own)
-    pace = ACTION_STEP / environment.step_seconds
+        changes["schedule"] = phase_schedule(preset.environment)
+    environment = settings_from(**settings_to_json(preset.environment) | changes)
+    steps_per_20ms = ACTION_STEP / environment.step_seconds
     return replace(
         preset,
         seed=seed,
         environment=environment,
-        timesteps=round(pace * (timesteps or preset.timesteps)),
-        update_steps=round(pace * preset.update_steps),
-        eval_interval=round(pace * preset.eval_interval),
+        timesteps=round(steps_per_20ms * (timesteps or preset.timesteps)),
+        update_steps=round(steps_per_20ms * preset.update_steps),
+        eval_interval=round(steps_per_20ms * preset.eval_interval),
     )
 
 
 def jobs(out: Path, names: Sequence[str], seeds: int, timesteps: int | None) -> list[tuple[TrainingConfig, Path, str]]:
     """Return configuration, folder and label of the training of each row and seed."""
-    order = product(range(seeds), names)  # every row once before any twice
+    order = product(range(seeds), names)  # the first seed of every row, then the second
     return [
         (config_of(name, seed, timesteps), out / name / f"seed-{seed}", f"{name}, seed {seed}") for seed, name in order
     ]
 
 
-def trained(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
-    """Return row -> the metrics of its finished seeds, in order; rows without a finished seed are left out."""
+Rows = dict[str, list[dict[str, Any]]]
+"""Row of a table -> metrics of each seed, `undisturbed` and `pushed`."""
+
+
+def measure_trained(out: Path, walks: PushedWalks) -> Rows:
+    """Measure the finished seeds of each row of `ABLATIONS`, in order; rows without a finished seed are left out."""
     rows = {}
     for name in ABLATIONS:
-        folders = sorted((out / name).glob("seed-*"), key=lambda each: int(each.name.removeprefix("seed-")))
-        done = [folder for folder in folders if is_finished(folder)]
-        if done:
-            rows[name] = [measured(each / RESULT, how, name, partial(how.of, str(each))) for each in done]
+        folders = sorted((out / name).glob("seed-*"), key=lambda folder: int(folder.name.removeprefix("seed-")))
+        finished = [folder for folder in folders if is_finished(folder)]
+        if finished:
+            rows[name] = [
+                kept_metrics(folder / RESULT, walks, name, partial(walks.metrics, str(folder))) for folder in finished
+            ]
     return rows
 
 
-def inputs(out: Path, how: PushedWalks) -> dict[str, list[dict[str, Any]]]:
-    """Return row -> the metrics of the fixed schedule, for each of `INPUTS` and for the ankle's angle alone as
-    equilibrium."""
-    own = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
-    rows: dict[str, list[dict[str, Any]]] = {}
+def measure_inputs(out: Path, walks: PushedWalks) -> Rows:
+    """Measure the fixed schedule with each of `INPUTS`, and with the ankle's angle alone as rest angle."""
+    tuned = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
+    rows: Rows = {}
     for number, (name, change) in enumerate(INPUTS.items()):
-        legs = change(own)
-        make = partial(how.of, "schedule", legs=legs)
-        rows[name] = [measured(out / f"input-{number}.json", how, vars(legs), make)]
-    make = partial(how.of, "schedule", {"equilibrium": "angle"})
-    return rows | {"θ_eq: people's ankle angle alone": [measured(out / "input-angle.json", how, vars(own), make)]}
+        legs = change(tuned)
+        make = partial(walks.metrics, "schedule", legs=legs)
+        rows[name] = [kept_metrics(out / f"input-{number}.json", walks, vars(legs), make)]
+    make = partial(walks.metrics, "schedule", {"equilibrium": "angle"})
+    of_angle = kept_metrics(out / "input-angle.json", walks, vars(tuned), make)
+    return rows | {"θ_eq: people's ankle angle alone": [of_angle]}
 
 
-def fixed(out: Path, how: PushedWalks, constant: tuple[float, float] | None) -> dict[str, list[dict[str, Any]]]:
+def measure_springs(out: Path, walks: PushedWalks, constant: tuple[float, float] | None) -> Rows:
     """Measure the thesis's straight lines, and before them a `constant` (ankle, toe) [N m/rad] if given."""
     names = {"thesis lines": "thesis"}
     if constant is not None:
         names = {"best fixed spring": "constant:{:g},{:g}".format(*constant)} | names
     return {
-        f"{label} (`{name}`)": [measured(out / f"{name.partition(':')[0]}.json", how, name, partial(how.of, name))]
+        f"{label} (`{name}`)": [
+            kept_metrics(out / f"{name.partition(':')[0]}.json", walks, name, partial(walks.metrics, name))
+        ]
         for label, name in names.items()
     }
 
 
-Rows = dict[str, list[dict[str, Any]]]
-"""Name -> metrics of each seed."""
-
-
 def rows_table(rows: Rows, head: str, people: bool = False) -> str:
-    """Return the Markdown table of `ABLATION_COLUMNS`, mean ± SD (n - 1) over the seeds of each row."""
+    """Return the Markdown table of `ABLATION_COLUMNS`, mean ± SD (n - 1) over the seeds of each row.
+
+    `head` is the label of the rows' column; with `people` the last row has people's numbers.
+    """
     lines = []
     for name, seeds in rows.items():
         cells = [name, str(len(seeds))]
-        for each in ABLATION_COLUMNS:
-            values = [value for value in map(each.of, seeds) if value is not None]
-            whole = each.path[-1] == "falls" and len(values) == 1
-            cells.append(plus_minus(mean_sd(values), ".0f" if whole else each.pattern))
+        for column in ABLATION_COLUMNS:
+            values = [value for value in map(column.of, seeds) if value is not None]
+            is_count = column.path[-1] == "falls" and len(values) == 1
+            cells.append(plus_minus(mean_sd(values), ".0f" if is_count else column.pattern))
         lines.append(cells)
     if people:
-        theirs = people_metrics(BipedSettings())
-        known = theirs | {"speed_m_s": {"mean": theirs["speed_m_s"]}}
-        known["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in theirs["moments"].items()}
-        lines.append(["people", MISSING, *(_known(known, each) for each in ABLATION_COLUMNS)])
-    return table([head, "seeds", *(each.label for each in ABLATION_COLUMNS)], lines)
+        of_people = people_metrics(BipedSettings())
+        nested = of_people | {"speed_m_s": {"mean": of_people["speed_m_s"]}}
+        nested["moments"] = {name: {"peak_Nm_kg": peak} for name, peak in of_people["moments"].items()}
+        lines.append(["people", MISSING, *(_people_cell(nested, column) for column in ABLATION_COLUMNS)])
+    return table([head, "seeds", *(column.label for column in ABLATION_COLUMNS)], lines)
 
 
-def _known(metrics: dict[str, Any], column: Column) -> str:
-    """Return people's number of a column; empty if there is none."""
+def _people_cell(metrics: dict[str, Any], column: Column) -> str:
+    """Return people's number of a column, from metrics nested as those of a walk without its condition; empty if there
+    is none."""
     value: Any = metrics
     for key in column.path[1:]:
         value = value.get(key) if isinstance(value, dict) else None
@@ -213,14 +222,14 @@ def _known(metrics: dict[str, Any], column: Column) -> str:
 
 
 def _numbers(tables: dict[str, Rows]) -> str:
-    """Return the CSV with a line for each seed of each row."""
+    """Return the CSV with a line for each seed of each row of each table."""
     lines = [
-        [section, row, index, *(each.of(metrics) for each in ABLATION_COLUMNS)]
-        for section, rows in tables.items()
+        [name, row, seed, *(column.of(metrics) for column in ABLATION_COLUMNS)]
+        for name, rows in tables.items()
         for row, seeds in rows.items()
-        for index, metrics in enumerate(seeds)
+        for seed, metrics in enumerate(seeds)
     ]
-    return csv_text(["table", "row", "seed", *(each.csv_name for each in ABLATION_COLUMNS)], lines)
+    return csv_text(["table", "row", "seed", *(column.csv_name for column in ABLATION_COLUMNS)], lines)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,21 +263,23 @@ class Ablations(TrainingStudy):
     @property
     def total(self) -> float:
         """Simulated time [s], without falls."""
-        rows = len(self.only or ABLATIONS) * self.seeds + len(INPUTS) + 1 + 1 + (self.constant is not None)
-        return 2 * rows * self.episodes * self.seconds
+        springs = 1 + (self.constant is not None)  # thesis lines, constant
+        rows = len(self.only or ABLATIONS) * self.seeds + len(INPUTS) + 1 + springs  # 1: the ankle's angle
+        conditions = 2  # undisturbed, pushed
+        return conditions * rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Train missing seeds, and measure."""
-        how = PushedWalks(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
+        """Train missing seeds, and measure trained policies, springs and inputs."""
+        walks = PushedWalks(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
         failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
-        rows = trained(self.runs, how)
-        springs = fixed(self.runs, how, self.constant)
+        trained = measure_trained(self.runs, walks)
+        springs = measure_springs(self.runs, walks, self.constant)
         learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
-        springs |= {f"{label} (`{name}`)": rows[name] for name, label in learned.items() if name in rows}
-        explained = {f"`{name}`: {MEANING[name]}": each for name, each in rows.items()}
-        tables = {"SPRINGS": springs, "ABLATIONS": explained, "INPUTS": inputs(self.runs, how)}
+        springs |= {f"{label} (`{name}`)": trained[name] for name, label in learned.items() if name in trained}
+        explained = {f"`{name}`: {MEANING[name]}": seeds for name, seeds in trained.items()}
+        tables = {"SPRINGS": springs, "ABLATIONS": explained, "INPUTS": measure_inputs(self.runs, walks)}
         heads = {"SPRINGS": "spring", "ABLATIONS": "training", "INPUTS": "fixed schedule"}
-        ran = f"{how.sentence} Mean ± SD over training seeds."
-        texts = {name: rows_table(each, heads[name], people=name == "SPRINGS") for name, each in tables.items()}
-        text = "\n\n".join([*texts.values(), ran])
+        note = f"{walks.sentence} Mean ± SD over training seeds."
+        texts = {name: rows_table(rows, heads[name], people=name == "SPRINGS") for name, rows in tables.items()}
+        text = "\n\n".join([*texts.values(), note])
         return Answer(text=text, files={"ablations.csv": _numbers(tables)}, failed=failed)

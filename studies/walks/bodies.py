@@ -44,7 +44,7 @@ BODY_COLUMNS = (
     *((f"RMSE {joint} °", f"{joint}_rmse_deg", ".1f", abs) for joint in COMPARED_JOINTS),
     ("vertical force r", VERTICAL_R, ".3f", lambda r: -r),
 )
-"""Label, column, format, and the badness of a value."""
+"""Label, column of pairs.csv, format, and a function that is larger for a worse value."""
 
 
 def draw_pairs(settings: BipedSettings, pairs: int, seed: int = 0) -> dict[str, NDArray]:
@@ -58,7 +58,7 @@ def draw_pairs(settings: BipedSettings, pairs: int, seed: int = 0) -> dict[str, 
 def walk_pairs(
     policy: PolicyFunction,
     settings: BipedSettings,
-    who: Mapping[str, NDArray],
+    subjects: Mapping[str, NDArray],
     *,
     name: str,
     seed: int = 0,
@@ -66,14 +66,18 @@ def walk_pairs(
     block: int = BATCH,
     progress: OnProgress = lambda seconds: None,
 ) -> list[dict[str, Any]]:
-    """Walk one episode of each pair, and return its numbers as in pairs.csv (docs/reference/metrics.md).
+    """Walk one episode with each pair of body and speed; return a row of pairs.csv for each.
 
-    None stands for a number that could not be measured. Arguments as for `recording.record_each`; `block` pairs walk at
-    a time, whose series are then freed.
+    Args:
+        policy, settings, name, seed, threads, progress: as for `recording.record_each`.
+        subjects: `height` [m], `mass` [kg] and `speed` [m/s], (pairs,) each, as from `draw_pairs`.
+        block: number of pairs that walk at a time; their series are freed before the next.
+
+    docs/reference/metrics.md explains the columns; None stands for a number that could not be measured.
     """
     rows = []
-    for first in range(0, len(who["height"]), block):
-        part = {key: values[first : first + block] for key, values in who.items()}
+    for first in range(0, len(subjects["height"]), block):
+        part = {key: values[first : first + block] for key, values in subjects.items()}
         recordings = record_each(
             policy, settings, part, name=name, seed=seed + first, threads=threads, progress=progress
         )
@@ -102,45 +106,47 @@ def _row(recording: Recording) -> dict[str, Any]:
 
 
 def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, Any]] = ()) -> str:
-    """Return the Markdown table of the pairs: falls, and without them the median, the 95 % bound and the worst of each
-    number.
+    """Return the Markdown table of the pairs, and below it the first falls one by one.
 
-    Falls, speed and angles of the policy's open-loop `copy` on the same pairs stand beside.
+    The table has the number of falls, and median, 95 % bound and worst value of each number over the pairs that did not
+    fall; beside them the same of the policy's open-loop `copy` on the same pairs.
     """
     lines: list[list[str]] = [["falls", _falls(rows), "", "", "", *([_falls(copy), "", ""] if copy else [])]]
     for label, column, pattern, badness in BODY_COLUMNS:
         if standing := _standing(rows, column, badness):
-            line = [label, *_spread(standing, column, pattern), _who(standing[-1])]
+            line = [label, *_spread(standing, column, pattern), _subject(standing[-1])]
             if copy:
-                beside = _standing(copy, column, badness) if column != VERTICAL_R else []
-                line += _spread(beside, column, pattern) if beside else ["", "", ""]
+                copy_standing = _standing(copy, column, badness) if column != VERTICAL_R else []
+                line += _spread(copy_standing, column, pattern) if copy_standing else ["", "", ""]
             lines.append(line)
     columns = ("median", "95 % within", "worst")
-    text = table(["", *columns, "worst pair", *(f"{OPEN_LOOP}: {each}" for each in columns if copy)], lines)
+    text = table(["", *columns, "worst pair", *(f"{OPEN_LOOP}: {name}" for name in columns if copy)], lines)
     fallen = [row for row in rows if row["fall"]]
-    told = [f"{_who(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
-    return "\n".join([text, "", *told]).rstrip("\n")
+    falls = [f"{_subject(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
+    return "\n".join([text, "", *falls]).rstrip("\n")
 
 
 def _falls(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the number of pairs that fell, as in "2 of 300"."""
     return f"{sum(bool(row['fall']) for row in rows)} of {len(rows)}"
 
 
 def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
-    """Return the pairs without a fall, the worst last."""
+    """Return the pairs that did not fall and have a number in the column, the worst last."""
     return sorted(
         (row for row in rows if not row["fall"] and row[column] is not None), key=lambda row: badness(row[column])
     )
 
 
 def _spread(standing: Sequence[Mapping[str, Any]], column: str, pattern: str) -> list[str]:
-    """Return median, 95 % bound and worst value of a column, as words."""
+    """Return median, 95 % bound and worst magnitude of a column, as text, from pairs with the worst last."""
     size = [abs(row[column]) for row in standing]
-    most = size[int(np.ceil(0.95 * len(size))) - 1]
-    return [format(value, pattern) for value in (np.median(size), most, size[-1])]
+    bound = size[int(np.ceil(0.95 * len(size))) - 1]
+    return [format(value, pattern) for value in (np.median(size), bound, size[-1])]
 
 
-def _who(row: Mapping[str, Any]) -> str:
+def _subject(row: Mapping[str, Any]) -> str:
+    """Return body and speed of a pair, in words."""
     return f"{row['height_m']:.2f} m, {row['mass_kg']:.0f} kg, {row['speed_m_s']:.2f} m/s"
 
 
@@ -177,15 +183,15 @@ class Bodies(Study):
         return len(and_copy(self.policy)) * self.pairs * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every pair."""
+        """Walk every pair with the policy and its open-loop copy."""
         conditions = RANGES | {"episode_seconds": self.seconds} | given(self.environment)
         settings = policy_and_settings(self.policy, conditions, self.seed)[1]
-        who = draw_pairs(settings, self.pairs, self.seed)
+        subjects = draw_pairs(settings, self.pairs, self.seed)
         how = {"seed": self.seed, "threads": self.threads}
         walks = []
         for name in and_copy(self.policy):
             prepared = policy_and_settings(name, conditions, self.seed, self.threads)
-            walks.append(walk_pairs(*prepared, who, name=policy_label(name), progress=progress, **how))
+            walks.append(walk_pairs(*prepared, subjects, name=policy_label(name), progress=progress, **how))
         clamped = sum(row["people_clamped"] for row in walks[0])
         text = (
             f"{pairs_table(*walks)}\n\n`{self.policy}`, {self.pairs} pairs × {settings.episode_seconds:g} s, seed "

@@ -70,7 +70,7 @@ class Contender(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Row:
-    """Episodes of one policy in numbers."""
+    """Numbers of one policy's episodes: a row of the tables."""
 
     name: str
     """Name of the policy in tables."""
@@ -87,9 +87,9 @@ class Row:
         return mean_interval(self.returns)
 
     def difference(self, first: "Row") -> tuple[float, float, float] | None:
-        """Return the mean return of `first` less this row's, and its interval.
+        """Return the mean return of `first` less this row's, and the ends of its 95 % interval.
 
-        None if the rows have other commanded speeds or other rewards.
+        None if the rows differ in commanded speed or reward, so that their returns do not compare.
         """
         if any(self.metrics["environment"].get(name) != first.metrics["environment"].get(name) for name in COMPARABLE):
             return None
@@ -98,7 +98,7 @@ class Row:
 
 
 def run_row(name: str, policy: PolicyFunction, settings: BipedSettings, **how: Any) -> Row:
-    """Record (`episodes`, `seed`, `threads`, `progress` as for `recording.record`) and measure a policy."""
+    """Record and measure a policy; `how` has `episodes`, `seed`, `threads`, `progress` as for `recording.record`."""
     recording = record(policy, settings, name=name, **how)
     fell = recording.fall_reason != ""
     return Row(name=name, metrics=measure(recording).metrics, returns=recording.returns, fell=fell)
@@ -112,16 +112,17 @@ def contenders(
     seed: int = 0,
     threads: int = 2,
 ) -> list[Contender]:
-    """Return the policy `name`, its open-loop copy, and the springs to compare it with, in its own environment.
+    """Return the policy `name`, its open-loop copy (`with_copy`) and the springs to compare it with (`springs_beside`).
 
-    `given` are environment settings that differ from the evaluation's standard conditions and the policy's own.
+    All walk in the policy's own environment. `given` are environment settings that differ from the evaluation's
+    standard conditions and the policy's own; `constant` and `factor` as for `springs_beside`.
     """
     return with_copy(name, given, seed, threads) + springs_beside(name, given, constant, factor, seed)
 
 
 def with_copy(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> list[Contender]:
-    """Return the policy `name` and, for a policy with feedback, its open-loop copy."""
-    return [Contender(each, *policy_and_settings(each, given, seed, threads)) for each in and_copy(name)]
+    """Return the policy `name` and, if it has feedback, its open-loop copy."""
+    return [Contender(row_name, *policy_and_settings(row_name, given, seed, threads)) for row_name in and_copy(name)]
 
 
 def springs_beside(
@@ -138,18 +139,18 @@ def springs_beside(
     and as printed; random actions. Each row pays for changes of its own action.
     """
     _, settings = policy_and_settings(name, given, seed)
-    found = []
-    for each in rivals(constant, factor):
-        own = settings_to_json(settings) | own_settings(each, settings)
-        found.append(Contender(each, *policy_and_settings(each, own, seed)))
-        if each == "quasi_stiffness" and settings.speed == BipedSettings.speed:
-            faster = policy_and_settings(each, own | {"speed": QUASI_SPEED}, seed)
-            found.append(Contender(f"{each}, commanded {QUASI_SPEED:g} m/s", *faster))
-    return found
+    springs = []
+    for baseline in spring_names(constant, factor):
+        conditions = settings_to_json(settings) | own_settings(baseline, settings)
+        springs.append(Contender(baseline, *policy_and_settings(baseline, conditions, seed)))
+        if baseline == "quasi_stiffness" and settings.speed == BipedSettings.speed:
+            faster = policy_and_settings(baseline, conditions | {"speed": QUASI_SPEED}, seed)
+            springs.append(Contender(f"{baseline}, commanded {QUASI_SPEED:g} m/s", *faster))
+    return springs
 
 
-def rivals(constant: tuple[float, float] | None, factor: float | None) -> list[str]:
-    """Return the names of the baselines among the contenders."""
+def spring_names(constant: tuple[float, float] | None, factor: float | None) -> list[str]:
+    """Return the names of the baselines that `springs_beside` compares a policy with."""
     names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
     names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
     return [*names, "constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]
@@ -168,7 +169,7 @@ def comparison_table(rows: Sequence[Row]) -> str:
         p = ""
         if row is not first:
             difference = row.difference(first)
-            ahead = "–" if difference is None else "{:.1f} [{:.1f}, {:.1f}]".format(*difference)
+            ahead = MISSING if difference is None else "{:.1f} [{:.1f}, {:.1f}]".format(*difference)
             p = f"{paired_p(first.fell, row.fell):.2g}"
         speed = text_of(m["speed_m_s"]["mean"], ".3f")
         lines.append([f"`{row.name}`", falls, p, f"{row.returns.mean():.1f}", ahead, speed, rmse_text(m)])
@@ -179,54 +180,58 @@ def verdict(rows: Sequence[Row]) -> str:
     """Return, in words, the rows that the first row is ahead of in return and in falls, and the rows that it is not."""
     first, *others = rows
     differences = [row.difference(first) for row in others]
-    behind = [
+    not_beaten = [
         row.name
         for row, difference in zip(others, differences, strict=True)
         if difference is not None and difference[1] <= 0.0
     ]
-    known = sum(difference is not None for difference in differences)
-    fewer = [
+    compared = sum(difference is not None for difference in differences)
+    fall_more = [
         row.name for row in others if paired_p(first.fell, row.fell) < SIGNIFICANT and first.fell.sum() < row.fell.sum()
     ]
-    alike = [row.name for row in others if row.name not in fewer]
+    no_more_falls = [row.name for row in others if row.name not in fall_more]
     return (
-        f"{first.name} earns more than {known - len(behind)} of {known} rows (interval above 0)"
-        f"{'; not more than ' + ', '.join(behind) if behind else ''}. It falls less often than {len(fewer)} of "
-        f"{len(others)} (p < {SIGNIFICANT:g}){'; not less than ' + ', '.join(alike) if alike else ''}."
+        f"{first.name} earns more than {compared - len(not_beaten)} of {compared} rows (interval above 0)"
+        f"{'; not more than ' + ', '.join(not_beaten) if not_beaten else ''}. It falls less often than "
+        f"{len(fall_more)} of {len(others)} (p < {SIGNIFICANT:g})"
+        f"{'; not less than ' + ', '.join(no_more_falls) if no_more_falls else ''}."
     )
 
 
 def spread_table(rows: Sequence[Row]) -> str:
-    """Return the Markdown table with a line for each number and a column for each policy, and their mean ± SD (n -
-    1)."""
+    """Return the Markdown table with a line for each of `WALK_COLUMNS` and a column for each policy, the last with
+    their mean ± SD (n - 1)."""
     lines = []
-    for each in WALK_COLUMNS:
-        values = [each.of(row.metrics) for row in rows]
+    for column in WALK_COLUMNS:
+        values = [column.of(row.metrics) for row in rows]
         spread = mean_sd([] if None in values else values)
-        mean = plus_minus(spread, ".1f" if each.pattern == "d" else each.pattern, alone=False)
-        lines.append([each.label, *(text_of(value, each.pattern) for value in values), mean])
+        mean = plus_minus(spread, ".1f" if column.pattern == "d" else column.pattern, alone=False)
+        lines.append([column.label, *(text_of(value, column.pattern) for value in values), mean])
     return table(["", *(f"`{row.name}`" for row in rows), "mean ± SD"], lines)
 
 
 def elsewhere_table(name: str, rows: Sequence[tuple[str, Sequence[Row]]]) -> str:
-    """Return the Markdown table with a line for each condition, of the policy `name` and its open-loop copy if it has
-    one."""
+    """Return the Markdown table with a line for each condition, of the policy `name` and its open-loop copy.
+
+    `rows` are conditions in words, each with the policy's row and, if it has a copy that walks, the copy's.
+    """
     lines = []
-    for words, (own, *copies) in rows:
-        m = own.metrics
+    for words, (row, *copies) in rows:
+        m = row.metrics
         peaks = " / ".join(text_of(m["grf"][f"vertical_peak{peak}_bw"], ".2f") for peak in (1, 2))
         largest = text_of(m["grf"]["vertical_max_bw"], ".2f")
-        walked = [cell for copy in copies for cell in _walked(copy.metrics)]
-        lines.append([words or "(none)", *_walked(m), peaks, largest, *walked])
+        of_copies = [cell for copy in copies for cell in _walk_cells(copy.metrics)]
+        lines.append([words or "(none)", *_walk_cells(m), peaks, largest, *of_copies])
     columns = ["falls", "speed m/s", "RMSE thigh / knee / ankle °"]
-    beside = [f"{OPEN_LOOP}: {column}" for column in columns] * (max(len(row) for _, row in rows) - 1)
-    lines = [[*line, *[MISSING] * (6 + len(beside) - len(line))] for line in lines]
-    return table([f"`{name}` with", *columns, "peaks 1 / 2 BW", "largest 10 ms BW", *beside], lines)
+    copy_columns = [f"{OPEN_LOOP}: {column}" for column in columns] * (max(len(row) for _, row in rows) - 1)
+    head = [f"`{name}` with", *columns, "peaks 1 / 2 BW", "largest 10 ms BW", *copy_columns]
+    return table(head, [[*line, *[MISSING] * (len(head) - len(line))] for line in lines])
 
 
-def _walked(m: dict[str, Any]) -> list[str]:
-    rest = "" if m["came_to_rest"] is None else f", {m['came_to_rest']} at rest"
-    return [falls_text(m) + rest, text_of(m["speed_m_s"]["mean"], ".3f"), rmse_text(m)]
+def _walk_cells(m: dict[str, Any]) -> list[str]:
+    """Return the cells of one walk: falls (and how many came to rest), speed, RMSE."""
+    at_rest = "" if m["came_to_rest"] is None else f", {m['came_to_rest']} at rest"
+    return [falls_text(m) + at_rest, text_of(m["speed_m_s"]["mean"], ".3f"), rmse_text(m)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,7 +272,8 @@ class Compare(WalkingStudy):
     def total(self) -> float:
         """Simulated time [s], without falls."""
         names = sum(len(and_copy(name)) for name in self.policies)
-        springs = self.springs * (len({*rivals(self.constant, self.factor)} - {*self.policies}) + 1)  # one faster
+        baselines = {*spring_names(self.constant, self.factor)} - {*self.policies}
+        springs = self.springs * (len(baselines) + 1)  # quasi-stiffness walks at two speeds
         rows = len(self.pushes) * (names + springs) + self.world * len(WORLD) * names
         return rows * self.episodes * self.seconds
 
@@ -277,33 +283,34 @@ class Compare(WalkingStudy):
         lines = []
         for push in self.pushes:
             conditions = self._conditions | {"push_newton": push}
-            found = [row for name in self.policies for row in with_copy(name, conditions, self.seed, self.threads)]
+            compared = [row for name in self.policies for row in with_copy(name, conditions, self.seed, self.threads)]
             if self.springs:
                 springs = springs_beside(next(iter(self.policies)), conditions, self.constant, self.factor, self.seed)
-                found += [each for each in springs if each.name not in self.policies]
-            rows = [run_row(*each, **self.how, progress=progress) for each in found]
+                compared += [spring for spring in springs if spring.name not in self.policies]
+            rows = [run_row(*contender, **self.how, progress=progress) for contender in compared]
             parts += [f"**{what_ran(self, rows[0])}**", comparison_table(rows), verdict(rows)]
             if len(self.policies) > 1:
                 parts.append(spread_table([row for row in rows if row.name in self.policies]))
-            lines += [(_ends(push, row, rows[0]), row.metrics) for row in rows]
+            lines += [(_csv_labels(push, row, rows[0]), row.metrics) for row in rows]
         parts.append(INTERVALS)
         files = {"compare.csv": walks_csv(lines)}
         if self.world:
-            walked = {name: self._elsewhere(name, progress) for name in self.policies}
-            parts += [elsewhere_table(name, rows) for name, rows in walked.items()]
+            elsewhere = {name: self._elsewhere(name, progress) for name in self.policies}
+            parts += [elsewhere_table(name, rows) for name, rows in elsewhere.items()]
             parts.append(f"{self.what_ran} of each row.")
             files["world.csv"] = walks_csv(
                 [
                     ({"policy": row.name, "conditions": words}, row.metrics)
-                    for rows in walked.values()
-                    for words, beside in rows
-                    for row in beside
+                    for conditions in elsewhere.values()
+                    for words, rows in conditions
+                    for row in rows
                 ]
             )
         return Answer(text="\n\n".join(parts), files=files)
 
     @property
     def _conditions(self) -> dict[str, Any]:
+        """Return the environment settings of all rows."""
         return {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)
 
     def _with_copy_if_it_walks(self, name: str, conditions: dict[str, Any]) -> list[Contender]:
@@ -315,17 +322,17 @@ class Compare(WalkingStudy):
             return [alone]
 
     def _elsewhere(self, name: str, progress: OnProgress) -> list[tuple[str, list["Row"]]]:
-        """Walk a policy and its open-loop copy under each of `WORLD`; return each condition in words and its rows."""
-        found = []
+        """Walk a policy and its open-loop copy under each of `WORLD`; return each condition in words, with its rows."""
+        walked = []
         for conditions in WORLD:
-            beside = self._with_copy_if_it_walks(name, self._conditions | conditions)
+            contenders = self._with_copy_if_it_walks(name, self._conditions | conditions)
             words = ", ".join(f"{key} {value}" for key, value in conditions.items())
-            found.append((words, [run_row(*each, **self.how, progress=progress) for each in beside]))
-        return found
+            walked.append((words, [run_row(*contender, **self.how, progress=progress) for contender in contenders]))
+        return walked
 
 
-def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
-    """Return the first columns of a row of compare.csv."""
+def _csv_labels(push: float, row: Row, first: Row) -> dict[str, Any]:
+    """Return the first columns of a row of compare.csv: name, push, intervals of falls and return, lead of `first`."""
     difference = row.difference(first) or (None, None, None)
     falls = share_interval(row.metrics["falls"], row.metrics["episodes"])
     return {
@@ -339,12 +346,11 @@ def _ends(push: float, row: Row, first: Row) -> dict[str, Any]:
 
 
 def what_ran(study: WalkingStudy, row: Row) -> str:
-    """Return a sentence on the episodes of a table."""
-    ran = row.metrics["environment"]
+    """Return a sentence on the episodes and pushes of a table, from one of its rows."""
+    settings = row.metrics["environment"]
     pushes = "no pushes"
-    if ran["push_newton"]:
-        pushes = (
-            f"pushes ±{ran['push_newton']:g} N × {ran['push_seconds']:g} s, one in every {ran['push_interval']:g} s"
-        )
+    if settings["push_newton"]:
+        size = f"±{settings['push_newton']:g} N × {settings['push_seconds']:g} s"
+        pushes = f"pushes {size}, one in every {settings['push_interval']:g} s"
     last = study.seed + study.episodes - 1
-    return f"{study.episodes} episodes × {ran['episode_seconds']:g} s, seeds {study.seed}–{last}, {pushes}."
+    return f"{study.episodes} episodes × {settings['episode_seconds']:g} s, seeds {study.seed}–{last}, {pushes}."

@@ -30,11 +30,11 @@ KEYS = ("timesteps", "seconds", "return_mean", "falls")
 
 
 def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """Return the first periodic evaluation from which on no episode fell; None if there is none."""
-    steady = None
+    """Return the first of the periodic evaluations without a fall up to the last; None if the last has falls."""
+    first = None
     for entry in evaluations:
-        steady = None if entry["falls"] else steady or entry
-    return steady
+        first = None if entry["falls"] else first or entry
+    return first
 
 
 def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
@@ -57,9 +57,9 @@ def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class LearningCurves(WalkingStudy):
-    """Draw learning curves of several runs of the same training, and tell whether each learned to walk.
+    """Draw learning curves of several runs of the same training, and report whether each learned to walk.
 
-    Tells the wall time of each whole training, the step from which no evaluation episode fell, and the criteria of a
+    Reports the wall time of each whole training, the step from which no evaluation episode fell, and the criteria of a
     walk that its best policy misses.
     """
 
@@ -78,7 +78,7 @@ class LearningCurves(WalkingStudy):
         return len(self.runs) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Evaluate every run."""
+        """Evaluate the best policy of every run."""
         runs = {folder.name: read_finished(folder) for folder in self.runs}
         lines = []
         walks = []
@@ -86,9 +86,9 @@ class LearningCurves(WalkingStudy):
             policy, settings = policy_and_settings(str(folder), {"episode_seconds": self.seconds}, self.seed)
             metrics = measure(record(policy, settings, name=name, progress=progress, **self.how)).metrics
             steady = first_without_falls(run["evaluations"])
-            when = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else MISSING
+            no_falls_from = f"{steady['timesteps']:,} steps, {steady['seconds']:.0f} s" if steady else MISSING
             missed = ", ".join(unmet(metrics, WALKS)) or "nothing"
-            lines.append([name, f"{run['seconds']:.0f}", f"{run['timesteps']:,}", when, missed])
+            lines.append([name, f"{run['seconds']:.0f}", f"{run['timesteps']:,}", no_falls_from, missed])
             walks.append(({"run": name} | {f"training_{key}": run[key] for key in ("seconds", "timesteps")}, metrics))
         head = ["run", "wall time s", "steps", "no falls from"]
         head.append(f"missed over {self.episodes} episodes × {self.seconds:g} s")
@@ -105,12 +105,12 @@ class LearningCurves(WalkingStudy):
 
 
 def read_finished(folder: Path) -> dict[str, Any]:
-    """Return the record of a finished run, with the time of every evaluation."""
+    """Return the record of a run; raise `SpringfootError` unless it has the time and steps of every evaluation."""
     try:
         record_of_run = read_record(folder)
-        for timed in (record_of_run, *record_of_run["evaluations"]):
-            require_number("seconds", timed["seconds"], 0.0, unit="s")
-            require_count("timesteps", timed["timesteps"], 0)
+        for entry in (record_of_run, *record_of_run["evaluations"]):
+            require_number("seconds", entry["seconds"], 0.0, unit="s")
+            require_count("timesteps", entry["timesteps"], 0)
     except (SpringfootError, KeyError):
         raise SpringfootError(
             f"{folder} holds no {RUN} with timed evaluations: give a run folder of train.py"

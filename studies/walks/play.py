@@ -72,7 +72,7 @@ class Play(WalkingStudy):
 
     @property
     def grid(self) -> Grid:
-        """Points to record."""
+        """Return the points to record: every combination of foot, speed and factors."""
         return Grid(feet=self.feet, speed=self.speed, toe=self.toe, ankle=self.ankle)
 
     @property
@@ -81,7 +81,7 @@ class Play(WalkingStudy):
         return self.grid.size * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk at every point."""
+        """Walk at every point of the grid, and write the page."""
         recordings = [
             walk for foot, speed in product(self.feet, self.speed) for walk in self._walks(foot, speed, progress)
         ]
@@ -91,12 +91,15 @@ class Play(WalkingStudy):
             "1.70 m and 63 kg."
         )
         versions = (f"{name} {number}" for name, number in versions_and_commit(PAGE_PACKAGES)["versions"].items())
-        how = "\n".join([f"command: {without_places(self.command)}", f"seeds from {self.seed} on", *versions])
-        page = play_page(self.grid, recordings, words, how)
-        falls = np.array([each["falls"] for each in page.numbers]).reshape(len(self.feet), len(self.speed), -1)
+        made_by = "\n".join([f"command: {without_places(self.command)}", f"seeds from {self.seed} on", *versions])
+        page = play_page(self.grid, recordings, words, made_by)
+        # (feet, speeds, pairs of factors) number of episodes that fell.
+        falls = np.array([point["falls"] for point in page.numbers]).reshape(len(self.feet), len(self.speed), -1)
+        never = (falls == 0).sum(axis=2)
+        always = (falls == self.episodes).sum(axis=2)
         rows = [
-            [foot.replace("_", " "), *(f"{(own == 0).sum()} / {(own == self.episodes).sum()}" for own in of_foot)]
-            for foot, of_foot in zip(self.feet, falls, strict=True)
+            [foot.replace("_", " "), *(f"{n} / {a}" for n, a in zip(never[index], always[index], strict=True))]
+            for index, foot in enumerate(self.feet)
         ]
         text = (
             f"{words}\n\n{table(['right foot', *(f'{speed:g} m/s' for speed in self.speed)], rows)}\n\n"
@@ -105,17 +108,17 @@ class Play(WalkingStudy):
         return Answer(text=text, files={PAGE_NAME: page.text})
 
     def _walks(self, foot: str, speed: float, progress: OnProgress) -> Iterator[Recording]:
-        """Yield a recording of each pair of factors, the ankle's changing fastest, as many side by side as a batch
-        takes."""
+        """Yield a recording for each pair of factors, the ankle's changing fastest; a batch walks many pairs at
+        once."""
         conditions = {"right_foot": foot, "speed": speed, "episode_seconds": self.seconds}
         policy, settings = policy_and_settings(self.policy, conditions, self.seed, self.threads)
         if settings.action_mode != "absolute":
             raise SpringfootError(f"policy must set K itself (action_mode absolute), got {self.policy}")
         pairs = np.array([(ankle, toe) for toe, ankle in product(self.toe, self.ankle)])
-        side_by_side = BATCH // self.episodes
-        for begin in range(0, len(pairs), side_by_side):
-            factor = np.repeat(pairs[begin : begin + side_by_side], self.episodes, axis=0)
-            whole = record(
+        pairs_per_batch = BATCH // self.episodes
+        for begin in range(0, len(pairs), pairs_per_batch):
+            factor = np.repeat(pairs[begin : begin + pairs_per_batch], self.episodes, axis=0)
+            batch = record(
                 _scaled(policy, factor, settings),
                 settings,
                 name=self.policy,
@@ -125,7 +128,7 @@ class Play(WalkingStudy):
                 progress=progress,
             )
             for first in range(0, len(factor), self.episodes):
-                yield episodes_of(whole, np.arange(first, first + self.episodes))
+                yield episodes_of(batch, np.arange(first, first + self.episodes))
 
 
 def _scaled(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) -> PolicyFunction:
@@ -133,8 +136,8 @@ def _scaled(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) ->
     body = body_of(settings)
 
     def scaled(observation: NDArray) -> NDArray:
-        own = policy(observation).astype(float).reshape(-1, len(SIDES), len(SPRINGS))
-        stiffness = stiffness_of(own, settings, body) * factor[:, None]
+        action = policy(observation).astype(float).reshape(-1, len(SIDES), len(SPRINGS))
+        stiffness = stiffness_of(action, settings, body) * factor[:, None]
         return action_of(stiffness, settings, body).reshape(len(factor), -1).astype(np.float32)
 
     return scaled

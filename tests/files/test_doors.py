@@ -16,8 +16,8 @@ from springfoot.files.text_table import read_bytes, read_csv
 from springfoot.gait.people.human import harmonics
 from springfoot.gait.plan.walk_style import styles_of
 from springfoot.studies.base.kept import Kept
+from springfoot.studies.searches.cma_search import generations
 from springfoot.studies.searches.constants_file import read_constants, read_feet
-from springfoot.studies.searches.kept_search import generations
 
 
 def search(path):

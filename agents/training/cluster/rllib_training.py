@@ -51,6 +51,8 @@ CHECKPOINT = "ray-"
 """First part of a checkpoint's folder name; the timesteps follow."""
 _RECORD = "springfoot.json"
 """File of a checkpoint: the run's sessions, evaluations, timesteps and seconds at its time."""
+_VALUE_WEIGHT, _GRADIENT_NORM = 0.5, 0.5
+"""Weight of the critic's loss, and largest norm of a gradient, as in stable-baselines3's PPO."""
 _ENVIRONMENT = "springfoot-batch"
 """Name under which RLlib finds our environments."""
 
@@ -246,9 +248,9 @@ class _Run:
                 clip_param=config.clip_range,
                 use_kl_loss=False,
                 entropy_coeff=0.0,
-                vf_loss_coeff=0.5,
+                vf_loss_coeff=_VALUE_WEIGHT,
                 vf_clip_param=float("inf"),
-                grad_clip=0.5,
+                grad_clip=_GRADIENT_NORM,
                 grad_clip_by="global_norm",
             )
             .fault_tolerance(restart_failed_env_runners=True)

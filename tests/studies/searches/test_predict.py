@@ -12,7 +12,7 @@ from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
 from springfoot.gait.plan.walk_style import STYLES
-from springfoot.studies.searches.kept_search import generations
+from springfoot.studies.searches.cma_search import generations
 from springfoot.studies.searches.prediction_table import PREDICTION, people_numbers, plan_numbers, prediction_table
 
 

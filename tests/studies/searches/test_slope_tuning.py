@@ -77,7 +77,7 @@ def test_better_numbers_are_written_with_their_command_and_worse_ones_are_not(mo
     words = ["--generations", "3", "--population", "6", "--walks", "1", "--seconds", "3", "--sigma", "0.4"]
     assert run(*words, "--constants", constants) == 0
     after, said = json.loads(constants.read_text()), capsys.readouterr().out
-    assert "wrote what it found" in said
+    assert "wrote the constants it ended with" in said
     assert after["constants"] == table["constants"] and after["slope"]["constants"] != table["slope"]["constants"]
     assert after["slope"]["found_by"].startswith("springfoot study slope-tuning --threads 1 --generations 3")
 

@@ -25,7 +25,7 @@ from springfoot.studies.springs.stiffness_responses import (
     MANY_STRIDES_SPEED,
     TORQUE,
     csv_rows,
-    response,
+    summarise,
 )
 from springfoot.studies.springs.stiffness_steps import CELLS, DURATIONS, FIXED, MOVEMENT, PairedWalks
 
@@ -48,24 +48,24 @@ def walks(scale=1.0):
 
 
 def test_a_speed_that_follows_the_acceleration_is_foretold_and_a_scrambled_one_is_not():
-    found = response(walks(), 0.1)
+    found = summarise(walks(), 0.1)
     r, low, high, scrambled = found.links[FORETOLD]
     assert r > 0.999 and low <= r <= high and scrambled < 0.01
     assert found.foretold.sum() == found.moved.sum() == len(CELLS)  # the smallest changes speed by 1.8 mm/s
     other = walks()
     order = np.random.default_rng(3).permutation(len(CELLS))
-    r, _, _, scrambled = response(replace(other, movement=other.movement[order]), 0.1).links[FORETOLD]
+    r, _, _, scrambled = summarise(replace(other, movement=other.movement[order]), 0.1).links[FORETOLD]
     assert abs(r) < 0.6 and scrambled > 0.05
 
 
 def test_the_opposite_sign_is_not_foretold():
     other = walks()
-    found = response(replace(other, movement=-other.movement), 0.1)
+    found = summarise(replace(other, movement=-other.movement), 0.1)
     assert found.links[FORETOLD][0] < -0.999 and found.foretold.sum() == 0 and found.moved.all()
 
 
 def test_intervals_hold_the_mean_and_narrow_with_the_noise():
-    found = response(walks(), 0.1)
+    found = summarise(walks(), 0.1)
     low, high = found.interval[MANY_STRIDES_SPEED].T
     assert (low <= found.mean[MANY_STRIDES_SPEED]).all() and (found.mean[MANY_STRIDES_SPEED] <= high).all()
     assert 0 < (high - low).max() < 4e-4
@@ -75,7 +75,7 @@ def test_intervals_hold_the_mean_and_narrow_with_the_noise():
 def test_a_walk_that_falls_is_counted_and_left_out_of_its_cell():
     fallen = walks()
     fallen.movement[4, 1, 2] = np.nan
-    found, whole = response(fallen, 0.1), response(walks(), 0.1)
+    found, whole = summarise(fallen, 0.1), summarise(walks(), 0.1)
     assert found.falls.sum() == found.falls[4, 1] == 1
     assert found.mean[MANY_STRIDES_SPEED][4] == pytest.approx(whole.mean[MANY_STRIDES_SPEED][4], abs=1e-4)
     for cell in set(range(len(CELLS))) - {4}:
@@ -85,7 +85,7 @@ def test_a_walk_that_falls_is_counted_and_left_out_of_its_cell():
 def test_a_cell_in_which_all_fall_has_no_number(tmp_path):
     fallen = walks()
     fallen.movement[4] = np.nan
-    found = {"as it is": response(fallen, 0.1)}
+    found = {"as it is": summarise(fallen, 0.1)}
     assert isnan(found["as it is"].mean[MANY_STRIDES_SPEED][4]) and isnan(found["as it is"].links[FORETOLD][0])
     assert "| ankle, push-off (50–62 %) | – |" in tables(Influence(), found)
     assert ",push-off,0.5,0.62,every stride,speed_m_s,many,,,,6,0\n" in csv_text(CSV_HEAD, csv_rows(found))
@@ -98,7 +98,7 @@ def test_a_cell_in_which_all_fall_has_no_number(tmp_path):
 
 
 def test_where_nothing_changes_nothing_is_claimed():
-    found = {"as it is": response(walks(0.0), 0.0)}
+    found = {"as it is": summarise(walks(0.0), 0.0)}
     assert "most here: nowhere. Elsewhere by at most 0.0 mm/s" in headline(Influence(), found)
     assert not found["as it is"].moved.any() and isnan(found["as it is"].links[FORETOLD][0])
 

@@ -98,7 +98,7 @@ def test_bad_input_is_one_line_and_nothing_on_disk(capsys, tmp_path, words, mess
 
 def test_a_table_has_mean_and_spread_over_seeds_and_people_beside_them():
     how = replace(ablations.PushedWalks(), episodes=2, seconds=0.5, threads=1)
-    one = how.of("schedule")
+    one = how.metrics("schedule")
     other = json.loads(json.dumps(one))
     for metrics, value in ((one, 1.0), (other, 2.0)):
         metrics["undisturbed"]["speed_m_s"]["mean"] = value
