@@ -211,21 +211,21 @@ class LegController:
 
 
 def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
-    """Return a leg's constants in the order of `GAINS`, scaled to the settings' body."""
+    """Return the fields of `GAINS`, in their order: a leg's constants scaled to the settings' body."""
     body = walk.body
     stride_time = walk.plan.stride_time
     scale = body.stiffness_scale
     time_scale = sqrt(body.length_scale)
     return (
-        TOUCHDOWN_LOAD * body.total_mass * GRAVITY,
-        CONTROL_WINDOW / (c.period_factor * stride_time),
-        c.period_speed_gain / time_scale,
-        radians(c.trunk_pitch_deg) + body.trunk_lean + walk.plan.lean,
+        TOUCHDOWN_LOAD * body.total_mass * GRAVITY,  # touchdown
+        CONTROL_WINDOW / (c.period_factor * stride_time),  # rate
+        c.period_speed_gain / time_scale,  # rate_gain
+        radians(c.trunk_pitch_deg) + body.trunk_lean + walk.plan.lean,  # pitch
         c.trunk_stiffness * scale,
         c.trunk_damping * scale * time_scale,
         c.speed_torque * scale / time_scale,
-        c.swing_speed_gain / time_scale,
-        c.swing_place_gain / body.length_scale,
+        c.swing_speed_gain / time_scale,  # swing_gain
+        c.swing_place_gain / body.length_scale,  # place_gain
         FARTHEST * body.length_scale,
     )
 

@@ -118,7 +118,7 @@ def _draw(held, m):
     `held` is of `HELD`, `m` the measurement of one body.
     """
     front = 0 if m.ankle[0, 0] > m.ankle[1, 0] else 1
-    push = 0.0
+    push = 0.0  # [N], half the difference of the feet's horizontal forces, positive if they push each other apart
     for contact in range(3):
         push += 0.5 * (m.force[1 - front, contact, 0] - m.force[front, contact, 0])
     torque = push * HIP_HEIGHT * held.length

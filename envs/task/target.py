@@ -47,7 +47,8 @@ def target_curves(gait: HumanGait, plan: ComPlan, step_seconds: float) -> NDArra
     step_phase = (2 * GRID) % 1.0  # of the plan's step, half a stride
     x, z = plan.com(step_phase)
     curves["com"] = np.stack((x - plan.step_length * step_phase, z), -1)
-    earlier = 2 * GRID - 0.5 * step_seconds / plan.step_time  # may lie in the plan's step before
+    # The ZMP half an environment's step earlier, which may lie in the plan's step before: then one step length behind.
+    earlier = 2 * GRID - 0.5 * step_seconds / plan.step_time
     curves["zmp"] = plan.zmp(earlier) + plan.step_length * (np.floor(earlier) - np.floor(2 * GRID) - step_phase)
     curves["speed"], _ = plan.com_velocity(step_phase)
     curves["stride_length"] = 2 * plan.step_length

@@ -119,7 +119,7 @@ class Adapt(Study):
 
     @property
     def total(self) -> float:
-        """Generations of all searches."""
+        """Return the number of generations of all searches."""
         return self.generations * len(self.searches)
 
     def ask(self, progress: OnProgress) -> Answer:

@@ -100,7 +100,7 @@ class Prosthesis(TrainingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls, of the rows that are not kept."""
+        """Return the simulated time of all rows if none falls [s]."""
         return 2.0 * self.seconds * sum(self._how(row)["episodes"] for row, _, _ in self._rows())
 
     def ask(self, progress: OnProgress) -> Answer:

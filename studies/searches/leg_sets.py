@@ -66,7 +66,7 @@ class LegSets(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         sets = [given for _, given, _ in _sets(read_constants(self.constants))]
         walks = 2 * len(sets) + len(UNTUNED) * sets.count(SETTINGS[0])
         return walks * self.episodes * self.seconds

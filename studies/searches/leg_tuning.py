@@ -118,7 +118,7 @@ class LegTuning(Study):
 
     @property
     def total(self) -> float:
-        """Generations and steps of refinement."""
+        """Return the number of generations and steps of refinement."""
         return self.generations + self.refinements
 
     def ask(self, progress: OnProgress) -> Answer:

@@ -194,7 +194,7 @@ class PlanTuning(Study):
 
     @property
     def total(self) -> float:
-        """Generations."""
+        """Return the number of generations."""
         return self.generations
 
     def ask(self, progress: OnProgress) -> Answer:

@@ -96,7 +96,7 @@ class Predict(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Generations of all searches."""
+        """Return the number of generations of all searches."""
         return sum(getattr(self, name) for name in STAGES) + (len(OTHER_SPEEDS) - 1) * self.other_generations
 
     @property

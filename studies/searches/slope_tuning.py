@@ -144,7 +144,7 @@ class SlopeTuning(Study):
 
     @property
     def total(self) -> float:
-        """Generations."""
+        """Return the number of generations."""
         return self.generations
 
     def ask(self, progress: OnProgress) -> Answer:

@@ -233,7 +233,7 @@ class SeedAgreement(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return sum(len(and_copy(name)) for name in self.policies) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:

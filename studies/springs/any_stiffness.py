@@ -258,7 +258,7 @@ class AnyStiffness(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         conditions = 3  # undisturbed, pushed, on uneven ground
         return (1 + len(self.stiffness)) * conditions * self.episodes * self.seconds
 

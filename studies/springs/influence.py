@@ -127,7 +127,7 @@ class Influence(Study):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         walks = (1 + len(CELLS) * len(DURATIONS)) * self.seeds  # 1: unchanged
         stride = reference_gait(BipedSettings()).stride_time
         return len(self.conditions) * walks * (WARM_UP + (self.strides + 1) * stride)

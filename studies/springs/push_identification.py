@@ -208,7 +208,7 @@ class Identify(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         once = (self.episodes + UNDISTURBED_EPISODES) * self.seconds
         repeats = self.repeats * REPEAT_EPISODES * REPEAT_SECONDS
         return len(self.policies) * (once + repeats)

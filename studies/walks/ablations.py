@@ -262,7 +262,7 @@ class Ablations(TrainingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         springs = 1 + (self.constant is not None)  # thesis lines, constant
         rows = len(self.only or ABLATIONS) * self.seeds + len(INPUTS) + 1 + springs  # 1: the ankle's angle
         conditions = 2  # undisturbed, pushed

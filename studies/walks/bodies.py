@@ -179,7 +179,7 @@ class Bodies(Study):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return len(and_copy(self.policy)) * self.pairs * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:

@@ -270,7 +270,7 @@ class Compare(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         names = sum(len(and_copy(name)) for name in self.policies)
         baselines = {*spring_names(self.constant, self.factor)} - {*self.policies}
         springs = self.springs * (len(baselines) + 1)  # quasi-stiffness walks at two speeds

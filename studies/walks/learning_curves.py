@@ -74,7 +74,7 @@ class LearningCurves(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated time [s], without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return len(self.runs) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:

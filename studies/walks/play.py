@@ -77,7 +77,7 @@ class Play(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return self.grid.size * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
