@@ -44,10 +44,10 @@ from importlib import resources
 from re import findall
 from springfoot.agents import policy_card
 from springfoot.agents.policies import SHIPPED
-from springfoot.evaluation import prepare, record
+from springfoot.evaluation import policy_and_settings, record
 
 for name in SHIPPED:
-    policy, settings = prepare(name, {"episode_seconds": 2.0})
+    policy, settings = policy_and_settings(name, {"episode_seconds": 2.0})
     walked = record(policy, settings, name=name, episodes=1).ticks.min()
     assert walked == 200, f"{name} falls after {walked} ticks"
     for page in findall(r"docs/\\S+\\.md", policy_card(name)):

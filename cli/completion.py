@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import make_dataclass
 from importlib import import_module
 from typing import Annotated, Any, Literal, Union, get_args
@@ -21,8 +22,17 @@ COMMANDS = {
 """Command -> class of its flags."""
 HELP = f"""usage: springfoot completion {{{",".join(get_args(Shell))}}}
 
-bash:  springfoot completion bash > ~/.local/share/bash-completion/completions/springfoot
-zsh:   springfoot completion zsh > FOLDER/_springfoot, a folder of your $fpath"""
+bash:  mkdir -p ~/.local/share/bash-completion/completions
+       springfoot completion bash > ~/.local/share/bash-completion/completions/springfoot
+zsh:   springfoot completion zsh > FOLDER/_springfoot, a folder of your $fpath
+
+A new shell has it."""
+FILES_TOO = """
+# Files, where no word of springfoot's begins so.
+_springfoot() { _tyro_springfoot "$@"; [ -n "${COMPREPLY[*]}" ] || COMPREPLY=(); }
+complete -o default -F _springfoot springfoot
+"""
+"""End of tyro's script for bash, which alone offers no file."""
 
 
 def completion_main(arguments: Sequence[str], installed_studies: Callable[[], dict[str, Any]]) -> int:
@@ -36,12 +46,15 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
             return 0
         case [shell] if shell in get_args(Shell):
             unprefixed = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
-            tyro.cli(
-                _all_commands(installed_studies()),
-                prog="springfoot",
-                args=["--tyro-print-completion", shell],
-                config=unprefixed,
-            )
+            with suppress(SystemExit):  # so tyro ends
+                tyro.cli(
+                    _all_commands(installed_studies()),
+                    prog="springfoot",
+                    args=["--tyro-print-completion", shell],
+                    config=unprefixed,
+                )
+            if shell == "bash":
+                print(FILES_TOO)
         case _:
             words = " ".join(arguments)
             print(

@@ -37,7 +37,7 @@ HELP = f"""usage: springfoot {{train,evaluate,live,export,study,datasets,example
   springfoot completion SHELL       print the tab completion of all flags for bash, zsh or tcsh
 
 Each takes --help; springfoot --version says which this is.
-Pages that help names, docs/results/..., lie in {Path(__file__).parents[1]}."""
+Pages that help names, docs/..., lie in {Path(__file__).parents[1]}."""
 
 STUDIES = {
     "compare": (

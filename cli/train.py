@@ -113,6 +113,8 @@ def run_training(flags: TrainFlags) -> int:
     if best:
         falls = f"{best['falls']} of {best['episodes']} episodes fell"
         print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
+        if not best["timesteps"]:
+            print("         It is the policy that training began with: train longer, or try last.safetensors.")
     print(f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard)")
     print(f"Next:    springfoot evaluate {_quoted(folder)}")
     if interrupted:

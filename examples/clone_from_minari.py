@@ -2,7 +2,7 @@
 
 springfoot datasets --sets expert
 python examples/clone_from_minari.py --out clone.safetensors
-python evaluate.py clone.safetensors
+springfoot evaluate clone.safetensors
 """
 
 import argparse

@@ -1,7 +1,7 @@
-"""Training by hand: stable-baselines3's PPO on the batched environment, without train.py, to a file that is judged.
+"""Training by hand: stable-baselines3's PPO on the batched environment, to a file that is judged.
 
 python examples/train_with_sb3.py --timesteps 1000000 --out mine.safetensors
-python evaluate.py mine.safetensors
+springfoot evaluate mine.safetensors
 """
 
 import argparse
@@ -46,7 +46,7 @@ def main() -> None:
     policy, settings = policy_and_settings(str(args.out), {"episode_seconds": args.seconds})
     walk = record(policy, settings, name=args.out.stem, episodes=1)
     print(f"walked {0.01 * walk.ticks[0]:.2f} s, return {walk.returns[0]:.1f}, {walk.fall_reason[0] or 'no fall'}")
-    print(f"Next: python evaluate.py {args.out}")
+    print(f"Next: springfoot evaluate {args.out}")
 
 
 if __name__ == "__main__":

@@ -145,6 +145,8 @@ def foot_setting(name: str, value: Any) -> FootSetting:
 
 def _plain(name: str, value: Any) -> str | dict[str, Any]:
     """Check a foot and return its plain JSON values: its kind alone, or a dictionary of kind and given numbers."""
+    if isinstance(value, Mapping) and "kind" not in value:
+        raise SpringfootError(f"{name}: a dictionary needs a 'kind', one of {', '.join(map(repr, KINDS))}")
     kind = value.get("kind") if isinstance(value, Mapping) else value
     if not isinstance(kind, str) or kind not in KINDS:
         form = "" if isinstance(value, (str, Mapping)) else ", or a dictionary with one of them as its 'kind'"

@@ -1,7 +1,7 @@
-"""sb3-contrib's RecurrentPPO. A policy with a memory is no policy file, but a function that `evaluate.py` can name.
+"""sb3-contrib's RecurrentPPO. A policy with a memory is no policy file, but a function that evaluation can name.
 
 python examples/learners/sb3_recurrent.py --out recurrent.safetensors
-cd examples/learners && RECURRENT=../../recurrent.safetensors python ../../evaluate.py sb3_recurrent:act
+cd examples/learners && RECURRENT=../../recurrent.safetensors springfoot evaluate sb3_recurrent:act
 Tried with sb3-contrib 2.9.2. Weights and statistics are kept as plain arrays: sb3's own files run code when read.
 """
 

@@ -20,9 +20,7 @@ def test_bash_offers_commands_studies_and_flags(tmp_path, capsys):
     bash = shutil.which("bash")
     if bash is None:
         pytest.skip("needs bash")
-    with pytest.raises(SystemExit) as end:  # how tyro ends
-        main(["completion", "bash"])
-    assert not end.value.code
+    assert main(["completion", "bash"]) == 0
     script = tmp_path / "springfoot.bash"
     script.write_text(capsys.readouterr().out, encoding="utf-8")
 
@@ -35,6 +33,8 @@ def test_bash_offers_commands_studies_and_flags(tmp_path, capsys):
     assert {"--speed", "--speed-range"} <= offered("evaluate", "--spe")
     assert set(STUDIES) <= offered("study", "")
     assert {"--quick", "--height"} <= offered("study", "bodies", "--")
+    assert offered("evaluate", "runs/wa") == set()  # so that bash offers files
+    assert "complete -o default" in script.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("words", [[], ["fish"], ["bash", "zsh"]])

@@ -1,8 +1,11 @@
 """The examples run as their own words say, with short settings."""
 
+import ast
 import json
+import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -37,6 +40,36 @@ RUNS = {
 def test_every_example_is_run_and_short():
     assert {path.name for path in EXAMPLES.glob("*.py")} == {"__init__.py", *RUNS}
     assert all(len(path.read_text().splitlines()) <= 60 for path in EXAMPLES.glob("*.py"))
+
+
+def imported(source):
+    """(module, name) of every `from springfoot… import` in some Python code."""
+    found = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
+    return {
+        (node.module, part.name)
+        for node in found
+        if (node.module or "").startswith("springfoot")
+        for part in node.names
+    }
+
+
+def test_what_notebooks_and_the_wheels_check_import_is_there():
+    sources = []
+    for path in (EXAMPLES / "notebooks").iterdir():
+        cells = json.loads(path.read_bytes())["cells"]
+        sources += ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    wheel = ast.parse((EXAMPLES.parent / "benchmarks" / "wheel.py").read_text(encoding="utf-8"))
+    texts = [node.value for node in ast.walk(wheel) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    sources += [text for text in texts if text.lstrip().startswith("from springfoot")]
+    names = set().union(*map(imported, sources))
+    assert ("springfoot.evaluation", "record") in names
+    for module, name in names:
+        assert hasattr(import_module(module), name), (module, name)
+
+
+def test_no_example_names_a_file_that_the_wheel_lacks():
+    for path in [*EXAMPLES.rglob("*.py"), *EXAMPLES.rglob("*.ipynb")]:
+        assert not re.search(r"\b(evaluate|train)\.py", path.read_text(encoding="utf-8")), path
 
 
 def test_notebooks_hold_no_results():
