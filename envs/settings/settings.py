@@ -47,7 +47,7 @@ THEMES = {
     "body": "Whose body walks.",
     "feet": "What its feet are: intact, prosthetic, weak.",
     "speed": "How fast it is commanded to walk.",
-    "reference": "Whose walk it is held to.",
+    "reference": "Human data, or the plan, that the body follows.",
     "springs": "What its ankle and toe springs do, and which part of that the action decides.",
     "episode": "How an episode starts and ends.",
     "ground": "What it walks on.",

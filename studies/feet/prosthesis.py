@@ -16,6 +16,7 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import ceil
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -498,9 +499,11 @@ def draw(path: Path, rows: Sequence[Row]) -> None:
         *((foot, WITH_POLICY) for foot in ("passive", "adaptive")),
     ]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 5.2), layout="constrained")
-        axes = figure.subplots(2, 3)
-        for ax, asked in zip(axes.flat, ASKED, strict=True):
+        figure = Figure(figsize=(14.0, 5.2), layout="constrained")
+        axes = figure.subplots(2, ceil(len(ASKED) / 2)).flat
+        for ax in axes[len(ASKED) :]:
+            ax.remove()
+        for ax, asked in zip(axes, ASKED, strict=False):
             for x, (foot, person) in enumerate(columns):
                 group = [row for row in at_first if (row["foot"], row["person"]) == (foot, person)]
                 values = [row[asked.key] for row in group if row[asked.key] is not None]
