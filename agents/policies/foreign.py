@@ -124,6 +124,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     dtype = INPUT_TYPES[node.type]
 
     def act(observation: NDArray) -> Any:
+        """Return the actions of the ONNX file for an observation in one of `FORMS`."""
         if (reason := failed.get(form(observation))) is not None:
             raise SpringfootError(reason)
         return session.run([output], {node.name: np.ascontiguousarray(observation, dtype)})[0]

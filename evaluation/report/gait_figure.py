@@ -122,7 +122,8 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
         ax.grid(color="#ededed", lw=0.6)
         numbers = gait.metrics["com"]
         error = numbers[f"{name}_rmse_m"]
-        _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", numbers["z_r"] if name == "z" else None)
+        r = numbers["z_r"] if name == "z" else None  # x is nearly a straight line: r would say nothing
+        _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", r)
     low, high = axes[1].get_ylim()
     middle = (low + high) / 2
     half_height = max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat

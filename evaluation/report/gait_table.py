@@ -50,7 +50,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         )
     for section in _sections(metrics):
         for label, unit, *values in section:
-            labels = [f"{label}, {unit}" if unit else label] if narrow else [label, unit]
+            label_with_unit = f"{label}, {unit}" if unit else label
+            labels = [label_with_unit] if narrow else [label, unit]
             table.add_row(*labels, *values)
         table.add_section()
     console.print(table)
