@@ -66,7 +66,10 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
 
 
 def _all_commands(studies: dict[str, Any]) -> Any:
-    """Return the type, a union for tyro, of all commands and studies."""
+    """Return the type of the whole command line, a union for tyro: every command, and below `study` every study.
+
+    `studies` is name -> class of its flags.
+    """
     commands = {}
     for name, path in COMMANDS.items():
         module, _, flags = path.partition(".")
@@ -76,7 +79,7 @@ def _all_commands(studies: dict[str, Any]) -> Any:
 
 
 def _one_of(commands: dict[str, Any]) -> Any:
-    """Return the union of the flags' types, in which each is a command of its name."""
+    """Return a union for tyro, in which each class of flags is the command of its name; `commands` is name -> class."""
     return Union[  # noqa: UP007  (made at run time)
         tuple(Annotated[flags, tyro.conf.subcommand(name, prefix_name=False)] for name, flags in commands.items())
     ]

@@ -100,13 +100,15 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     if flags.film:
         film.require_film()
-    prepared = []
+    # Find every policy, before anything is written.
+    prepared = []  # policy and settings of each
     for label, name in zip(labels, flags.policies, strict=True):
         with _bar(f"{label}, copying", 0.0, delay=0.5) as bar:
-            prepared.append(policies.policy_and_settings(name, settings, flags.seed, flags.threads, _follow(bar)))
+            prepared.append(policies.policy_and_settings(name, settings, flags.seed, flags.threads, _watch_of(bar)))
     for _, environment in prepared:
         recording.require_recordable(environment, flags.episodes)
 
+    # Walk, measure and write one policy after another.
     default_out = Path("runs", f"eval-{'-'.join(labels)[:LONGEST_NAME]}")
     with whole_folder(flags.out, default_out) as (folder, out):
         walks = []
@@ -123,7 +125,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                     progress=bar.update,
                 )
             policy_folder = folder if len(labels) == 1 else folder / label
-            policy_folder.mkdir(exist_ok=policy_folder == folder)
+            policy_folder.mkdir(exist_ok=policy_folder == folder)  # of a single policy it exists already
             with _bar(f"{label}, files", 1.0, delay=0.5) as bar:
                 gait = metrics.measure(episodes)
                 report.write_report(policy_folder, episodes, gait, bar.update)
@@ -134,6 +136,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
             written |= {path.name for path in policy_folder.iterdir()}
         if flags.report:
             report_page.write_page(folder / "report.html", walks, command)
+    # Tell the results.
     if flags.json:
         print(json.dumps({"folder": str(out), "metrics": [gait.metrics for _, gait in walks]}, ensure_ascii=False))
         return
@@ -153,9 +156,9 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
 
 
 def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
-    """Return a progress bar with the time left, which disappears at its end and appears only after `delay` [s].
+    """Return a progress bar named by `words`, of `total` units, with the time left.
 
-    Shows nothing without a terminal.
+    It appears only after `delay` [s], disappears at its end, and shows nothing without a terminal.
     """
     return tqdm(
         total=total,
@@ -164,14 +167,15 @@ def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
         dynamic_ncols=True,
         leave=False,
         delay=delay,
-        disable=None,
+        disable=None,  # where there is no terminal
     )
 
 
-def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
-    """Return the `watch` of `open_loop_copy` that advances `bar`."""
+def _watch_of(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
+    """Return the `watch` of `open_loop_copy` that advances `bar` as a policy walks to be copied."""
 
     def watch(seconds: float) -> Callable[[float], object]:
+        """Set the length of the walk [s]; return the function to call with the seconds of each step."""
         bar.total = seconds
         return bar.update
 
@@ -179,17 +183,21 @@ def _follow(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """Return a label for each policy, which names its folder: no two are equal, nor equal to the report's name, also
-    where capitals do not count."""
+    """Return a label for each of the policies' `names`, which names its folder.
+
+    No two labels are equal, nor equal to the report's name, also in file systems where capitals do not count: the
+    second `walk` is `walk-2`.
+    """
     from springfoot.evaluation.recording.policies import policy_label
 
     labels: list[str] = []
     taken = {"report.html"}
     for label in map(policy_label, names):
-        number = 2
+        number = 1
         numbered = label
         while numbered.casefold() in taken:
-            number, numbered = number + 1, f"{label}-{number}"
+            number += 1
+            numbered = f"{label}-{number}"
         taken.add(numbered.casefold())
         labels.append(numbered)
     return labels

@@ -35,13 +35,13 @@ def examples_main(arguments: Sequence[str], program: str = "springfoot examples"
 def run_examples(flags: ExamplesFlags) -> None:
     """Copy the examples if a folder is given; print the path and the first line of each example or copy."""
     source = Path(str(resources.files("springfoot.examples")))
-    found = (path for ending in ("py", "ipynb") for path in source.rglob(f"*.{ending}"))
-    programs = [path for path in sorted(found) if path.name != "__init__.py"]
+    files = (path for ending in ("py", "ipynb") for path in source.rglob(f"*.{ending}"))
+    programs = [path for path in sorted(files) if path.name != "__init__.py"]
     if flags.copy is not None:
         if is_taken(flags.copy):
             raise SpringfootError(f"{flags.copy} exists already; give --copy a new folder")
         with whole_folder(flags.copy, flags.copy) as (folder, _):
-            for path in (*programs, *source.rglob("*.txt")):
+            for path in (*programs, *source.rglob("*.txt")):  # texts name the packages that they need
                 copied = folder / path.relative_to(source)
                 copied.parent.mkdir(exist_ok=True)
                 shutil.copyfile(path, copied)
@@ -53,5 +53,6 @@ def run_examples(flags: ExamplesFlags) -> None:
 def _first_line(path: Path) -> str:
     """Return the first line of a program's docstring, or the title of a notebook."""
     if path.suffix == ".ipynb":
-        return read_object(path, "notebook")["cells"][0]["source"][0].strip("# \n")
+        first_cell = read_object(path, "notebook")["cells"][0]
+        return first_cell["source"][0].strip("# \n")  # a Markdown heading
     return (get_docstring(parse(read_bytes(path))) or "").partition("\n")[0]

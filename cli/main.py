@@ -129,7 +129,7 @@ def _run(words: list[str]) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
             raise
-        extra = "train" if words[0] == "train" else EXTRA_OF[error.name]
+        extra = "train" if words[0] == "train" else EXTRA_OF[error.name]  # `train` needs all of its extra
         print(
             f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
             file=sys.stderr,
@@ -141,8 +141,10 @@ def _run(words: list[str]) -> int:
 
 
 def study_main(arguments: Sequence[str]) -> int:
-    """Run the study that the first argument names; return 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143
-    SIGTERM."""
+    """Run the study that the first argument names, or print help; return the exit code.
+
+    It is 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143 SIGTERM.
+    """
     name, *words = arguments or ["--help"]
     if name in ("-h", "--help"):
         print(study_help())
@@ -157,6 +159,7 @@ def study_main(arguments: Sequence[str]) -> int:
     study = replace(study, command=shlex.join([*program.split(), *words]))
 
     def run() -> int:
+        """Run the study, which signals end in good order; return the exit code."""
         end_in_order()
         return study.run(name)
 
@@ -164,7 +167,7 @@ def study_main(arguments: Sequence[str]) -> int:
 
 
 def study_class(name: str) -> "type[Study]":
-    """Return the class of one of `STUDIES`."""
+    """Import and return the class of the study `name`, one of `STUDIES`."""
     module, _, class_name = STUDIES[name][0].rpartition(".")
     return getattr(import_module(f"springfoot.studies.{module}"), class_name)
 

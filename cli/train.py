@@ -18,6 +18,7 @@ from springfoot.files.writing import require_new
 from springfoot.studies.base.flags import given, optional_flags
 
 PRESET = PRESETS["walk"]
+"""Preset whose values the help shows as defaults."""
 ENGINES = Literal["sb3", "rllib"]
 RESUMED = {"timesteps", "threads", "reward_weights"}
 """Settings that may change when a run is continued."""
@@ -69,11 +70,13 @@ def train_main(arguments: Sequence[str] | None = None, program: str = "train.py"
 
 
 def run_training(flags: TrainFlags) -> int:
-    """Check the flags, train or continue a run, and print its result and folder; return the exit code."""
+    """Check the flags, train or continue a run, and print its result, its folder and what to type next; return the exit
+    code."""
     settings = given(flags.training) | given(flags.environment)
     from springfoot.agents.policies.policy import RUN  # here, as below: help and bad flags need no simulator
     from springfoot.agents.training.run_record import runs_within
 
+    # Check the flags against each other.
     if (flags.out is None) == (flags.resume is None):
         raise SpringfootError("give either --out NEW_FOLDER or --resume FOLDER")
     if flags.out is not None:
@@ -97,6 +100,7 @@ def run_training(flags: TrainFlags) -> int:
         require_count("seeds", flags.seeds)
     if flags.resume and (fixed := sorted(set(settings) - RESUMED)):
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")
+    # Train.
     if flags.resume:
         folder = flags.resume
         record = _resume(flags, settings)
@@ -107,6 +111,7 @@ def run_training(flags: TrainFlags) -> int:
             return run_seeds(config, flags.out, flags.seeds)
         folder = flags.out
         record = _train(flags, config)
+    # Tell the result.
     interrupted = record["status"] == "interrupted"
     best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
@@ -123,7 +128,7 @@ def run_training(flags: TrainFlags) -> int:
 
 
 def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
-    """Train a new run with the engine asked for; return its record."""
+    """Train a new run of `config` with the engine of the flags; return the content of its run.json."""
     assert flags.out is not None
     if flags.engine == "rllib":
         return _engine(rllib=True).train(config, flags.out, flags.num_env_runners)
@@ -131,7 +136,10 @@ def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
 
 
 def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
-    """Continue a run with the engine that began it; return its record."""
+    """Continue the run of the flag --resume with the engine that began it; return the content of its run.json.
+
+    `settings` are those given on the command line, of `RESUMED` alone.
+    """
     from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training.run_record import is_of_rllib, read_record
 
@@ -146,7 +154,8 @@ def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _engine(rllib: bool) -> Any:
-    """Import and return the module that trains, with RLlib or stable-baselines3; let signals end it in good order.
+    """Import and return the module that trains, with RLlib or stable-baselines3; from here on signals end the command
+    in good order.
 
     Not imported above: torch takes seconds, and bad flags need not wait for it.
     """
@@ -160,7 +169,10 @@ def _engine(rllib: bool) -> Any:
 
 
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
-    """Train from `count` seeds, and print a table with their spread and the folders; return the exit code."""
+    """Train from `count` seeds, beginning at `config.seed`, each into a folder in `out`; return the exit code.
+
+    Prints a table of the seeds with their spread, the folders, and what to type next.
+    """
     from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training import multi_seed
 
@@ -173,13 +185,20 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
     if begun := [folder for folder in folders if (folder / RUN).is_file()]:
         print(f"Or:      {_for_folders('springfoot train --resume', begun)}")
-    return {"finished": 0, "interrupted": stopped_by(record)}.get(record["status"], 1)
+    match record["status"]:
+        case "finished":
+            return 0
+        case "interrupted":
+            return stopped_by(record)
+        case _:  # one failed
+            return 1
 
 
 def _for_folders(command: str, folders: Sequence[Path]) -> str:
-    """Return `command` for the first of several folders, followed by the names of the others."""
-    others = ", ".join(folder.name for folder in folders[1:])
-    return f"{command} {_quoted(folders[0])}" + (f", then so with {others}" if others else "")
+    """Return the advice to give `command` to the first of several folders, and then to the others, which it names."""
+    first, *others = folders
+    then = f", then so with {', '.join(folder.name for folder in others)}" if others else ""
+    return f"{command} {_quoted(first)}{then}"
 
 
 def _quoted(folder: Path) -> str:
@@ -188,6 +207,9 @@ def _quoted(folder: Path) -> str:
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
-    """Return the preset with values of the command line, `training` and `environment`, in place of its own."""
+    """Return the configuration of a preset, with values of the command line in place of its own.
+
+    `training` holds settings of the training, `environment` those of the environment, both by name.
+    """
     settings = settings_from(**settings_to_json(preset.environment) | environment)
     return dataclasses.replace(preset, **training, environment=settings)

@@ -35,6 +35,7 @@ CONSTANT_STIFFNESS = (300.0, 40.0)
 _SIN, _COS, _SPEED = (
     [entry.name for entry in OBSERVATION].index(name) for name in ("phase_sin", "phase_cos", "command_speed")
 )
+"""Columns of the observation: sine and cosine of the left leg's phase, and the commanded speed as a Froude number."""
 
 
 def leg_phase(observation: NDArray) -> NDArray:
@@ -49,7 +50,7 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
     body = body_of(settings)
     require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
-    action = np.tile(action_of(scaled, settings, body).astype(np.float32), 2)
+    action = np.tile(action_of(scaled, settings, body).astype(np.float32), len(SIDES))  # the same for both legs
     return lambda observation: np.tile(action, (len(observation), 1))
 
 
@@ -67,29 +68,33 @@ def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
 
 
 def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
-    """Return the policy of a stiffness schedule times `factor`: `settings.schedule`, else that of the leg tuning.
+    """Return the policy of a stiffness schedule times `factor`: `settings.schedule`, else the schedule that was tuned
+    with the leg constants.
 
     The tuned schedule depends on the momentary commanded speed, and differs between the legs of a person who has
-    adapted to a foot. Both scale with the body.
+    adapted to a foot. Both schedules scale with the body.
     """
     body = body_of(settings)
     speeds = tabulated_speeds(settings)
     if settings.schedule is not None:
-        stiffness = settings.schedule.at(GRID)[0]
-        return follow(factor * stiffness[None], speeds[:1], settings, body)
-    left, right = walks_of_legs(settings)
-    stiffness = np.stack([_scheduled(left), _scheduled(right)], 2) if right else _scheduled(left)
+        stiffness, _ = settings.schedule.at(GRID)  # without the rest angles, which are the environment's
+        return follow(factor * stiffness[None], speeds[:1], settings, body)  # one speed: the same at all
+    left, right = walks_of_legs(settings)  # `right` is empty if the legs do not differ
+    stiffness = np.stack([_tuned_schedules(left), _tuned_schedules(right)], 2) if right else _tuned_schedules(left)
     return follow(factor * stiffness, speeds, settings, body)
 
 
-def _scheduled(walks: Sequence[ReferenceWalk]) -> NDArray:
-    """Return (speeds, samples, (ankle, toe)) stiffness of the leg tuning [N m/rad]."""
+def _tuned_schedules(walks: Sequence[ReferenceWalk]) -> NDArray:
+    """Return the stiffness schedules of one leg's constants (speeds, samples, (ankle, toe)) [N m/rad].
+
+    `walks` are that leg's reference walks, one for each speed; of several variants of constants the first counts.
+    """
     return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.target.foot.plateaus) for walk in walks])
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
     """Return the policy whose K is people's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and
-    `TOE_STIFFNESS` at the toes."""
+    `TOE_STIFFNESS` at the toes; the same at every speed."""
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)
     stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
@@ -97,24 +102,34 @@ def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
 
 
 def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
-    """Return the policy that sets `stiffness` (speeds, samples, (ankle, toe)) [N m/rad] by each leg's phase.
+    """Return the policy that sets the ankle's and the toe's K as scheduled for each leg's phase and the commanded
+    speed.
 
-    With an axis of sides, (speeds, samples, side, (ankle, toe)), each leg has its own. Phase and Froude speed are read
-    from the observation; stiffness is linear between two of `speeds` [m/s, of `body`].
+    Args:
+        stiffness: schedules on `GRID` for each speed, (speeds, samples, (ankle, toe)) [N m/rad] for both legs, or
+            (speeds, samples, side, (ankle, toe)) with one for each leg.
+        speeds: (speeds,) ascending speeds of the schedules [m/s], of `body`; K is linear between two, and constant
+            beyond. With a single one the speed makes no difference.
+        settings: of the environment in which the policy acts.
+        body: of these settings.
+
+    Phase and commanded speed are read from the observation.
     """
     require_absolute(settings)
     froude = np.array([body.froude_speed(speed) for speed in speeds])
     legs = np.arange(len(SIDES))
+    # (speeds, samples, side, joint)
     of_legs = stiffness if stiffness.ndim == 4 else np.stack([stiffness] * len(SIDES), 2)
     joints = of_legs.shape[-1]
-    table = PhaseTable(of_legs.reshape(*of_legs.shape[:2], -1))
+    table = PhaseTable(of_legs.reshape(*of_legs.shape[:2], -1))  # one row for each speed
 
     def policy(observation: NDArray) -> NDArray:
         """Return the actions (N, 4) at phase and speed of the observations (N, D)."""
-        position = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))  # between the tabulated speeds
+        # The commanded speed's position among the tabulated ones: 1.25 is a quarter of the way from row 1 to row 2.
+        position = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
         place = np.zeros(len(position), PLACE)
-        place["row"] = position
-        place["weight"] = position % 1.0
+        place["row"] = position  # cut to a whole number
+        place["weight"] = position % 1.0  # of the next row
         # (N, leg of the phase, leg of the stiffness, joint): each leg takes its own stiffness at its own phase.
         curves = table.at(leg_phase(observation), place).reshape(-1, len(SIDES), len(SIDES), joints)
         action = action_of(curves[:, legs, legs], settings, body)
@@ -157,7 +172,7 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
             return untrained(settings)
         case "quasi_stiffness":
             return quasi_stiffness(settings)
-        case _:
+        case _:  # `schedule`; the thesis's lines too, which `own_settings` makes the schedule of the settings
             return schedule(settings, _factor_from(numbers) if colon else 1.0)
 
 

@@ -22,7 +22,7 @@ SHARED_LIMITS = (
     "One planar body in simulation; a stiffness that walks here is none for a patient's foot. Slopes, loads and other "
     "bodies were not trained: measure them first (`springfoot study compare --world`)."
 )
-"""Limits that all of them share."""
+"""Limits of every policy that comes with the package."""
 
 
 def policy_card(name: str) -> str:

@@ -163,21 +163,25 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
         parts = [network.mlp_extractor.policy_net, network.action_net]
     else:  # SAC and TQC; TD3 and DDPG
         parts = [actor.latent_pi, actor.mu] if hasattr(actor, "latent_pi") else [actor.mu]
-    leaves = [leaf for part in parts for leaf in part.modules() if not list(leaf.children())]
+    leaves = [leaf for part in parts for leaf in part.modules() if not list(leaf.children())]  # modules without parts
     kinds = [type(leaf).__name__ for leaf in leaves]
     if not hasattr(actor, "latent_pi") and output == "tanh" and kinds[-1:] == ["Tanh"]:
         leaves = leaves[:-1]  # in TD3 and DDPG the output function is a module too
         kinds = kinds[:-1]
+    # Every other module is a layer, those between are activations.
+    layers = leaves[::2]
+    between = leaves[1::2]
     names = {kind: name for name, kind in TORCH_NAMES.items()}
     activations = set(kinds[1::2]) or {"Tanh"}  # a single layer has none: any name does
     if len(kinds) % 2 == 0 or set(kinds[::2]) != {"Linear"} or len(activations) > 1 or not activations <= set(names):
         raise SpringfootError(
             f"its actor is {', '.join(kinds)}: no layers with one activation between them, of {', '.join(ACTIVATIONS)}"
         )
-    for leaf in leaves[1::2]:
-        if (getattr(leaf, "negative_slope", 0.01), getattr(leaf, "alpha", 1.0)) != (0.01, 1.0):
-            raise SpringfootError(f"its activation {leaf} is not of the default slope")
-    return [(layer.weight, layer.bias) for layer in leaves[::2]], names[activations.pop()], output
+    for activation in between:
+        # Parameters of LeakyReLU and ELU, at their defaults in torch; other activations have neither.
+        if (getattr(activation, "negative_slope", 0.01), getattr(activation, "alpha", 1.0)) != (0.01, 1.0):
+            raise SpringfootError(f"its activation {activation} is not of the default slope")
+    return [(layer.weight, layer.bias) for layer in layers], names[activations.pop()], output
 
 
 def statistics_of(normalizer: Any) -> dict[str, Any]:
@@ -193,11 +197,17 @@ def statistics_of(normalizer: Any) -> dict[str, Any]:
     }
 
 
-def _checked_layers(layers: Layers, width: int, actions: int) -> tuple[tuple[NDArray, ...], tuple[NDArray, ...]]:
-    """Return weights and biases as arrays; raise `SpringfootError` if they do not lead from observation to action."""
+def _checked_layers(
+    layers: Layers, observation_entries: int, actions: int
+) -> tuple[tuple[NDArray, ...], tuple[NDArray, ...]]:
+    """Return the weights (outputs, inputs) and the biases (outputs,) of all layers as arrays, 0 for a bias of None.
+
+    Raises `SpringfootError` unless the first layer takes `observation_entries` numbers, each other layer the outputs of
+    the one before, and the last one returns `actions` numbers.
+    """
     weights = []
     biases = []
-    inputs = width
+    inputs = observation_entries
     for index, (weight, bias) in enumerate(layers):
         name = f"layer {index}"
         w = _array(f"{name}: weight", weight)

@@ -19,12 +19,13 @@ from springfoot.envs.control.foot_rows import controlled_joints
 from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.phase_table import SAMPLES
 from springfoot.envs.control.reference_walk import ReferenceWalk, rows, walks_of_legs
-from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.errors import SpringfootError
 from springfoot.files.writing import require_new_files, write_new
 from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from springfoot.gait.springs.stiffness import SPRINGS
 
 from .foreign import CONTRACT_KEY, contract_path
 from .policy import Policy
@@ -97,7 +98,11 @@ def scale_of(settings: BipedSettings) -> Scale:
     joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
         return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
-    middle, stiffest = (np.tile(stiffness_of(np.full(2, a), settings, Body()), 2)[joints] for a in (0.0, 1.0))
+    # K of the four actions' joints, ankle and toe of each leg, where all actions are 0, and where all are 1
+    middle, stiffest = (
+        np.tile(stiffness_of(np.full(len(SPRINGS), action), settings, Body()), len(SIDES))[joints]
+        for action in (0.0, 1.0)
+    )
     return Scale("stiffness", "N m/rad", joints, middle, stiffest / middle)
 
 
@@ -115,6 +120,7 @@ def contract_of(policy: Policy) -> dict[str, Any]:
     settings = policy.settings
     scale = scale_of(settings)
     header = policy.header
+    # (joint, stiffness at action -1, stiffness at action 1)
     bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
     contract = {
         "contract_version": CONTRACT_VERSION,
@@ -156,9 +162,11 @@ def contract_of(policy: Policy) -> dict[str, Any]:
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
-    """Return the schedule that a residual action multiplies, for each speed at each percent of the leg's stride.
+    """Return the schedule that a residual action multiplies, as JSON values: K for each speed at each percent of the
+    leg's stride.
 
-    It is that of the body of the contract. For a person who has adapted to a foot, `right` is the right leg's schedule.
+    K is that of the contract's body, 1.70 m and 63 kg. For a person who has adapted to a foot, `right` holds the right
+    leg's schedule, and the other entries are the left leg's.
     """
     left, right = walks_of_legs(settings)
     schedule = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
@@ -166,11 +174,13 @@ def _schedule(settings: BipedSettings) -> dict[str, Any]:
 
 
 def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str, list[list[float]]]:
-    """Return ankle and toe K [N m/rad] of the body of 1.70 m and 63 kg, at each percent of the stride, for each
-    speed."""
+    """Return `ankle` and `toe` K as lists [speed][percent of the stride] [N m/rad], of the body of 1.70 m and 63 kg."""
     scale = body_of(settings).stiffness_scale
-    curves = [foot_curves(settings, constants, walk)[1][::SCHEDULE_STEP] / scale for constants, walk in rows(walks)]
-    table = np.round(np.stack(curves), 6)
+    curves = []
+    for constants, walk in rows(walks):
+        _, stiffness = foot_curves(settings, constants, walk)
+        curves.append(stiffness[::SCHEDULE_STEP] / scale)
+    table = np.round(np.stack(curves), 6)  # (speed, percent, joint)
     return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}
 
 
@@ -191,7 +201,7 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     nodes: list[Any] = []
     constants: list[Any] = []
 
-    # Each of the three adds to the graph and returns the name of its output.
+    # These three functions add to the graph; each returns the name of its output.
     def constant(value: ArrayLike, dtype: type = np.float32) -> str:
         constants.append(numpy_helper.from_array(np.array(value, dtype, order="C"), f"constant_{len(constants)}"))
         return constants[-1].name
@@ -203,20 +213,21 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     def clip(x: str, limit: float, name: str = "") -> str:
         return node("Clip", x, constant(-limit), constant(limit), name=name)
 
+    # Normalise the observation: (observation - mean) / deviation, clipped.
     mean, mean_remainder = two_floats(policy.observation_mean)
     x = node("Sub", node("Sub", "observation", constant(mean)), constant(mean_remainder))
     x = node("Div", x, constant(policy.observation_deviation))
     if policy.observation_clip is not None:
         x = clip(x, policy.observation_clip)
     for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
-        if layer:
-            x = (
-                node("Mul", x, node("Sigmoid", x))
-                if policy.activation == "silu"
-                else node(OPERATORS[policy.activation], x)
-            )
+        if layer > 0:  # activations stand between the layers
+            if policy.activation == "silu":
+                x = node("Mul", x, node("Sigmoid", x))
+            else:
+                x = node(OPERATORS[policy.activation], x)
         x = node("Gemm", x, constant(weight), constant(bias), transB=1)
     action = node("Tanh", x, name="action") if policy.output == "tanh" else clip(x, 1.0, "action")
+    # The second output: middle x factor^action of the joints that an action sets.
     power = node("Pow", constant(scale.factor), node("Gather", action, constant(scale.joints, np.int64), axis=1))
     node("Mul", constant(scale.middle), power, name=scale.name)
 

@@ -26,36 +26,40 @@ _EVERY = 50
 
 
 def fingerprint(biped: Biped) -> dict[str, str]:
-    """Return SHA-256 digests of the `observation`, the `action`, the compiled `model`, and the `legs`.
+    """Return the SHA-256 digests of all that a policy relies on: `observation`, `action`, compiled `model`, and `legs`.
 
     `legs` digests the constants of hips, knees and foot springs, and the target curves, at every tabulated speed; the
-    planned position of the CoM counts if a gain reads it. Numbers count to six significant digits, so that compilers
-    and processors agree.
+    planned position of the CoM counts only if the gain `swing_place_gain` reads it. Numbers count to six significant
+    digits, so that compilers and processors agree.
     """
     model = biped.model
-    actions = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])
+    actions = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])  # of ankle and toe: softest, middle, stiffest
     of_legs: list[Any] = []
     for constants, walk in (*rows(biped.walks), *rows(biped.right_walks)):
         columns = slice(None) if constants.swing_place_gain else slice(PLANNED_PLACE)  # from there the CoM's position
         curves = (leg_curves(constants, walk)[:, columns], *foot_curves(biped.settings, constants, walk))
-        of_legs += [*_used(constants).values(), *(curve[::_EVERY] for curve in curves)]
+        of_legs += [*_digested_constants(constants).values(), *(curve[::_EVERY] for curve in curves)]
         if (feed := foot_feed(biped.settings, constants, walk)) is not None:
             of_legs.append(feed[::_EVERY])
     return {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(actions, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
-        "legs": _digest(_used(biped.constants[0]), *of_legs),
+        "legs": _digest(_digested_constants(biped.constants[0]), *of_legs),
     }
 
 
-def _used(legs: LegConstants) -> dict[str, Any]:
-    """Return the constants without a `swing_place_gain` of 0, so that policies older than that constant still load."""
+def _digested_constants(legs: LegConstants) -> dict[str, Any]:
+    """Return name -> value of the leg constants that are digested: all, but no `swing_place_gain` of 0.
+
+    Policies trained before that constant existed have the digest without it, and still load.
+    """
     return {name: value for name, value in asdict(legs).items() if value or name != "swing_place_gain"}
 
 
 def require_same(name: object, stored: Mapping[str, str], current: Mapping[str, str]) -> None:
-    """Raise `SpringfootError` if the policy `name` has another fingerprint than this version's environment."""
+    """Raise `SpringfootError` if the fingerprint `stored` in the policy `name` differs from that of this version's
+    environment, `current`."""
     if different := [part for part in current if current[part] != stored.get(part)]:
         raise SpringfootError(
             f"{name} was trained on another version of this environment: other {' and '.join(different)}; "

@@ -39,9 +39,9 @@ def contract_path(path: Path) -> Path:
 
 
 def observation_rows(observation: Any, width: int) -> NDArray:
-    """Return observations (N, D) or (D,) as float64 (N, D).
+    """Return observations (N, D) or (D,) as float64 of the same shape.
 
-    Raises `SpringfootError` for another width and for numbers that are not finite.
+    Raises `SpringfootError` unless D is `width`, and for numbers that are not finite.
     """
     rows = np.asarray(observation, dtype=np.float64)
     if rows.ndim not in (1, 2) or rows.shape[-1] != width:
@@ -79,8 +79,8 @@ class ForeignPolicy:
         try:
             actions = np.asarray(returned)
         except (TypeError, ValueError):
-            actions = np.array(None)
-        if actions.dtype.kind not in "biuf":
+            actions = np.array(None)  # no numbers: refused next
+        if actions.dtype.kind not in "biuf":  # bool, whole numbers, floats
             raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned no numbers")
         if actions.shape != (len(batch), len(ACTIONS)):
             raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned {actions.shape}")
@@ -103,7 +103,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
         import onnxruntime  # noqa: F401  # likewise
     except ModuleNotFoundError as error:
         raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
-    session, failed = onnx_session(path, np.zeros((2, len(OBSERVATION))))
+    session, failed = onnx_session(path, np.zeros((2, len(OBSERVATION))))  # the real ones follow, of its environment
     inputs = session.get_inputs()
     outputs = [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
@@ -116,7 +116,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     width = len(biped.observation_names)
     if len(node.shape) not in (1, 2) or (isinstance(node.shape[-1], int) and node.shape[-1] != width):
         raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, node.shape))})")
-    if len(failed) < len(FORMS):
+    if len(failed) < len(FORMS):  # it runs on zeros in one form at least
         session, failed = onnx_session(path, _first_observations(biped))
     if len(failed) == len(FORMS):
         raise SpringfootError(f"{path} fails on observations (2, {width}): {failed[FORMS[0]]}")
@@ -124,6 +124,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     dtype = INPUT_TYPES[node.type]
 
     def act(observation: NDArray) -> Any:
+        """Return the actions of the ONNX file for an observation in one of `FORMS`."""
         if (reason := failed.get(form(observation))) is not None:
             raise SpringfootError(reason)
         return session.run([output], {node.name: np.ascontiguousarray(observation, dtype)})[0]
@@ -181,8 +182,11 @@ def _only_ordinary_errors(name: str) -> Iterator[None]:
 
 
 def _environment_of(path: Path, inside: str | None) -> Biped:
-    """Return the environment that an ONNX file was made for, by the contract beside it, else by the text of the
-    contract `inside` it; the default one without a contract."""
+    """Return the environment that an ONNX file was made for, as its contract says; the default one without a contract.
+
+    The contract is the file beside it, else `inside`, the text in its metadata. Raises `SpringfootError` for a contract
+    that is malformed, or of another version of the environment.
+    """
     beside = contract_path(path)
     if inside is None and not beside.is_file():
         return Biped(BipedSettings(), 1)
@@ -216,8 +220,9 @@ def _accepted(name: str, act: Callable[[NDArray], Any], biped: Biped) -> Foreign
     observations = _first_observations(biped)
     actions = len(biped.action_names)
     width = observations.shape[1]
-    wrong_shape = ""
+    wrong_shape = ""  # messages of the first form that fails so
     failed = ""
+    # The function as one of (N, D), the observation to try its form on, and the shape of actions that it must return.
     for act_on_rows, argument, expected in (
         (act, observations, (2, actions)),
         (lambda rows: np.concatenate([act(row[None]) for row in rows]), observations[:1], (1, actions)),

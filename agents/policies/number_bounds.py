@@ -26,15 +26,18 @@ def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
             low, high = bounds
             least = float(values.min())
             most = float(values.max())
-            if not low <= least <= most <= high:  # so that NaN is refused too
-                outside = least if not least >= low else most
+            if not low <= least <= most <= high:  # false for NaN too
+                outside = most if least >= low else least  # NaN is the least and the largest
                 raise SpringfootError(f"{path}: {name} must be in [{low:g}, {high:g}], has {outside:.4g}")
 
 
 def _bounds(name: str) -> tuple[float, float] | None:
-    """Return the least and largest value of a tensor's numbers, by its name; None for unknown names."""
-    kind, _, item = name.partition(".")
-    item = item.rpartition(".")[2]
+    """Return the least and the largest allowed number in the tensor `name`; None for unknown names.
+
+    The first part of the name tells the kind, the last one the item: `adam.3.exp_avg`, `observation.mean`.
+    """
+    kind, _, rest = name.partition(".")
+    item = rest.rpartition(".")[2]
     if kind in ("network", "layer"):
         return -LARGEST_WEIGHT, LARGEST_WEIGHT
     if kind == "adam":
@@ -45,7 +48,11 @@ def _bounds(name: str) -> tuple[float, float] | None:
 
 
 def require_moments(path: object, names: Mapping[str, object], parameters: int) -> None:
-    """Raise `SpringfootError` unless Adam's moments exist for all `parameters`, or for none."""
+    """Raise `SpringfootError` unless a state has Adam's moments of all parameters of the network, or of none.
+
+    `path` is the file, or another subject of the error; `names` are those of the state's tensors, `parameters` the
+    number of the network's.
+    """
     present = {name for name in names if name.startswith("adam.")}
     expected = {f"adam.{index}.{item}" for index in range(parameters) for item in _MOMENTS}
     if present and (missing := sorted(expected - present)):

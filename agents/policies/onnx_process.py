@@ -17,7 +17,7 @@ MOST_ONNX_BYTES = 2**26
 INPUT_TYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 """Allowed types of the input."""
 FORMS = ("(N, D)", "(1, D)", "(D,)")
-"""Shapes in which an observation is given: several, the only row, alone."""
+"""Shapes in which observations are given to a network: several rows, one row, one without an axis of rows."""
 REFUSED = {"Loop", "RandomNormal", "RandomNormalLike", "RandomUniform", "RandomUniformLike", "Multinomial", "Bernoulli"}
 """Operators that no policy needs, and with which two runs may take different time and memory."""
 
@@ -25,16 +25,19 @@ _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
 
 def form(observation: NDArray) -> str:
-    """Return which of `FORMS` an observation has."""
-    several, row, alone = FORMS
-    return alone if observation.ndim == 1 else row if len(observation) == 1 else several
+    """Return the one of `FORMS` that an observation has."""
+    several_rows, one_row, without_rows = FORMS
+    if observation.ndim == 1:
+        return without_rows
+    return one_row if len(observation) == 1 else several_rows
 
 
 def onnx_session(path: Path, observations: NDArray) -> tuple[Any, dict[str, str]]:
     """Return onnxruntime's session of a file, and the `form`s of `observations` (N, D) that it fails on, with reasons.
 
-    A child process with bounded time and memory opens the file and runs it on the observations first, as both may
-    depend on the numbers. Raises `SpringfootError` for a file that onnxruntime does not open, or not within the bounds.
+    A child process with bounded time and memory opens the file and runs it on the observations first: time, memory and
+    failures may depend on the numbers. Raises `SpringfootError` for a file that onnxruntime does not open, or not
+    within the bounds.
     """
     if (size := path.stat().st_size) > MOST_ONNX_BYTES:
         raise SpringfootError(f"{path} must have at most {MOST_ONNX_BYTES:,} bytes, has {size:,}")

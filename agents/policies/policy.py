@@ -120,7 +120,7 @@ class Policy:
         if self.observation_clip is not None:
             rows = rows.clip(-self.observation_clip, self.observation_clip)
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            rows = ACTIVATIONS[self.activation](rows) if layer else rows
+            rows = ACTIVATIONS[self.activation](rows) if layer > 0 else rows  # activations stand between the layers
             # einsum adds in the same order for any N, BLAS does not; a row must not depend on the other rows.
             rows = np.einsum("...i,oi->...o", rows, weight.astype(np.float64), optimize=False) + bias
         if not np.isfinite(rows).all():  # wide and deep unbounded layers can overflow
@@ -140,9 +140,10 @@ def save_policy(path: str | Path, policy: Policy) -> None:
 
 
 def find_policy(name: str | Path) -> Path:
-    """Return the file of a policy from its path, its run folder (the best policy) or one of `SHIPPED`.
+    """Return the path of a policy's file.
 
-    Raises `SpringfootError` if there is none.
+    `name` is that path, a run folder (its best policy) or one of `SHIPPED`. Raises `SpringfootError` if there is no
+    such file.
     """
     path = Path(name)
     if str(name) in SHIPPED:
@@ -161,6 +162,7 @@ def find_policy(name: str | Path) -> Path:
 
 
 _NUMBERS = ("observation_clip", "variance_floor")
+"""Entries of a header's network that are numbers; a clip may be null."""
 
 
 def load_policy(name: str | Path) -> Policy | ForeignPolicy:
@@ -176,7 +178,7 @@ def load_policy(name: str | Path) -> Policy | ForeignPolicy:
 
 
 def read_policy(name: str | Path) -> Policy:
-    """Return the policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`, after all checks.
+    """Read, check and return the policy in a .safetensors file, a run folder (its best) or one of `SHIPPED`.
 
     Raises `SpringfootError`, one line, if the file is missing, no .safetensors file, not of springfoot, of another
     format version, incomplete or not finite, or made for other spaces, another model or other legs than this version's.
@@ -226,7 +228,11 @@ def read_policy(name: str | Path) -> Policy:
 
 
 def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list[int]) -> None:
-    """Raise `SpringfootError` unless the tensors are those of layers of these `sizes`, with numbers within bounds."""
+    """Raise `SpringfootError` unless the tensors of the policy `name` are those of its layers, with numbers within
+    bounds.
+
+    `sizes` are the widths of observation, hidden layers and actions.
+    """
     shapes = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
         shapes |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}

@@ -33,26 +33,37 @@ SAME_BETA = 1e-4
 
 
 def schedule_file(
-    name: str, conditions: BipedSettings
+    name: str, settings_of_body: BipedSettings
 ) -> tuple[dict[str, Any], Callable[[BipedSettings], PolicyFunction]]:
-    """Read a schedule file: return the settings that it needs, and a function that makes its policy of settings.
+    """Return the environment settings that a schedule file needs, and a function that builds the file's policy for an
+    environment's settings.
 
-    The settings are absolute actions and the file's rest angles, for the body of `conditions`; the function takes the
-    settings of an environment of that body. Raises `SpringfootError` for another file.
+    Args:
+        name: path of the file, as an evaluation writes it: `.json` for finite states, else `.csv` for K over the
+            stride.
+        settings_of_body: settings of the body to which K is scaled; they count for nothing else. The environment has to
+            have that body.
+
+    The needed settings are absolute actions and the file's rest angles. Raises `SpringfootError` for a file of another
+    content.
     """
     path = Path(name)
     if path.suffix.lower() == ".json":
-        springs = _states(path, conditions)
-        return {"action_mode": "absolute", "equilibrium": "phase", "schedule": springs.to_json()}, schedule
+        springs = _states(path, settings_of_body)
+        needed = {"action_mode": "absolute", "equilibrium": "phase", "schedule": springs.to_json()}
+        return needed, schedule  # the baseline, which plays the schedule of the settings
     table = read_csv(path)
-    stiffness = _stiffness(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), conditions)
+    stiffness = _stiffness(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), settings_of_body)
     needed = {"action_mode": "absolute"} | _equilibrium(table, stiffness)
+    # One schedule serves all speeds: [None] is the axis of speeds, and its single entry may be any.
     return needed, lambda settings: follow(stiffness[None], np.zeros(1), settings, body_of(settings))
 
 
 def _scale(height: float | None, mass: float | None, settings: BipedSettings) -> float:
-    """Return the ratio of the stiffness of the body of `settings` to that of a body of `height` [m] and `mass` with
-    load [kg]; None is 1.70 m or 63 kg."""
+    """Return the factor [-] by which stiffness is scaled from the body of a file to the body of `settings`.
+
+    `height` [m] and `mass`, load included [kg], are the file's; None stands for 1.70 m or 63 kg.
+    """
     height = require_number("height_m", REFERENCE_HEIGHT if height is None else height, 0.0, unit="m", above=True)
     mass = require_number("mass_kg", REFERENCE_MASS if mass is None else mass, 0.0, unit="kg", above=True)
     return body_of(settings).stiffness_scale / (mass / REFERENCE_MASS * height / REFERENCE_HEIGHT)
@@ -67,11 +78,18 @@ def _cell(table: Table, column: str) -> float | None:
 
 
 def _columns(table: Table, quantity: str) -> list[list[str]]:
-    """Return [side][joint] the names of the columns with a quantity of each spring: one for each side, or one for
-    both."""
+    """Return the column names of a spring quantity as [side][joint], such as `ankle_left_stiffness_Nm_per_rad`.
+
+    A column without a side, `ankle_stiffness_Nm_per_rad`, serves both legs. Raises `SpringfootError` if a spring has no
+    column.
+    """
+    # The first of the two possible names that the table has; "" if it has neither.
     names = [
         [
-            next((c for c in (f"{joint}_{side}_{quantity}", f"{joint}_{quantity}") if c in table.columns), "")
+            next(
+                (column for column in (f"{joint}_{side}_{quantity}", f"{joint}_{quantity}") if column in table.columns),
+                "",
+            )
             for joint in SPRINGS
         ]
         for side in SIDES
@@ -86,7 +104,12 @@ def _columns(table: Table, quantity: str) -> list[list[str]]:
 
 
 def _curves(table: Table, quantity: str) -> NDArray:
-    """Return (SAMPLES, side, joint) a quantity of the springs on `GRID`; linear and periodic between the rows."""
+    """Return a quantity of the springs on `GRID`, (SAMPLES, side, joint), from a table of rows at percents of the
+    stride.
+
+    It is linear between rows, and periodic. `quantity` is the end of the column names, as in `_columns`. Raises
+    `SpringfootError` for percents that are missing, not ascending or outside [0, 100].
+    """
     if not table.has("percent"):
         raise SpringfootError(f"{table.name}, line 1: needs a column percent, of the leg's stride")
     percent = table.ascending("percent")
@@ -94,6 +117,7 @@ def _curves(table: Table, quantity: str) -> NDArray:
         if not 0.0 <= value <= PERCENT[-1]:
             raise table.error(line, "percent", f"must be in [0, 100], got {value:g}")
     inside = percent < PERCENT[-1]  # 100 is 0 again
+    # [side][joint] (rows,), then (side, joint, SAMPLES)
     of_rows = [[table.numbers(column)[inside] for column in columns] for columns in _columns(table, quantity)]
     if not inside.any():
         raise SpringfootError(f"{table.name} needs a row of less than 100 percent")
@@ -116,10 +140,11 @@ def _stiffness(table: Table) -> NDArray:
 
 
 def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
-    """Return the settings of the rest angles: `equilibrium` from the column of that name, `planned` without it.
+    """Return the environment settings of a table's rest angles: `equilibrium`, and `schedule` if it is `phase`.
 
-    With `phase` also `schedule`: stiffness and rest angles, constant over each percent of the stride and the same for
-    both legs.
+    `equilibrium` is the word in the column of that name, `planned` without the column. `schedule`, in JSON form, has
+    for each percent of the stride K and rest angle at its start, averaged over the two legs, since a schedule has one
+    course for both. `stiffness` (SAMPLES, side, joint) [N m/rad] is the table's, scaled to the body.
     """
     kinds = get_args(Equilibrium)
     kind = "planned"
@@ -130,23 +155,31 @@ def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
             raise table.error(line, "equilibrium", f"must be one of {', '.join(kinds)}, got {kind!r:.40}")
     if kind != "phase":
         return {"equilibrium": kind}
-    per_percent = len(GRID) // int(PERCENT[-1])
-    springs = np.stack([stiffness, np.radians(_curves(table, "equilibrium_deg"))], -1).mean(axis=1)[::per_percent]
-    starts = np.broadcast_to(GRID[::per_percent, None, None], (len(springs), len(SPRINGS), 1))
-    lines = np.concatenate([starts, springs], axis=-1).swapaxes(0, 1).tolist()
-    return {"equilibrium": kind, "schedule": dict(zip(SPRINGS, lines, strict=True))}
+    rest_angles = np.radians(_curves(table, "equilibrium_deg"))
+    of_legs = np.stack([stiffness, rest_angles], -1)  # (SAMPLES, side, joint, (K, rest angle))
+    samples_per_percent = len(GRID) // int(PERCENT[-1])
+    springs = of_legs.mean(axis=1)[::samples_per_percent]  # (percent, joint, (K, rest angle)), the mean of both legs
+    starts = np.broadcast_to(GRID[::samples_per_percent, None, None], (len(springs), len(SPRINGS), 1))
+    # (joint, percent, (start, K, rest angle)): a list of segments for each joint, as a schedule is written
+    segments = np.concatenate([starts, springs], axis=-1).swapaxes(0, 1).tolist()
+    return {"equilibrium": kind, "schedule": dict(zip(SPRINGS, segments, strict=True))}
 
 
 # Springs of finite states, in a JSON file --------------------------------------------------------------------
 
 
 def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
-    """Return the springs of a finite-state table, for the body of `settings`."""
+    """Return the schedule in a file of finite states: K and rest angle of ankle and toe, constant in each state.
+
+    K is scaled to the body of `settings`. Raises `SpringfootError` for a file of another form, for numbers out of
+    range, and for a damping time other than the model's, which no policy can set.
+    """
     table = read_object(path, STATES_FILE)
     try:
         states = table["states"]
         height = table.get("height_m")
         mass = table.get("mass_kg")
+        # [state][joint] -> (phase of the state's start, K, damping time, rest angle)
         entries = [
             [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
         ]
@@ -157,11 +190,12 @@ def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
         ) from None
     model_betas = damping_times(body_of(settings))[FEET]
     scale = _scale(height, mass, settings)
-    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))  # of bodies that scale
-    lines = []
-    for column, (joint, model_beta) in enumerate(zip(SPRINGS, model_betas, strict=True)):
+    # Times of bodies of equal proportions are as the roots of their heights (Froude).
+    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))
+    courses = []  # of ankle and toe: each a tuple of segments
+    for index, (joint, model_beta) in enumerate(zip(SPRINGS, model_betas, strict=True)):
         segments = []
-        for phase, stiffness, beta, rest_deg in (state[column] for state in entries):
+        for phase, stiffness, beta, rest_deg in (state[index] for state in entries):
             stiffness = require_number(
                 f"{path.name}: {joint} {SPRING_KEYS[0]}", stiffness, 0.0, unit="N m/rad", above=True
             )
@@ -170,8 +204,8 @@ def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
                 raise SpringfootError(f"{path.name}: {joint} {SPRING_KEYS[1]} must be {allowed}, got {beta!r:.40}")
             rest = radians(require_within(f"{path.name}: {joint} {SPRING_KEYS[2]}", rest_deg, (-180.0, 180.0), "deg"))
             segments.append(Segment(phase, stiffness * scale, rest))
-        lines.append(tuple(segments))
+        courses.append(tuple(segments))
     try:
-        return StiffnessSchedule(*lines)
+        return StiffnessSchedule(*courses)
     except (SpringfootError, TypeError) as error:
         raise SpringfootError(f"{path.name}: {error}") from None

@@ -30,7 +30,8 @@ class SessionAndUserCallbacks(CallbackList):
 
 
 def call_with_evaluation(user_callbacks: Sequence[UserCallback], evaluation: dict[str, Any]) -> bool:
-    """Call the functions among the callbacks with an evaluation; return False if one of them ends the training."""
+    """Call the functions among the callbacks with an evaluation, its entry of run.json; return False if one of them
+    returned False, to end the training."""
     functions = [callback for callback in user_callbacks if not isinstance(callback, BaseCallback)]
     answers = [function(dict(evaluation)) for function in functions]
     return all(answer is not False for answer in answers)

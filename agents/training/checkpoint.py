@@ -27,15 +27,22 @@ _NAME = re.compile(r"state-(\d{1,15})\.safetensors")
 
 
 class Header(TypedDict):
-    """Content of a checkpoint's header; see `session`."""
+    """Content of a checkpoint's header."""
 
     timesteps: int
+    """Environment steps trained so far."""
     config: dict[str, Any]
+    """Configuration of the training, in JSON form."""
     fingerprint: dict[str, str]
+    """Fingerprint of its environment."""
     record: dict[str, list[dict[str, Any]]]
+    """Sessions and evaluations so far, as in run.json."""
     seconds: float
+    """Wall time of the training so far [s]."""
     events: dict[str, int]
+    """Size of each of TensorBoard's event files [bytes]."""
     learning: Learning
+    """JSON part of the learning's state."""
 
 
 def checkpoints(out: Path) -> list[Path]:
@@ -47,7 +54,11 @@ def checkpoints(out: Path) -> list[Path]:
 def write_checkpoint(
     out: Path, header: dict[str, Any], arrays: Mapping[str, np.ndarray], kept: int = KEPT_CHECKPOINTS
 ) -> None:
-    """Write the checkpoint of `header["timesteps"]`, then remove all but the newest `kept`."""
+    """Write the checkpoint after `header["timesteps"]` steps into the folder `out`; then remove all but the newest
+    `kept`.
+
+    `header` is as in `Header`, `arrays` holds the state's arrays by name.
+    """
     write_tensors(out / f"state-{header['timesteps']}.safetensors", STATE_KEY, header, arrays)
     for path in checkpoints(out)[kept:]:
         path.unlink(missing_ok=True)
@@ -62,7 +73,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     try:
         _require_header(header)
     except (KeyError, TypeError, ValueError) as error:
-        reason = f"it has no {error}" if isinstance(error, KeyError) else error
+        reason = f"it has no {error}" if isinstance(error, KeyError) else error  # of KeyError the text is the key
         raise SpringfootError(f"{path} is damaged: {reason}") from None
     return header, arrays
 

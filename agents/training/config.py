@@ -16,6 +16,7 @@ WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
 training state is then at most half as large as the largest file that is read."""
 _LARGEST = 1e3  # rate of learning or clip range; chosen
 _SIDE_BY_SIDE = ("num_envs", "eval_episodes")
+"""Settings that count environments simulated side by side, and so have their limit."""
 
 TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
 """Default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range at 0."""

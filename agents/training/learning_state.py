@@ -19,7 +19,9 @@ from .ppo import Learner
 from .sb3_vec_env import SegmentedFootBipedVecEnv
 
 _LEARNER = ("network.", "adam.", "observation.", "return.")
+"""First parts of the names of the learner's arrays."""
 _SIMULATION = "simulation."
+"""First part of the names of the environments' arrays."""
 
 
 class Episode(TypedDict):
@@ -30,16 +32,18 @@ class Episode(TypedDict):
 
 
 class Learning(TypedDict):
-    """JSON part of the state."""
+    """JSON part of the state of a training; the other part is arrays."""
 
     generators: list[dict[str, Any]]
-    """Generator of each environment."""
+    """State of each environment's random generator."""
     actions: dict[str, Any]
-    """Generator of the action space."""
+    """State of the action space's random generator."""
     numpy: list[float]
-    """NumPy's generator: position, whether it holds a normal number, and that number."""
+    """NumPy's global generator: its position, whether it holds a normal number (1 or 0), and that number."""
     python_gauss: float | None
+    """Normal number that Python's global generator holds, if it does."""
     updates: int
+    """Gradient epochs so far, as stable-baselines3 counts them."""
     episodes: list[Episode]
     """Latest episodes, whose mean return is rollout/ep_rew_mean."""
     logged: dict[str, list[Any]]
@@ -101,14 +105,14 @@ def restore_learning(
         simulation = {name.removeprefix(_SIMULATION): array for name, array in simulation.items()}
         environments.restore(simulation | {"generators": values["generators"]})
         width = len(environments.env.biped.observation_names)
-        normalized.returns = _fitting(arrays, "rollout.returns", (ppo.n_envs,), np.float64)
-        ppo._last_obs = _fitting(arrays, "rollout.observation", (ppo.n_envs, width), np.float32)
-        ppo._last_episode_starts = _fitting(arrays, "rollout.episode_starts", (ppo.n_envs,), np.bool_)
+        normalized.returns = _checked_array(arrays, "rollout.returns", (ppo.n_envs,), np.float64)
+        ppo._last_obs = _checked_array(arrays, "rollout.observation", (ppo.n_envs, width), np.float32)
+        ppo._last_episode_starts = _checked_array(arrays, "rollout.episode_starts", (ppo.n_envs,), np.bool_)
         ppo._n_updates = require_count("updates", values["updates"], 0)
         episodes = ({"r": float(episode["r"]), "l": int(episode["l"])} for episode in values["episodes"])
         ppo.ep_info_buffer = deque(episodes, maxlen=ppo._stats_window_size)
         ppo.ep_success_buffer = deque(maxlen=ppo._stats_window_size)  # these environments report no success
-        if not all(
+        if not all(  # [value, formats] by name
             len(entry) == 2 and isinstance(entry[1], list) and isfinite(entry[0]) for entry in values["logged"].values()
         ):
             raise ValueError("logged must be values, each with the formats that leave it out")
@@ -125,9 +129,9 @@ def restore_learning(
         raise SpringfootError(f"the training state does not fit its configuration: {reason}") from None
 
 
-def _fitting(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
-    """Return the array `name` of a state; raise `ValueError` for another shape or type, and for numbers that are not
-    finite."""
+def _checked_array(arrays: Mapping[str, np.ndarray], name: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
+    """Return the array `name` of the state `arrays`; raise `ValueError` unless it has this `shape`, numbers of this
+    `kind` (a type of NumPy's), and all finite."""
     values = arrays[name]
     if values.shape != shape or values.dtype != kind:
         raise ValueError(f"{name} is {values.dtype} {values.shape}, not {kind.__name__} {shape}")

@@ -30,9 +30,11 @@ from .config import TrainingConfig, config_from_json, config_to_json, processors
 from .run_record import read_record
 
 SEEDS = "seeds.json"
+"""Name of the file with the results of all seeds."""
 Engine = Literal["here", "ray"]
 """Where several trainings run: in processes on this machine, or on the nodes of a Ray cluster."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that are passed on to the trainings."""
 SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
 """Results in `seeds.json` with mean and standard deviation (n - 1) over the seeds."""
 
@@ -85,7 +87,10 @@ def train_all(
 def _train_on_ray(
     jobs: Sequence[tuple[TrainingConfig, Path, str]],
 ) -> tuple[list[dict[str, Any]], signal.Signals | None]:
-    """Train the jobs of `train_all` on the nodes of a Ray cluster; return what `train_all` returns."""
+    """Train `jobs` (configuration, folder, name) on the nodes of a Ray cluster.
+
+    Returns a row of results for each, and the signal that stopped them, if any, as `train_all` does.
+    """
     with naming_extras():
         from .cluster.nodes import run_on_ray  # not above: an extra
     stopping = None
@@ -106,12 +111,14 @@ def _command(config: TrainingConfig, folder: Path) -> list[str]:
 def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) -> str:
     """Return the status of all seeds together: `failed` if one failed, else `interrupted` after a signal, else
     `finished`."""
-    status = "interrupted" if signalled else "finished"
-    return "failed" if any(row["status"] == "failed" for row in rows) else status
+    if any(row["status"] == "failed" for row in rows):
+        return "failed"
+    return "interrupted" if signalled else "finished"
 
 
 def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engine = "here") -> str:
-    """Train those of the jobs (see `train_all`) whose folder holds no finished run, continuing unfinished ones.
+    """Train those of the jobs (configuration, folder, name) whose folder holds no finished run; continue unfinished
+    runs.
 
     Returns the status of all: `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing changed,
     if a folder holds a run of another configuration.
@@ -131,13 +138,16 @@ def is_finished(folder: Path) -> bool:
 
 
 def spread(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
-    """Return mean and standard deviation (n - 1) of each of `SPREAD` over the finished seeds; None for unknown ones."""
+    """Return mean and standard deviation (n - 1) of each result of `SPREAD` over the finished seeds.
+
+    `rows` are the seeds' rows of results. None stands for a mean without a seed, and for a deviation of fewer than two.
+    """
     finished = [row for row in rows if row["status"] == "finished"]
     return {name: mean_sd([row[name] for row in finished]) for name in SPREAD}
 
 
 def training_table(record: dict[str, Any]) -> str:
-    """Return the Markdown table of the seeds, and the mean ± SD over the finished ones."""
+    """Return the Markdown table of `seeds.json`: a line for each seed, and the mean ± SD over the finished ones."""
     head = ["seed", "status", "steps", "seconds", "best return", "falls", "after steps"]
     lines = []
     for row in record["seeds"]:
@@ -155,9 +165,9 @@ class _Trainings:
 
     def __init__(self) -> None:
         self.stopping: signal.Signals | None = None  # the signal that came, if one did
-        self._lock = threading.RLock()  # a second signal may interrupt the passing on of the first
+        self._lock = threading.RLock()  # reentrant: a second signal may interrupt the passing on of the first
         self._running: list[subprocess.Popen[str]] = []
-        self._before: dict[int, Any] = {}
+        self._handlers_before: dict[int, Any] = {}
 
     def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
         """Train in a process of its own, print its messages after its `name`, and return its row of results."""
@@ -184,8 +194,9 @@ class _Trainings:
             self._running.remove(process)
         if process.returncode < 0 and not self.stopping:
             ended = signal.Signals(-process.returncode).name
-            saved = f"springfoot train --resume {folder} goes on from what it has saved"
-            saved = saved if (folder / RUN).is_file() else "it had saved nothing yet"
+            saved = "it had saved nothing yet"
+            if (folder / RUN).is_file():
+                saved = f"springfoot train --resume {folder} goes on from what it has saved"
             print(f"{name}: its process was ended by {ended}; {saved}", file=sys.stderr, flush=True)
         return _row(config, folder, "interrupted" if self.stopping else "failed")
 
@@ -200,14 +211,14 @@ class _Trainings:
         """Handle SIGINT and SIGTERM, which Python allows in the main thread only."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
-                self._before[number] = signal.signal(number, self._stop)
+                self._handlers_before[number] = signal.signal(number, self._stop)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the signal handlers; terminate processes that still run, as they do only after an error."""
-        for number, handler in self._before.items():
+        for number, handler in self._handlers_before.items():
             signal.signal(number, handler)
         for process in self._running:
             process.terminate()
@@ -220,8 +231,11 @@ def _block(blocked: bool) -> None:
 
 
 def _row(config: TrainingConfig, folder: Path, if_incomplete: str) -> dict[str, Any]:
-    """Return the row of results of one seed, from its run.json; its status is `if_incomplete` if that file is missing
-    or still says `running`."""
+    """Return one seed's row of results, a seed of `seeds.json`, from the run.json in `folder`.
+
+    Its status is `if_incomplete` if that file is missing or still says `running`: the training ended without a word.
+    Numbers that are not known are None.
+    """
     record = read_record(folder) if (folder / RUN).is_file() else {}
     status = record.get("status", "running")
     best = record.get("best") or {}

@@ -43,6 +43,7 @@ class Learner:
             self.ppo = PPO(
                 "MlpPolicy",
                 self.normalized,
+                # left: fraction of the training that is still to come, 1 at its start
                 learning_rate=lambda left: config.learning_rate * (left + config.learning_rate_end * (1 - left)),
                 n_steps=self.rollout_steps,
                 batch_size=-(-samples // config.minibatches),  # rounded up
@@ -88,7 +89,7 @@ class Learner:
         return arrays
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Continue from a `state`; raise `SpringfootError` if it does not fit this learner."""
+        """Continue from `arrays` as `state` returns them; raise `SpringfootError` if they do not fit this learner."""
         subject = "the training state"  # of the errors
         require_bounded(subject, arrays)
         require_moments(subject, arrays, len(list(self.ppo.policy.parameters())))
@@ -102,7 +103,7 @@ class Learner:
             moments: dict[int, dict[str, torch.Tensor]] = {}
             for name, value in arrays.items():
                 if name.startswith("adam."):
-                    _, index, item = name.split(".")
+                    _, index, item = name.split(".")  # adam.INDEX OF THE PARAMETER.ITEM
                     expected = () if item == "step" else tuple(parameters[int(index)].shape)
                     _require_shape(name, value, expected)
                     moments.setdefault(int(index), {})[item] = torch.from_numpy(value)
@@ -111,7 +112,7 @@ class Learner:
                 for item in ("mean", "var", "count"):
                     value = arrays[f"{name}.{item}"]
                     _require_shape(f"{name}.{item}", value, np.shape(getattr(statistics, item)))
-                    setattr(statistics, item, value if value.shape else float(value))
+                    setattr(statistics, item, value if value.shape else float(value))  # a count is a number
         except (KeyError, IndexError, ValueError, RuntimeError) as error:
             reason = " ".join(str(error).split())
             raise SpringfootError(f"{subject} does not fit its configuration: {reason}") from None
@@ -123,5 +124,6 @@ class Learner:
 
 
 def _require_shape(name: str, value: np.ndarray, shape: tuple[int, ...]) -> None:
+    """Raise `ValueError` unless the array `name` of a state has this shape."""
     if value.shape != shape:
         raise ValueError(f"{name} has shape {value.shape}, not {shape}")

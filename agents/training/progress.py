@@ -23,7 +23,7 @@ class Progress:
             disable=not sys.stderr.isatty(),
         )
         self._total = total
-        self._first = done
+        self._done_before = done  # the rate is that of this session alone
         self._done = done
         self._state = ""
         self._began = self._last_line = monotonic()
@@ -45,7 +45,9 @@ class Progress:
         """Print a line of progress if there is no bar."""
         if self._bar.disable:
             self._last_line = monotonic()
-            rate = (self._done - self._first) / max(self._last_line - self._began, 1e-9)  # [steps/s]
+            rate = (self._done - self._done_before) / max(
+                self._last_line - self._began, 1e-9
+            )  # [steps/s]; no time may have passed
             remaining = max(self._total - self._done, 0)
             left = f"{tqdm.format_interval(remaining / rate)} left" if rate and remaining else ""
             parts = f"{self._done:,} of {self._total:,} steps", self._state, left

@@ -13,7 +13,11 @@ EVALUATION_SEED = 2**30
 
 
 def evaluation_of(biped: Biped, policy: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
-    """Run one episode in each environment; return the summary that run.json keeps of a periodic evaluation."""
+    """Run one episode of the policy in each environment of `biped`, from the evaluations' seeds.
+
+    Returns the summary that run.json keeps of a periodic evaluation: mean and spread of the return [-], falls, mean
+    length [s].
+    """
     returns, seconds, fell = evaluate_returns(biped, policy, EVALUATION_SEED)
     return {
         "return_mean": float(returns.mean()),
@@ -27,9 +31,9 @@ def evaluation_of(biped: Biped, policy: Callable[[np.ndarray], np.ndarray]) -> d
 def evaluate_returns(
     biped: Biped, policy: Callable[[np.ndarray], np.ndarray], seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run one episode in each environment of `biped`, seeded `seed`, `seed` + 1 and so on.
+    """Run one episode of the policy in each environment of `biped`, seeded `seed`, `seed` + 1 and so on.
 
-    Returns: (N,) return [-], length [s], and whether the episode ended in a fall.
+    Returns of each of the N episodes, (N,): the return [-], the length [s], and whether it ended in a fall.
     """
     episodes = biped.num_envs
     returns = np.zeros(episodes)

@@ -14,6 +14,7 @@ from ..policies.policy import RUN
 from .config import config_from_json
 
 EVENTS = "events.out.tfevents.*"
+"""Pattern of the names of TensorBoard's event files."""
 RLLIB = "rllib"
 """Name of the engine in the record of a run that RLlib trained."""
 
@@ -36,7 +37,7 @@ def read_record(out: Path) -> dict[str, Any]:
 
 
 def require_past(record: Mapping[str, Any]) -> None:
-    """Raise KeyError or ValueError if `sessions` or `evaluations` of a record are malformed."""
+    """Raise KeyError or ValueError if the past of a run, `sessions` or `evaluations` of its record, is malformed."""
     for name in ("sessions", "evaluations"):
         if not isinstance(record[name], list) or not all(isinstance(entry, dict) for entry in record[name]):
             raise ValueError(f"{name} must be a list of objects")
@@ -52,7 +53,8 @@ def require_past(record: Mapping[str, Any]) -> None:
 
 def runs_within(out: Path) -> list[Path]:
     """Return the folders of the runs in a folder of several seeds, in the order of the seeds."""
-    return sorted((path.parent for path in out.glob(f"seed-*/{RUN}")), key=lambda path: (len(path.name), path.name))
+    folders = (path.parent for path in out.glob(f"seed-*/{RUN}"))
+    return sorted(folders, key=lambda path: (len(path.name), path.name))  # seed-9 before seed-10
 
 
 def write_record(out: Path, record: Mapping[str, Any]) -> None:
@@ -93,7 +95,7 @@ def event_sizes(out: Path) -> dict[str, int]:
 def cut_events(out: Path, sizes: Mapping[str, int]) -> None:
     """Cut the event files to `sizes` [bytes by name] and remove others: a resumed run writes the later events again."""
     for path in out.glob(EVENTS):
-        size = sizes.get(path.name, 0)
+        size = sizes.get(path.name, 0)  # 0 for a file that did not exist then
         if size == 0:
             path.unlink()
         elif path.stat().st_size > size:

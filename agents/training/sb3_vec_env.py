@@ -56,7 +56,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self.step_info = _values(info)
         if done.any():
-            final = _values(info["final_info"])
+            final = _values(info["final_info"])  # of the last step; `info` already is that of the new episode's reset
             self.step_info = {name: np.where(done, last, info.get(name, last)) for name, last in final.items()}
             for i in np.flatnonzero(done):
                 infos[i] = {name: values[i] for name, values in final.items()} | {
@@ -120,7 +120,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
 
 
 def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Merge the reset options of the environments into those of the batch.
+    """Return the reset options of the batch, merged from those of each environment, `by_environment`.
 
     The options of `DRAWN` (bodies and speeds) may differ between environments and become lists; all others must agree.
     """
@@ -139,5 +139,8 @@ def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return a vector environment's info without the masks and the last observations and infos."""
+    """Return name -> values (N,) of a vector environment's info.
+
+    Leaves out its masks (`_NAME`), and the last observations and infos of ended episodes (`final_NAME`).
+    """
     return {name: values for name, values in info.items() if not name.startswith(("_", "final_"))}

@@ -62,24 +62,26 @@ class Session(BaseCallback):
         self._config = config
         self._out = out
         self._record = record
-        self._start = checkpoint
+        self._start_from = checkpoint
         threads = threads or config.threads or processors()
         settings = settings_to_json(config.environment)
         self._environments = SegmentedFootBipedVecEnv(config.num_envs, num_threads=threads, **settings)
         self._evaluation = Biped(config.environment, config.eval_episodes, threads)
         self._fingerprint = fingerprint(self._evaluation)
-        seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)  # below that of evaluations
+        # A seed of 29 bits: the environments count on from it, and evaluations begin at 2^30.
+        seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)
         self.learner = Learner(config, self._environments, seed)
         self._stopping = Stopping()
         self._began = monotonic()
-        self._written_at, self._write_seconds = 0.0, 0.0  # of the latest checkpoint
+        self._written_at = 0.0  # time of the latest checkpoint
+        self._write_seconds = 0.0  # time that writing it took
         header, arrays = checkpoint or ({"timesteps": 0, "seconds": 0.0}, {})
         self._first_timesteps = header["timesteps"]
         self._seconds_before = header["seconds"]
         self._trained = self._first_timesteps
         self._captured = checkpoint
-        self._policy = None
-        self._best = arrays[BEST_FILE].tobytes() if BEST_FILE in arrays else b""
+        self._policy = None  # of the captured state
+        self._best = arrays[BEST_FILE].tobytes() if BEST_FILE in arrays else b""  # the best policy's file
         self._user_callbacks = callbacks
         self._sums: dict[str, np.ndarray] = {}  # over the steps of a rollout, (N,) by name
         self._ended: list[dict[str, Any]] = []  # infos of the episodes that ended in a rollout
@@ -130,12 +132,13 @@ class Session(BaseCallback):
         policy with another return than the recorded one, as under another reward, is recorded in it anew. Random
         generators are restored last, so that nothing draws in between.
         """
-        if self._start is None:
+        if self._start_from is None:
             self._record["sessions"].append(session)
             cut_events(self._out, {})  # of a training that was killed before its first checkpoint
             return {}
-        header, arrays = self._start
+        header, arrays = self._start_from
         require_same(self._out, header["fingerprint"], self._fingerprint)
+        # The checkpoint's best policy counts: a session that was killed may have written a later one.
         if self._best and not has_content(self._out / BEST, self._best):
             write_atomically(self._out / BEST, self._best)
         recorded = best_of(self._record)
@@ -148,12 +151,12 @@ class Session(BaseCallback):
                     file=sys.stderr,
                     flush=True,
                 )
-        config = json.loads(json.dumps(config_to_json(self._config)))
+        config = json.loads(json.dumps(config_to_json(self._config)))  # as the header's: tuples are lists in JSON
         before = header["config"].get("environment", {})
         now = config["environment"]
         if changed := {name: value for name, value in before.items() if now.get(name) != value}:
             session["changed_from"] = changed
-        same_config = {**header["config"], "threads": 0} == {**config, "threads": 0}
+        same_config = {**header["config"], "threads": 0} == {**config, "threads": 0}  # threads change no bit
         if not (same_config and same_source(self._record["sessions"][-1], session) and "best" not in session):
             self._record["sessions"].append(session)
         learning = {name: values for name, values in arrays.items() if name != BEST_FILE}
@@ -177,7 +180,9 @@ class Session(BaseCallback):
         due = not evaluations or self._trained - evaluations[-1]["timesteps"] >= self._config.eval_interval
         if due and not self._stopping.asked:
             self._evaluate()
-        elif monotonic() - self._written_at > self._write_seconds / CHECKPOINT_TIME_FRACTION:
+        elif (
+            monotonic() - self._written_at > self._write_seconds / CHECKPOINT_TIME_FRACTION
+        ):  # seldom if writing is slow
             self._write_checkpoint()
 
     def _on_step(self) -> bool:
@@ -255,8 +260,8 @@ class Session(BaseCallback):
         return self._seconds_before + monotonic() - self._began
 
     def _save(self, status: str) -> None:
-        """Write the captured state as a checkpoint, the newest policy and the record."""
-        self._write_checkpoint(1 if status == "finished" else KEPT_CHECKPOINTS)
+        """Write the captured state as a checkpoint, the newest policy, and the record with this `status`."""
+        self._write_checkpoint(1 if status == "finished" else KEPT_CHECKPOINTS)  # a finished run needs no older ones
         if self._policy is not None:
             save_policy(self._out / LAST, self._policy)
         self._write_record(status)

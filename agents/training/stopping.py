@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that stop a training."""
 
 
 class Stopping:
@@ -17,7 +18,7 @@ class Stopping:
     def __init__(self) -> None:
         self.asked = False
         self.signal: signal.Signals | None = None
-        self._before: dict[int, Any] = {}
+        self._handlers_before: dict[int, Any] = {}
 
     def _stop(self, number: int, _frame: Any) -> None:
         """Note the first signal; at the second, raise KeyboardInterrupt."""
@@ -34,14 +35,14 @@ class Stopping:
 
     def _restore(self) -> None:
         """Restore the signal handlers from before."""
-        for number, handler in self._before.items():
+        for number, handler in self._handlers_before.items():
             signal.signal(number, handler)
 
     def __enter__(self) -> "Stopping":
         """Handle the signals, which Python allows in the main thread only."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
-                self._before[number] = signal.signal(number, self._stop)
+                self._handlers_before[number] = signal.signal(number, self._stop)
         return self
 
     def __exit__(

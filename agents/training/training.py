@@ -92,7 +92,8 @@ def resume(
 
 
 def _require_same_shape(out: Path, of_checkpoint: Mapping[str, Any], of_record: Mapping[str, Any]) -> None:
-    """Raise `SpringfootError` if checkpoint and run.json differ in a setting that decides the shape of the arrays."""
+    """Raise `SpringfootError` if the configurations of checkpoint and run.json differ in a setting that decides the
+    shape of the arrays; `out` is the run's folder."""
     for name in ("num_envs", "hidden"):
         if of_checkpoint[name] != of_record[name]:
             raise SpringfootError(
@@ -101,10 +102,13 @@ def _require_same_shape(out: Path, of_checkpoint: Mapping[str, Any], of_record: 
 
 
 def _is_complete(out: Path, record: dict[str, Any], checkpoint: Checkpoint) -> bool:
-    """Return True if record and policies of a finished run agree with its last checkpoint, so that nothing is left to
-    write."""
+    """Return True if the run in `out` is finished, and its `record` and policies agree with its last `checkpoint`.
+
+    Otherwise the run was killed as it wrote them, and a session of no steps has to write them again.
+    """
     header, arrays = checkpoint
     same_record = all(record.get(name) == value for name, value in header["record"].items())
-    evaluated = [entry["timesteps"] for entry in record["evaluations"]][-1:] == [header["timesteps"]]
+    evaluations = record["evaluations"]
+    evaluated = bool(evaluations) and evaluations[-1]["timesteps"] == header["timesteps"]
     same_best = has_content(out / BEST, arrays[BEST_FILE].tobytes())
     return same_record and evaluated and same_best and (out / LAST).is_file() and record.get("status") == "finished"

@@ -17,14 +17,15 @@ METRICS = ("evaluation/return_mean", "evaluation/falls", "evaluation/seconds_mea
 
 
 def log_configuration(logger: Logger, config: TrainingConfig) -> None:
-    """Write the configuration to TensorBoard; its table HPARAMS compares several runs by it."""
+    """Write the configuration to TensorBoard: as a text, and for its table HPARAMS, which compares several runs by
+    it."""
     values = config_to_json(config)
     text = "```json\n" + json.dumps(values, indent=2) + "\n```"
     hyperparameters = HParam(_flat(values), dict.fromkeys(METRICS, 0.0))
     for output in logger.output_formats:
         if isinstance(output, TensorBoardOutputFormat):
             both: dict[str, Any] = {"configuration": text, "hyperparameters": hyperparameters}
-            output.write(both, dict.fromkeys(both, ()), 0)
+            output.write(both, dict.fromkeys(both, ()), 0)  # excluded from no format, at step 0
 
 
 @contextmanager

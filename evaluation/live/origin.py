@@ -16,10 +16,11 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def is_own_page(headers: Mapping[str, str], host: str) -> bool:
-    """Tell whether a request comes from a page of the requested address, or from a program, which sends no `Origin`.
+    """Return True if a request with these `headers` comes from the live page itself, or from a program, which sends no
+    `Origin`.
 
-    Where `host`, the address listened on, belongs to this machine alone, the page's address must too: a name that
-    resolves to it (DNS rebinding) is not enough.
+    The page itself has the address that the request asks. Where `host`, the address listened on, belongs to this
+    machine alone, the page's address must too: a name that resolves to it (DNS rebinding) is not enough.
     """
     origin = headers.get("Origin")
     if origin is None:
@@ -37,6 +38,7 @@ def own_pages_only(host: str) -> Iterator[None]:
         """Start the server with an answer of 403 to requests from other pages."""
 
         def process(connection: Any, request: Any) -> Any:
+            """Answer a request from another page with 403, any other as viser does."""
             if is_own_page(request.headers, host):
                 return process_request(connection, request)
             return connection.respond(HTTPStatus.FORBIDDEN, "This page is not of the live walk.\n")

@@ -61,8 +61,8 @@ class LiveScene:
             self._begin()
         data = session.data()
         slope = np.radians(session.wishes.slope_deg)
-        x = float(data.qpos[0])
-        walked = np.array([x, 0.0, x * np.tan(slope)])
+        x = float(data.qpos[0])  # of the hip
+        walked = np.array([x, 0.0, x * np.tan(slope)])  # along the slope, by which everything is shifted back
         data.xpos[:] -= walked
         with self._server.atomic():
             for body, frame in self._bodies.items():
@@ -82,9 +82,9 @@ class LiveScene:
         scene.add_light_ambient("/daylight", intensity=DAYLIGHT)
         scene.add_light_directional("/sun", intensity=SUN, position=(2.0, -3.0, 4.0))
         self._bodies = {body: scene.add_frame(_name(body), show_axes=False) for body in range(1, model.nbody)}
-        for geom in np.flatnonzero(model.geom_bodyid).tolist():
+        for geom in np.flatnonzero(model.geom_bodyid).tolist():  # body 0 is the world, whose ground is drawn as a grid
             self._add_geom(geom)
-        turn = -np.radians(self._session.wishes.slope_deg) / 2
+        turn = -np.radians(self._session.wishes.slope_deg) / 2  # half the angle, for a quaternion
         self._ground = scene.add_line_segments(
             "/ground",
             _grid(),
@@ -94,11 +94,16 @@ class LiveScene:
             wxyz=(np.cos(turn), 0.0, np.sin(turn), 0.0),
         )
         self._forces = scene.add_arrows(
-            "/forces", np.zeros((2, 2, 3)), FORCE_COLOUR, shaft_radius=0.012, head_radius=0.03, head_length=0.06
+            "/forces",
+            np.zeros((len(SIDES), 2, 3)),
+            FORCE_COLOUR,
+            shaft_radius=0.012,
+            head_radius=0.03,
+            head_length=0.06,
         )
 
     def _add_geom(self, geom: int) -> None:
-        """Draw a capsule or sphere of the model on its body."""
+        """Draw the capsule or sphere with the number `geom` in the model, on its body."""
         model = self._model
         radius, half_length = model.geom_size[geom, :2]
         name = f"{_name(model.geom_bodyid[geom])}/{geom}"
@@ -112,6 +117,7 @@ class LiveScene:
 
 
 def _name(body: int) -> str:
+    """Return the name in the scene of the model's body with this number."""
     return f"/body/{body}"
 
 
@@ -133,6 +139,6 @@ def _arrows(force: NDArray, feet: NDArray, walked: NDArray) -> NDArray:
     """
     points = np.zeros((len(force), 2, 3), np.float32)
     for side, (x, height, forward, up) in enumerate(force):
-        start = np.array([x, feet[side, 1], height]) - walked * (1, 0, 1)
+        start = np.array([x, feet[side, 1], height]) - walked * (1, 0, 1)  # the feet's y is not shifted
         points[side] = start, start + FORCE_LENGTH * np.array([forward, 0.0, up])
     return points

@@ -148,9 +148,9 @@ class LiveSession:
         self._policy, self._settings = policy_and_settings(policy, settings, seed)
         self.name = policy
         self._seed = seed
-        self._pushed = 0.0
-        self._push_steps = 0
-        self._lying = 0
+        self._push_force = 0.0  # of the last push [N]
+        self._push_steps = 0  # steps for which it still acts
+        self._lying_steps = 0  # steps for which a fallen body still lies
         self.falls = 0
         """Falls so far."""
         names = {item.name for item in fields(Wishes)}
@@ -182,12 +182,13 @@ class LiveSession:
         return self._biped.data(0)
 
     def stiffness_ranges(self) -> NDArray:
-        """Return (joint, (lowest, highest)) K that actions can give to this body [N m/rad]; the legs may exceed it."""
-        ends = np.array([-1.0, 1.0])[:, None]
+        """Return K that actions can give to this body, (joint, (lowest, highest)) [N m/rad]; the legs may exceed it."""
+        ends = np.array([-1.0, 1.0])[:, None]  # the softest and the stiffest action
         return stiffness_of(ends, self._settings, self.body).T
 
     def ask(self, **wishes: Any) -> None:
-        """Change wishes, by name; raises `SpringfootError`, with nothing changed, for impossible wishes."""
+        """Change wishes, given by name, and the walk with them; raise `SpringfootError`, with nothing changed, for
+        impossible ones."""
         new_wishes = replace(self.wishes, **wishes)
         self._check(new_wishes)
         before = self.wishes
@@ -195,17 +196,18 @@ class LiveSession:
         changed = {item.name for item in fields(Wishes) if getattr(new_wishes, item.name) != getattr(before, item.name)}
         self.wishes = new_wishes
         try:
-            if changed & {*ANEW}:
+            if changed & {*ANEW}:  # another model: the walk begins again
                 self._biped = self._make(new_wishes)
                 self.restart()
-            # Offsets of theta_eq act through new tables of rest angles: a new batch that takes over the state.
+            # Offsets of theta_eq act through new tables of rest angles, which are of one speed: a new batch that takes
+            # over the state.
             elif changed & {*OFFSETS} or (_offset(new_wishes).any() and "speed" in changed):
                 self._biped = self._make(new_wishes)
                 self._biped.restore(biped.state())
                 self._walk = walked_steps(self._biped, self._action, ENDLESS)
             if "speed" in changed:
                 self._biped.command(np.arange(1), np.array([new_wishes.speed]))
-        except SpringfootError:
+        except SpringfootError:  # a wish that no check found: back to the walk before
             self.wishes = before
             self._biped = biped
             self._walk = walked_steps(biped, self._action, ENDLESS)
@@ -213,22 +215,22 @@ class LiveSession:
 
     def push(self, newton: float) -> None:
         """Push the trunk horizontally, forward positive [N], for `PUSH_SECONDS` from the next step on."""
-        self._pushed = require_number("push", newton, *LIVE_PUSHES, unit="N")
+        self._push_force = require_number("push", newton, *LIVE_PUSHES, unit="N")
         self._push_steps = ceil(PUSH_SECONDS / self.dt)
 
     def restart(self) -> None:
-        """Restart the walk with the present wishes."""
+        """Restart the walk from its beginning, with the present wishes."""
         walker = {name: np.array([getattr(self.wishes, name)]) for name in ("height", "mass", "speed")}
         self._biped.reset(np.arange(1), [self._seed], None, walker)
         self._walk: Iterator[Walked] = walked_steps(self._biped, self._action, ENDLESS)
         self._steps = 0
-        self._push_steps = self._lying = 0
-        still = np.zeros((len(SIDES), len(SPRINGS)))
+        self._push_steps = self._lying_steps = 0
+        nothing_yet = np.zeros((len(SIDES), len(SPRINGS)))  # no spring has acted
         speed = float(self._biped.measurement.com_velocity[0, 0])
         self.frame = Frame(
             time=0.0,
-            stiffness=still,
-            equilibrium=still,
+            stiffness=nothing_yet,
+            equilibrium=nothing_yet,
             force=np.zeros((len(SIDES), 4)),
             speed=speed,
             push=0.0,
@@ -236,18 +238,21 @@ class LiveSession:
         )
 
     def step(self) -> Frame:
-        """Walk one step of the environment. A fallen body lies for `LYING_SECONDS`, then the walk restarts."""
-        if self._lying:
-            self._lying -= 1
-            if not self._lying:
+        """Walk one step of the environment; return its numbers.
+
+        A fallen body lies for `LYING_SECONDS`, in which the last numbers stay; then the walk restarts.
+        """
+        if self._lying_steps:
+            self._lying_steps -= 1
+            if not self._lying_steps:
                 self.restart()
             return self.frame
-        force = self._pushed if self._push_steps else 0.0
+        force = self._push_force if self._push_steps else 0.0
         self._push_steps = max(0, self._push_steps - 1)
         self._biped.push(np.array([force]))
         ticks: list[Tick] = []
         self._biped.on_tick = ticks.append
-        _, result = next(self._walk)
+        _, result = next(self._walk)  # fills `ticks`, one for each control window
         self._steps += 1
         last = ticks[-1]
         fell = str(result.reasons[0])
@@ -262,7 +267,7 @@ class LiveSession:
         )
         if fell:
             self.falls = self.falls + 1
-            self._lying = ceil(LYING_SECONDS / self.dt)
+            self._lying_steps = ceil(LYING_SECONDS / self.dt)
         return self.frame
 
     def _force(self, tick: Tick) -> NDArray:
@@ -273,7 +278,7 @@ class LiveSession:
         force = tick.measurement.force[0]
         contact = tick.measurement.contact[0]
         load = force[..., 1]
-        total = np.maximum(load.sum(axis=-1, keepdims=True), 1e-6)
+        total = np.maximum(load.sum(axis=-1, keepdims=True), 1e-6)  # [N]; no division by 0 without load
         cop = (load[..., None] * contact).sum(axis=1) / total
         return np.concatenate([cop, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
@@ -284,7 +289,7 @@ class LiveSession:
         body = self.body
         wishes = self.wishes
         residual = settings.action_mode == "residual"
-        schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(action)
+        schedule = self._biped.scheduled_stiffness()[0] if residual else np.ones_like(action)  # (side, joint)
         # A residual action is the logarithm of K over the schedule's; an absolute one maps to a range of K.
         stiffness = schedule * np.exp(action) if residual else stiffness_of(action, settings, body)
         for joint, name in enumerate(SPRINGS):
@@ -300,17 +305,21 @@ class LiveSession:
         return action.reshape(1, -1)
 
     def _make(self, wishes: Wishes) -> Biped:
-        """Return a batch of one body on the ground and feet of `wishes`, its rest angles offset as wished."""
+        """Return a batch of one body on the ground and feet of `wishes`, its rest angles offset as wished.
+
+        Its reset decides on height, mass and speed.
+        """
         offset = _offset(wishes)
-        feet = {name: getattr(wishes, name) for name in ("slope_deg", "left_foot", "right_foot")}
-        settings = replace(self._settings, **feet)
+        slope_and_feet = {name: getattr(wishes, name) for name in ("slope_deg", "left_foot", "right_foot")}
+        settings = replace(self._settings, **slope_and_feet)
         if not offset.any():
             return Biped(settings, 1)
         # The wished body's speed at the Froude number of the settings' body, within the tabulated speeds.
         speeds = tabulated_speeds(settings)
         froude_speed = float(np.clip(wishes.speed / sqrt(wishes.height / settings.height), speeds[0], speeds[-1]))
         ((constants, walk),) = rows([reference_walk_at(settings, froude_speed)])
-        return Biped(settings, 1, rest=foot_curves(settings, constants, walk)[0][None] + offset)
+        rest, _ = foot_curves(settings, constants, walk)  # (SAMPLES, joint) [rad]
+        return Biped(settings, 1, rest=rest[None] + offset)  # one row, the same at all speeds
 
     def _check(self, wishes: Wishes) -> None:
         """Raise `SpringfootError` for wishes outside their ranges."""

@@ -71,7 +71,7 @@ class LiveView:
         accept_values_only(self._server)
         self._gui = self._server.gui
         _set_theme(self._gui)
-        self._dark: set[int] = set()
+        self._dark: set[int] = set()  # numbers of the browsers whose page is dark
         self._server.on_client_connect(fit_to_screen)
         self.address = f"http://{host}:{self._server.get_port()}"
         """Address of the page."""
@@ -90,8 +90,8 @@ class LiveView:
     def run(self, seconds: float | None = None) -> float:
         """Walk in real time for `seconds`, for ever if None; return the shown pictures a second.
 
-        Each step is `due` at a time of the clock. Late steps leave out pictures; the clock waits for a delay over
-        `LATE`.
+        Each step is `due` at a time of the clock. Late steps leave out pictures, so that the walk catches up; after a
+        delay over `LATE` the clock is set back instead.
         """
         dt = self._session.dt
         begin = time.perf_counter()
@@ -104,13 +104,13 @@ class LiveView:
             self._history.append(self._session.step())
             due = due + dt
             step = step + 1
-            if time.perf_counter() - due < dt:
+            if time.perf_counter() - due < dt:  # less than a step late
                 self._show()
             if step % steps_a_curve == 0:
                 self._send_numbers()
             delay = time.perf_counter() - due
             due += delay if delay > LATE else 0.0
-            time.sleep(max(0.0, -delay))
+            time.sleep(max(0.0, -delay))  # until the step is due, if it is early
         return (self.frames - frames_before) / (time.perf_counter() - begin)
 
     def stop(self) -> None:
@@ -119,7 +119,7 @@ class LiveView:
             self._server.stop()
 
     def _apply_requests(self) -> None:
-        """Apply the wishes since the last step.
+        """Apply the wishes and calls that came from the page since the last step.
 
         After an impossible wish the page shows the error, and its input the present value again.
         """
@@ -154,39 +154,45 @@ class LiveView:
     def _turn_theme(self, client: viser.ClientHandle | None) -> None:
         """Turn the page of one browser dark, or light again; others keep theirs."""
         if client is not None:
-            self._dark ^= {client.client_id}
+            self._dark ^= {client.client_id}  # in, or out again
             _set_theme(client.gui, client.client_id in self._dark)
 
     def _add_wishes(self) -> None:
         """Add a slider or a list for each of the `Wishes`."""
-        most = self._session.stiffness_ranges()
+        ranges = self._session.stiffness_ranges()
         for joint, name in enumerate(SPRINGS):
             with self._gui.add_folder(f"{name.capitalize()}: stiffness K"):
-                self._choose(f"{name}_source", "from", get_args(Source))
-                self._slide(f"{name}_factor", "scaled: factor", LIVE_FACTORS, 0.05)
-                low, high = most[joint].tolist()
-                self._slide(f"{name}_stiffness", "by hand, N·m/rad", (round(low), round(high)), 1.0)
-                self._slide(f"{name}_offset_deg", "θ_eq, added deg", OFFSETS_DEG, 0.5)
+                self._add_list(f"{name}_source", "from", get_args(Source))
+                self._add_slider(f"{name}_factor", "scaled: factor", LIVE_FACTORS, 0.05)
+                low, high = ranges[joint].tolist()
+                self._add_slider(f"{name}_stiffness", "by hand, N·m/rad", (round(low), round(high)), 1.0)
+                self._add_slider(f"{name}_offset_deg", "θ_eq, added deg", OFFSETS_DEG, 0.5)
         with self._gui.add_folder("Walk"):
-            self._slide("speed", "speed, m/s", LIVE_SPEEDS, 0.05)
-            self._slide("slope_deg", "slope, deg", SLOPE_RANGE_DEG, 0.5)
+            self._add_slider("speed", "speed, m/s", LIVE_SPEEDS, 0.05)
+            self._add_slider("slope_deg", "slope, deg", SLOPE_RANGE_DEG, 0.5)
         with self._gui.add_folder("Body and feet"):
-            self._slide("height", "height, m", LIVE_HEIGHTS, 0.01)
-            self._slide("mass", "mass, kg", LIVE_MASSES, 1.0)
+            self._add_slider("height", "height, m", LIVE_HEIGHTS, 0.01)
+            self._add_slider("mass", "mass, kg", LIVE_MASSES, 1.0)
             for side in SIDES:
-                self._choose(f"{side}_foot", f"{side} foot", tuple(KINDS))
+                self._add_list(f"{side}_foot", f"{side} foot", tuple(KINDS))
 
-    def _slide(self, name: str, label: str, ends: tuple[float, float], step: float) -> None:
+    def _add_slider(self, name: str, label: str, ends: tuple[float, float], step: float) -> None:
+        """Add a slider for the wish `name`, from end to end in steps."""
         value = float(np.clip(getattr(self._session.wishes, name), *ends))
         self._handles[name] = self._gui.add_slider(label, *map(float, ends), step=step, initial_value=value)
         self._listen(name)
 
-    def _choose(self, name: str, label: str, options: tuple[str, ...]) -> None:
+    def _add_list(self, name: str, label: str, options: tuple[str, ...]) -> None:
+        """Add a list of options for the wish `name`."""
         value = _shown(getattr(self._session.wishes, name))
         self._handles[name] = self._gui.add_dropdown(label, options, initial_value=value)
         self._listen(name)
 
     def _listen(self, name: str) -> None:
+        """Put the wish `name` into the queue whenever its input changes.
+
+        A change without a client is our own: the input shows the present value again.
+        """
         handle = self._handles[name]
         handle.on_update(lambda event: self._requests.put({name: handle.value}) if event.client is not None else None)
 
@@ -210,6 +216,7 @@ class LiveView:
         return self._gui.add_uplot((empty,) * len(series), series, title=title, scales=time_scale, height=170)
 
     def _show(self) -> None:
+        """Draw the body, and count the picture."""
         self._scene.show()
         self.frames += 1
 
@@ -228,16 +235,20 @@ class LiveView:
             f"{_plain(session.name)}: {last_frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
             "| K that acts, N·m/rad | ankle | toe | ankle θ_eq, deg | toe θ_eq, deg |\n|-|-|-|-|-|\n" + rows
         )
-        seconds = session.dt * np.arange(1 - len(self._history), 1)
+        seconds = session.dt * np.arange(1 - len(self._history), 1)  # up to 0, the last step
         stiffness, force = (
             np.array([getattr(frame, name) for frame in self._history]) for name in ("stiffness", "force")
         )
-        curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)} | {"load": force[..., -1].T}
-        for name, lines in (curves | {"speed": np.array([[frame.speed for frame in self._history]])}).items():
+        # Chart -> (line, step): left and right, or one.
+        curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)}
+        curves["load"] = force[..., -1].T  # the last component, up
+        curves["speed"] = np.array([[frame.speed for frame in self._history]])
+        for name, lines in curves.items():
             self._curves[name].data = (seconds, *np.ascontiguousarray(lines))
 
 
 def _set_theme(gui: viser.GuiApi, dark: bool = False) -> None:
+    """Make the page of `gui`, of one browser or of all, light or dark, without viser's own marks."""
     gui.configure_theme(show_logo=False, show_share_button=False, control_width="large", dark_mode=dark)
 
 

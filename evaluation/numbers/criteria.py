@@ -14,29 +14,34 @@ LOOSENED_BY, LOOSENED_R_BY = 0.2, 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """A number of `with_derived(metrics)` and its allowed range, ends included."""
+    """A number of an evaluation and its allowed range, ends included; numbers are those of `with_derived(metrics)`."""
 
     name: str
+    """Name in messages and tables of several walks."""
     path: tuple[str, ...]
     """Keys of the number in `with_derived(metrics)`."""
     low: float = -inf
+    """Least allowed number."""
     high: float = inf
+    """Largest allowed number."""
     unit: str = ""
+    """Unit of the number, after a space."""
     pattern: str = ".2f"
+    """Format of the number as text."""
     loosen: Literal["share", "r", ""] = ""
     """Rule by which `loosened` widens the range."""
     label: str = ""
     """Name in the table of one walk; empty: the criterion's name."""
 
     def value(self, values: dict[str, Any]) -> float | None:
-        """Return the number; None if it could not be measured."""
+        """Return the criterion's number among `values`, from `with_derived`; None if it could not be measured."""
         value: Any = values
         for key in self.path:
             value = value[key]
         return value
 
     def holds(self, values: dict[str, Any]) -> bool:
-        """Tell whether the number was measured and lies in the range."""
+        """Return True if the criterion's number among `values` was measured and lies in the range."""
         value = self.value(values)
         return value is not None and self.low <= value <= self.high
 
@@ -49,15 +54,21 @@ class Criterion:
             return replace(
                 self, low=self.low - LOOSENED_BY * abs(self.low), high=self.high + LOOSENED_BY * abs(self.high)
             )
-        return replace(self, low=self.low - LOOSENED_R_BY) if self.loosen == "r" else self
+        if self.loosen == "r":
+            return replace(self, low=self.low - LOOSENED_R_BY)
+        return self
 
     @property
     def text(self) -> str:
-        """Return the range in words, with its unit."""
+        """Return the allowed range as text with its unit: `≤ 3.5°`, `≥ 0.98`, `59.0 … 65.0 %`, or one number."""
         low, high = (format(end, self.pattern) for end in (self.low, self.high))
-        if self.low == -inf or self.high == inf:
-            return (f"≤ {high}" if self.low == -inf else f"≥ {low}") + self.unit
-        return low + self.unit if self.low == self.high else f"{low} … {high}{self.unit}"
+        if self.low == -inf:
+            return f"≤ {high}{self.unit}"
+        if self.high == inf:
+            return f"≥ {low}{self.unit}"
+        if self.low == self.high:
+            return low + self.unit
+        return f"{low} … {high}{self.unit}"
 
 
 def with_derived(metrics: dict[str, Any]) -> dict[str, Any]:
@@ -72,6 +83,7 @@ def with_derived(metrics: dict[str, Any]) -> dict[str, Any]:
     double_support = metrics["double_support_s"]
 
     def percent_off(value: float | None, planned: float) -> float | None:
+        """Return the absolute difference of a value from the plan's [%]."""
         return None if value is None else 100 * abs(value / planned - 1)
 
     speed = metrics["speed_m_s"]["mean"]
@@ -86,7 +98,10 @@ def with_derived(metrics: dict[str, Any]) -> dict[str, Any]:
 
 
 def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
-    """Return the criteria that an evaluation misses, each in words with its number; empty if it meets all."""
+    """Return those of `criteria` that an evaluation misses, each as its name and number; empty if it meets all.
+
+    `metrics` is the content of metrics.json.
+    """
     values = with_derived(metrics)
     return [
         f"{criterion.name} {number_text(criterion, values)}" for criterion in criteria if not criterion.holds(values)

@@ -10,7 +10,7 @@ from springfoot.gait.people.contacts import PERCENT
 
 @dataclass(kw_only=True, eq=False)
 class StrideCurves:
-    """Mean and spread over strides of C curves, added block by block; NaN before the first stride."""
+    """Mean and spread over strides of C curves over percent of the stride; strides are added block by block."""
 
     names: tuple[str, ...]
     """Names of the C curves."""
@@ -22,26 +22,30 @@ class StrideCurves:
     """(101, C) sum of squares over the strides."""
 
     def add(self, curves: NDArray) -> None:
-        """Add strides' curves (S, 101, C)."""
+        """Add the curves (S, 101, C) of S strides."""
         self.count += len(curves)
         self.total = self.total + curves.sum(axis=0)
         self.squares = self.squares + np.square(curves).sum(axis=0)
 
     def mean(self, name: str) -> NDArray:
-        """Return the mean of a curve over strides (101,)."""
-        return self._pick(np.asarray(self.total) / max(self.count, 1), name) if self.count else self._missing()
+        """Return the mean of the curve `name` over strides (101,); NaN before the first stride."""
+        return self._pick(np.asarray(self.total) / self.count, name) if self.count else self._missing()
 
     def sd(self, name: str) -> NDArray:
-        """Return the standard deviation of a curve over strides (101,), with n - 1; NaN for fewer than two strides."""
+        """Return the standard deviation (n - 1) of the curve `name` over strides (101,); NaN for fewer than two
+        strides."""
         if self.count < 2:
             return self._missing()
         total = np.asarray(self.total)
         squares = np.asarray(self.squares)
+        # Rounding can make the variance of equal strides negative.
         variance = (squares - total**2 / self.count) / (self.count - 1)
         return self._pick(np.sqrt(np.maximum(variance, 0.0)), name)
 
     def _pick(self, values: NDArray, name: str) -> NDArray:
+        """Return the column (101,) of the curve `name` of `values` (101, C)."""
         return values[:, self.names.index(name)]
 
     def _missing(self) -> NDArray:
+        """Return NaN (101,), for a curve of too few strides."""
         return np.full(len(PERCENT), np.nan)

@@ -32,6 +32,7 @@ MOMENT_CURVES = {
     "ankle": "ankle_moment_Nm_per_kg",
     "toe": "mtp_moment_Nm_per_kg",
 }
+"""Joint -> column of its moment's curve over the stride."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -78,7 +79,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     com_z = tally.com.mean("z")
 
     def joint(name: str) -> dict[str, Any]:
-        """Return the likeness of a joint's angle to people's."""
+        """Return the entry of a joint in `joints`: the likeness of its angle to people's."""
         curve = both.mean(ANGLE_COLUMNS[name])
         people = np.degrees(human.mean(name, phase))
         return {
@@ -88,10 +89,10 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         }
 
     def moment(name: str) -> dict[str, Any]:
-        """Return a joint moment's peaks and its likeness to people's; people's toe moment is unknown."""
+        """Return the entry of a joint in `moments`: peaks, and likeness to people's; people's toe moment is unknown."""
         curve = both.mean(MOMENT_CURVES[name])
         peak, percent = score.largest(curve)
-        late_swing = score.largest(curve[LATE_SWING_PERCENT:])[0]
+        late_swing, _ = score.largest(curve[LATE_SWING_PERCENT:])
         entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late_swing}
         if name == "toe":
             return entry | {"r": None, "within_2sd_percent": None}
@@ -103,11 +104,13 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         }
 
     def force_r(name: str) -> float | None:
+        """Return the correlation of a force's mean curve with people's."""
         return score.correlation(both.mean(f"{name}_bw"), human.mean(name, phase))
 
     def stiffness(name: str) -> dict[str, Any]:
-        swing = USUAL_TOE_OFF if toe_off is None else toe_off
-        return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), swing)
+        """Return the entry of ankle or toe in `stiffness_Nm_rad`: mean K in each part of the stride."""
+        swing_begin = USUAL_TOE_OFF if toe_off is None else toe_off
+        return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), swing_begin)
 
     work = _joint_work(tally)
     legs = leg_numbers(tally) if feet_differ(settings) else None
@@ -172,9 +175,10 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
 
 def _reward_terms(recording: Recording) -> dict[str, dict[str, float]]:
     """Return `reward_terms` of metrics.json: each term's weight and mean contribution to the return of an episode."""
-    terms = np.nan_to_num(recording.series[REWARD].astype(float))
+    terms = np.nan_to_num(recording.series[REWARD].astype(float))  # (E, T, TERMS); 0 after an episode's end
     weights = DEFAULT_WEIGHTS | recording.settings.reward_weights
-    alive = terms[..., TERMS.index("alive")]
+    alive = terms[..., TERMS.index("alive")]  # 1, and 0 in the step of a fall, which has no reward
+    # A weight is paid per `ACTION_STEP`, a tick is a part of that.
     return {
         name: {
             "weight": float(weights[name]),
@@ -191,7 +195,7 @@ def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
     """
     if not tally.joint_work:
         return {joint: {"positive": None, "negative": None} for joint in JOINTS}
-    mean = np.mean(tally.joint_work, axis=0)
+    mean = np.mean(tally.joint_work, axis=0)  # (joint, (positive, negative))
     return {
         joint: {"positive": float(positive), "negative": float(-negative)}
         for joint, (positive, negative) in zip(JOINTS, mean, strict=True)
@@ -216,7 +220,7 @@ def _energy(tally: StrideTally) -> dict[str, float | None]:
     if not tally.energy:
         return dict.fromkeys(names)
     entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
-    for source in SPRING_SOURCES:
+    for source in SPRING_SOURCES:  # of all joints together
         entry[source] = sum(entry[f"{source}/{joint}"] for joint in JOINTS)
     change = entry["mechanical_change"] = entry["mechanical"]
     entry["residual"] = change - sum(entry[name] for name in ("actuators", "passive_damping", "contact", "pushes"))
@@ -224,7 +228,11 @@ def _energy(tally: StrideTally) -> dict[str, float | None]:
 
 
 def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
-    """Return `springs_J_kg` of metrics.json: mean energy put into each joint's spring of one leg in a stride."""
+    """Return `springs_J_kg` of metrics.json: mean energy put into each joint's spring of one leg in a stride, by each
+    of `SPRING_SOURCES`.
+
+    The ledger is of both legs, of which each gets half.
+    """
     if not tally.energy:
         return {joint: dict.fromkeys(SPRING_SOURCES) for joint in JOINTS}
     entry = dict(zip(ledger_entries(), np.mean(tally.energy, axis=0).tolist(), strict=True))
@@ -232,13 +240,14 @@ def _springs(tally: StrideTally) -> dict[str, dict[str, float | None]]:
 
 
 def _zmp(planned: NDArray, tally: StrideTally) -> dict[str, float | None]:
-    """Return `zmp` of metrics.json: the mean centre of pressure (CoP) against the planned ZMP (101,) over the step.
+    """Return `zmp` of metrics.json: RMSE and correlation of the mean centre of pressure (CoP) with the `planned` ZMP
+    over the step (101,).
 
     Percent 100 is left out, as the plan is at the next foot there.
     """
     cop = tally.cop.mean("x")[:-1]
     single_support = np.full(len(cop), False)
-    if tally.step_time:
+    if tally.step_time:  # a step begins with its double support
         single_support = PERCENT[:-1] >= 100 * np.mean(tally.double_support) / np.mean(tally.step_time)
     return {
         "cop_rmse_single_support_m": score.rmse(cop[single_support], planned[:-1][single_support])
@@ -250,4 +259,5 @@ def _zmp(planned: NDArray, tally: StrideTally) -> dict[str, float | None]:
 
 
 def _mean(values: list[float]) -> float | None:
+    """Return the mean of values; None without any."""
     return float(np.mean(values)) if values else None

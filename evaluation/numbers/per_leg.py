@@ -28,7 +28,7 @@ def kinds_of(settings: BipedSettings) -> dict[str, str]:
 
 
 def feet_differ(settings: BipedSettings) -> bool:
-    """Tell whether the two feet differ."""
+    """Return True if the two feet of the settings differ."""
     left, right = settings.feet
     return left != right
 
@@ -39,7 +39,10 @@ def leg_numbers(tally: StrideTally) -> dict[str, dict[str, Any]]:
 
 
 def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
-    """Return `asymmetry` of metrics.json: for some numbers (right - left) over their mean, 0 for equal legs."""
+    """Return `asymmetry` of metrics.json: (right - left) over their mean of some numbers of `legs`, 0 for equal legs.
+
+    `legs` are those of `leg_numbers`. The entries have the numbers' names without the unit.
+    """
     names = ("step_length_m", "stance_percent", "vertical_max_mean_bw")
     return {name.rpartition("_")[0]: _relative_difference(*(legs[side][name] for side in SIDES)) for name in names}
 
@@ -47,14 +50,15 @@ def asymmetry(legs: dict[str, dict[str, Any]]) -> dict[str, float | None]:
 def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
     """Return the numbers of metrics.json for one leg, `side` 0 left, 1 right."""
     curves = tally.feet[side]
-    of_side = np.array(tally.stride_sides, int) == side
+    of_side = np.array(tally.stride_sides, int) == side  # strides of this leg
     features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))
-    work = _chosen(tally.joint_work, of_side)
-    stance = _mean(_chosen(tally.toe_off, of_side))
-    swings = np.array(tally.step_sides, int) == side  # steps that begin as this leg pushes off and the other one lands
+    work = _of_chosen(tally.joint_work, of_side)
+    stance = _mean(_of_chosen(tally.toe_off, of_side))
+    # Steps that this leg makes: they begin as it pushes off and the other leg lands.
+    swings = np.array(tally.step_sides, int) == side
     return {
         "strides": int(of_side.sum()),
-        "step_length_m": _mean(_chosen(tally.step_length, swings)),
+        "step_length_m": _mean(_of_chosen(tally.step_length, swings)),
         "stance_percent": stance,
         "joint_range_deg": {
             joint: float(np.ptp(curves.mean(column))) if curves.count else None
@@ -62,18 +66,18 @@ def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
         },
         "vertical_peak1_bw": features.vertical_peak1,
         "vertical_peak2_bw": features.vertical_peak2,
-        "vertical_max_mean_bw": _mean(_chosen(tally.vertical_max, of_side)),
+        "vertical_max_mean_bw": _mean(_of_chosen(tally.vertical_max, of_side)),
         "braking_peak_bw": features.braking_peak,
         "forward_peak_bw": features.forward_peak,
         "joint_work_J_kg": {
-            joint: dict(zip(("positive", "negative"), _signs(work, index), strict=True))
+            joint: dict(zip(("positive", "negative"), _joint_work(work, index), strict=True))
             for index, joint in enumerate(JOINTS)
         },
         "com_work_J_kg": {
-            "push_off": _mean(_chosen(tally.push_off, swings)),
-            "collision": _mean(_chosen(tally.collision, ~swings)),
+            "push_off": _mean(_of_chosen(tally.push_off, swings)),
+            "collision": _mean(_of_chosen(tally.collision, ~swings)),  # of the leg that lands: in the other leg's steps
         },
-        "toe_clearance_m": float(np.median(_chosen(tally.clearance, of_side))) if of_side.any() else None,
+        "toe_clearance_m": float(np.median(_of_chosen(tally.clearance, of_side))) if of_side.any() else None,
         "stiffness_Nm_rad": {
             name: score.phase_means(
                 curves.mean(f"{name}_stiffness_Nm_per_rad"), USUAL_TOE_OFF if stance is None else stance
@@ -83,21 +87,27 @@ def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
     }
 
 
-def _chosen(values: list[Any], chosen: NDArray) -> NDArray:
+def _of_chosen(values: list[Any], chosen: NDArray) -> NDArray:
+    """Return those of n values, as an array, for which `chosen` (n,) is True."""
     return np.array(values)[chosen] if len(values) else np.empty(0)
 
 
 def _mean(values: NDArray) -> float | None:
+    """Return the mean of values; None without any."""
     return float(values.mean()) if len(values) else None
 
 
-def _signs(work: NDArray, joint: int) -> tuple[float | None, float | None]:
-    """Return the positive work of a joint, and its negative work as a positive number, from (strides, joint, 2)."""
+def _joint_work(work: NDArray, joint: int) -> tuple[float | None, float | None]:
+    """Return the mean positive work of a joint in a stride, and its negative work as a positive number [J/kg].
+
+    `work` (strides, joint, (positive, negative)) is that of one leg [J/kg]; None without a stride.
+    """
     if not len(work):
         return None, None
-    up, down = work[:, joint].mean(0)
-    return float(up), float(-down)
+    positive, negative = work[:, joint].mean(0)
+    return float(positive), float(-negative)
 
 
 def _relative_difference(left: float | None, right: float | None) -> float | None:
+    """Return the right leg's number less the left's, over their mean; None if one is missing."""
     return None if left is None or right is None else 2 * (right - left) / (right + left)

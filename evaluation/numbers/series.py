@@ -40,16 +40,20 @@ GAIT_CYCLE_COLUMNS = (
 
 
 def foot_contacts(vertical: NDArray, body: Body) -> list[Contacts]:
-    """Return heel strikes and toe-offs of the left and of the right foot, from their vertical force (T, side) [N]."""
+    """Return heel strikes and toe-offs of the left and of the right foot [s], from their vertical force (T, side)
+    [N]."""
     threshold = CONTACT_THRESHOLD_BW * body.mass * GRAVITY
     # Forces and moments are means over a tick, so they belong to its middle; states to its end.
     return [find_contacts(vertical[:, side], TICK, threshold, first=TICK / 2) for side in range(len(SIDES))]
 
 
 def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
-    """Return (S, 3) heel strike, toe-off and next heel strike [s] of complete strides in the `steady` time [s]."""
-    strides = foot.strides(after=steady[0])
-    return strides[strides[:, 2] <= steady[1]]
+    """Return (S, 3) heel strike, toe-off and next heel strike [s] of a foot's complete strides in the time `steady`,
+    from and to [s]."""
+    begin, end = steady
+    strides = foot.strides(after=begin)
+    next_heel_strike = strides[:, 2]
+    return strides[next_heel_strike <= end]
 
 
 def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
@@ -73,9 +77,9 @@ def mid_tick(state: NDArray) -> NDArray:
 
 
 def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """Return (T, C) curves known at a tick's end, in the order of `GAIT_CYCLE_COLUMNS` without those of `_means`."""
+    """Return one leg's curves that are known at the end of each tick, (T, C) in the order of `_STATES`."""
     angle = np.degrees(series["angle"][:, side])
-    pitch = np.degrees(series["base"][:, 2])
+    pitch = np.degrees(series["base"][:, 2])  # of the trunk
     thigh = angle[:, HIP] - pitch
     shank = thigh - angle[:, KNEE]
     equilibrium = np.degrees(series["equilibrium"][:, side])
@@ -85,7 +89,7 @@ def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
             pitch,
             thigh,
             shank,
-            shank + angle[:, ANKLE],
+            shank + angle[:, ANKLE],  # pitch of the foot
             angle[:, TOE],
             series["stiffness"][:, side],
             equilibrium,
@@ -94,13 +98,14 @@ def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
 
 
 def _means(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """Return (T, C) curves that are means over ticks, in the order of `_MEANS`."""
-    force = series["force"][:, side].sum(axis=1) / (body.mass * GRAVITY)
-    moment = -series["joint_torque"][:, side] / body.mass
-    power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass
-    return np.column_stack([force[:, ::-1], moment, power[:, :TOE]])
+    """Return one leg's curves that are means over ticks, (T, C) in the order of `_MEANS`."""
+    forward, vertical = series["force"][:, side].sum(axis=1).T / (body.mass * GRAVITY)
+    moment = -series["joint_torque"][:, side] / body.mass  # internal: extension and plantarflexion positive
+    power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass  # positive and negative work together
+    return np.column_stack([vertical, forward, moment, power[:, :TOE]])  # no power of the toe
 
 
+# Columns by the function that computes them, and the order that brings them into that of `GAIT_CYCLE_COLUMNS`.
 _MEANS = (
     *("grf_vertical_bw", "grf_forward_bw"),
     *(f"{joint}_moment_Nm_per_kg" for joint in ("hip", "knee", "ankle", "mtp")),

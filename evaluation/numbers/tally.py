@@ -76,7 +76,7 @@ class StrideTally:
     energy: list[NDArray] = field(default_factory=list)
     """Change of each entry of the body's ledger (`springfoot.envs.physics.energy`) in each stride [J/kg]."""
     effort: list[EpisodeEffort] = field(default_factory=list)
-    """What each episode cost its muscles."""
+    """Price of each episode to the muscles."""
     push_off: list[float] = field(default_factory=list)
     """Positive work of the trailing leg's force on the CoM in the double support of each step [J/kg]."""
     collision: list[float] = field(default_factory=list)
@@ -115,11 +115,11 @@ def add_episode(
         tally: to add to.
         series: name -> (T, ...), as in a recording.
         settings: of the environment: body, feet and slope.
-        steady: time span [s]; strides and steps outside it do not count.
+        steady: from and to [s]; strides and steps outside this time do not count.
         fell: whether the episode ended in a fall.
     """
     body = body_of(settings)
-    weight = body.mass * GRAVITY
+    weight = body.mass * GRAVITY  # [N]
     com = series["com"]
     # Distance, work and speed of the whole steady span, by ticks.
     first_tick, last_tick = (round(min(time / TICK, len(com))) for time in steady)
@@ -127,14 +127,14 @@ def add_episode(
         distance = com[last_tick - 1, 0] - com[first_tick - 1, 0]
         seconds = (last_tick - first_tick) * TICK
         tally.distance += distance
-        tally.work += float(series["joint_work"][first_tick:last_tick, ..., 0].sum())
+        tally.work += float(series["joint_work"][first_tick:last_tick, ..., 0].sum())  # 0: the positive part
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
         if effort := episode_effort(series, body, settings.feet, first_tick, last_tick):
             tally.effort.append(effort)
 
     # Curves and numbers of each foot's strides, cut at its heel strikes.
-    vertical = series["force"][..., 1].sum(axis=2)
+    vertical = series["force"][..., 1].sum(axis=2)  # (T, side), all contacts of a foot together [N]
     contacts = foot_contacts(vertical, body)
     # How far the material of the sole at each contact point has moved: the slip of a loaded sole.
     material = contact_material(body, series["contact"], series["base"], series["angle"])
@@ -151,14 +151,15 @@ def add_episode(
         tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, next_heel_strike) / body.mass)
         tally.energy += list(_energies(series["energy"], heel_strike, next_heel_strike) / body.mass)
         contact = series["contact"][:, side]
-        load = series["force"][:, side, :, 1]
+        load = series["force"][:, side, :, 1]  # (T, contact), vertical [N]
         # Largest force, slip in stance and clearance in mid-swing of each stride, by ticks.
         for start, leave, stop in np.floor(strides / TICK).astype(int):
             tally.vertical_max.append(vertical[start : stop + 1, side].max() / weight)
             stance = slice(start, leave + 1)
             tally.travel.append(score.travel(material[stance, side], load[stance], CONTACT_THRESHOLD_BW * weight))
             first, last = (round(leave + part * (stop - leave)) for part in CLEARANCE_SWING)
-            tally.clearance.append(contact[first : last + 1, CONTACTS.index("ball") :, 1].min())
+            ball_and_toe = slice(CONTACTS.index("ball"), None)
+            tally.clearance.append(contact[first : last + 1, ball_and_toe, 1].min())  # 1: height
     _add_steps(tally, series, contacts, settings, steady)
 
 
@@ -175,7 +176,7 @@ def _add_steps(
     in_time = steps[:, 1] <= steady[1]
     steps = steps[in_time]
     sides = sides[in_time]
-    for side in range(len(SIDES)):
+    for side in range(len(SIDES)):  # the standing foot: its stance begins with the step
         begin, end = steps[sides == side].T
         relative = np.column_stack(
             [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
@@ -185,29 +186,29 @@ def _add_steps(
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
         # Step length: the place at which the other foot lands at the step's end, less this one's at the step's start.
-        tick_of = np.floor(np.stack([begin, end]) / TICK).astype(int)
-        ankle = series["ankle"][..., 0]
-        tally.step_length += list(ankle[tick_of[1], 1 - side] - ankle[tick_of[0], side])
+        begin_tick, end_tick = np.floor(np.stack([begin, end]) / TICK).astype(int)
+        ankle_x = series["ankle"][..., 0]
+        tally.step_length += list(ankle_x[end_tick, 1 - side] - ankle_x[begin_tick, side])
         tally.step_time += list(end - begin)
         tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
         support = next_after(contacts[1 - side].toe_offs, begin) - begin
         support = np.where(support < end - begin, support, 0.0)
         tally.double_support += list(support)
-        work = _sums(com_work, begin, begin + support)
+        work = _sums(com_work, begin, begin + support)  # (step, side, (positive, negative))
         tally.push_off += list(work[:, 1 - side, 0])
         tally.collision += list(-work[:, side, 1])
 
 
 def _com_work(series: dict[str, NDArray], settings: BipedSettings) -> NDArray:
-    """Return (T, side, 2) the positive and the negative work of each leg's ground force on the CoM in each tick [J].
+    """Return the work of each leg's ground force on the CoM in each tick, (T, side, (positive, negative)) [J].
 
-    The individual limbs' work of Donelan, Kram & Kuo, J. Biomech. 35 (2002) 117-124.
+    It is the individual limbs' work of Donelan, Kram & Kuo, J. Biomech. 35 (2002) 117-124.
     """
     velocity = mid_tick(series["com_velocity"])
     # Recorded heights, and so upward velocities, are above the mean ground; work needs them in the world.
     velocity[:, 1] += np.tan(np.radians(settings.slope_deg)) * velocity[:, 0]
-    work = (series["force"].sum(2) * velocity[:, None]).sum(-1) * TICK
+    work = (series["force"].sum(2) * velocity[:, None]).sum(-1) * TICK  # (T, side): force times way
     return np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1)
 
 
@@ -216,12 +217,14 @@ def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
 
     A tick that a stride's end cuts counts by the fraction of it that lies within the stride.
     """
+    # Row k is the sum of the ticks before tick k.
     sum_before = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
 
     def sum_until(time: NDArray) -> NDArray:
+        """Return the sum from the start to the times (S,) [s], (S, ...)."""
         ticks = time / TICK
-        whole_ticks = np.minimum(ticks.astype(int), len(per_tick) - 1)
-        fraction = (ticks - whole_ticks).reshape(-1, *[1] * (sum_before.ndim - 1))
+        whole_ticks = np.minimum(ticks.astype(int), len(per_tick) - 1)  # the last tick has a fraction of 1 at its end
+        fraction = (ticks - whole_ticks).reshape(-1, *[1] * (sum_before.ndim - 1))  # (S, 1, ...), as the sums
         return sum_before[whole_ticks] + fraction * (sum_before[whole_ticks + 1] - sum_before[whole_ticks])
 
     return sum_until(end) - sum_until(begin)
@@ -234,14 +237,14 @@ def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     to `end` (S,) [s].
     """
     flow = energy.copy()
-    state = ledger_entries().index("mechanical")
-    flow[1:, state] = np.diff(energy[:, state])
+    mechanical = ledger_entries().index("mechanical")
+    flow[1:, mechanical] = np.diff(energy[:, mechanical])  # the first tick's change is unknown; no stride is in it
     return _sums(flow, begin, end)
 
 
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:
     """Return (T,) the forward CoP of both feet at the middle of each tick [m]; NaN in flight."""
-    load = series["force"][..., 1]
+    load = series["force"][..., 1]  # (T, side, contact), vertical [N]
     forward = mid_tick(series["contact"][..., 0])
     total = load.sum(axis=(1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):

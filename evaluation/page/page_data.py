@@ -27,10 +27,11 @@ FORCE_PANELS = {
     "grf_vertical": ("Vertical force", "up, body weights"),
     "grf_forward": ("Fore-aft force", "forward, body weights"),
 }
+"""Force -> title and unit of its panel."""
 
 
 def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
-    """Return the page's data of one policy: numbers, panels of curves, loops, and two strides of the body.
+    """Return the page's data of one policy as JSON values: numbers, panels of curves, loops, two strides of the body.
 
     The page's table and verdict come beside it (`report_page`).
     """
@@ -56,8 +57,15 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
 
 
 def _panel(group: str, title: str, unit: str, curve: tuple[NDArray, NDArray], **entries: Any) -> dict[str, Any]:
-    """Return one panel of the page: title, unit, mean and SD of the walk's `curve`, and more `entries`, such as
-    people's."""
+    """Return one panel of the page as JSON values.
+
+    Args:
+        group: heading below which the panel stands.
+        title: of the panel.
+        unit: of the curve, with its positive direction.
+        curve: mean and SD of the walk, (101,) each.
+        entries: further entries, such as people's curve, the plan, or the axis.
+    """
     return {
         "group": group,
         "title": title,
@@ -68,11 +76,12 @@ def _panel(group: str, title: str, unit: str, curve: tuple[NDArray, NDArray], **
 
 
 def _mean_and_sd(curves: StrideCurves, name: str) -> tuple[NDArray, NDArray]:
+    """Return mean and SD of the curve `name` over strides, (101,) each."""
     return curves.mean(name), curves.sd(name)
 
 
 def _leg_curves(gait: Gait, name: str, by_leg: bool) -> dict[str, Any]:
-    """Return a panel's entry `legs`: the curve of the left and of the right leg; nothing unless `by_leg`."""
+    """Return a panel's entry `legs`: the curve `name` of the left and of the right leg; no entry unless `by_leg`."""
     if not by_leg:
         return {}
     return {
@@ -84,7 +93,7 @@ def _leg_curves(gait: Gait, name: str, by_leg: bool) -> dict[str, Any]:
 
 def _people_curve(human: HumanGait, name: str, degrees: bool = False) -> dict[str, Any]:
     """Return people's mean and SD of a curve over percent of the stride, for a panel."""
-    unit = np.degrees(1.0) if degrees else 1.0
+    unit = np.degrees(1.0) if degrees else 1.0  # people's angles are in radians
     phase = PERCENT / 100
     return {
         "people": shown_numbers(unit * human.mean(name, phase)),
@@ -93,7 +102,7 @@ def _people_curve(human: HumanGait, name: str, degrees: bool = False) -> dict[st
 
 
 def _angles(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
-    """Return the panels of joint angles."""
+    """Return the panels of joint angles, the legs' own curves in them if `by_leg`."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}
     return [
         _panel(
@@ -107,9 +116,10 @@ def _angles(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
 
 
 def _kinetics(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
-    """Return the panels of moments, powers and ground reaction forces."""
+    """Return the panels of moments, powers and ground reaction forces, the legs' own curves in them if `by_leg`."""
 
-    def stride(group: str, title: str, unit: str, column: str, people: dict[str, Any]) -> dict[str, Any]:
+    def stride_panel(group: str, title: str, unit: str, column: str, people: dict[str, Any]) -> dict[str, Any]:
+        """Return the panel of a column of the curves over the stride, with `people`'s entries."""
         return _panel(
             group, title, unit, _mean_and_sd(gait.both, column), **people, **_leg_curves(gait, column, by_leg)
         )
@@ -118,13 +128,13 @@ def _kinetics(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]
     for joint, column in MOMENT_CURVES.items():
         unit = f"{'extension' if joint in ('hip', 'knee') else 'plantarflexion'}, N·m/kg"
         people = {} if joint == "toe" else _people_curve(human, f"{joint}_moment")
-        panels.append(stride("Moments", f"{joint.capitalize()} moment", unit, column, people))
+        panels.append(stride_panel("Moments", f"{joint.capitalize()} moment", unit, column, people))
     for joint in ("hip", "knee", "ankle"):
         column = f"{joint}_power_W_per_kg"
         people = _people_curve(human, f"{joint}_power")
-        panels.append(stride("Powers", f"{joint.capitalize()} power", "generation, W/kg", column, people))
+        panels.append(stride_panel("Powers", f"{joint.capitalize()} power", "generation, W/kg", column, people))
     for name, (title, unit) in FORCE_PANELS.items():
-        panels.append(stride("Ground reaction forces", title, unit, f"{name}_bw", _people_curve(human, name)))
+        panels.append(stride_panel("Ground reaction forces", title, unit, f"{name}_bw", _people_curve(human, name)))
     return panels
 
 
@@ -150,7 +160,7 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
 
 
 def _springs(recording: Recording) -> list[dict[str, Any]]:
-    """Return K and theta_eq over the leg's phase: the mean is the open-loop copy, the SD around it feedback."""
+    """Return the panels of K and theta_eq over the leg's phase: the mean is the open-loop copy, the SD is feedback."""
     curves = schedule_curves(recording)
     group = "Stiffness and equilibrium over the leg's phase"
     panels = []
@@ -169,7 +179,7 @@ def _springs(recording: Recording) -> list[dict[str, Any]]:
 
 
 def _reward(gait: Gait) -> list[dict[str, Any]]:
-    """Return the reward's terms over the step: rewards from 0 to 1, and costs."""
+    """Return the panels of the reward's terms over the step: rewards from 0 to 1, and costs."""
     group = "Reward terms over the step, unweighted"
     return [
         _panel(
@@ -180,7 +190,10 @@ def _reward(gait: Gait) -> list[dict[str, Any]]:
 
 
 def _loops(recording: Recording, gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
-    """Return the loops of moment over angle of ankle and toe; of the ankle also people's, and the thesis's lines."""
+    """Return the loops of moment [N m/kg] over angle [deg] of ankle and toe, of each leg too if `by_leg`.
+
+    The ankle's has people's loop and the thesis's lines beside it.
+    """
     phase = PERCENT / 100
     body = body_of(recording.settings)
     # The thesis's springs in stance, each a straight line from its start to that of the next.
@@ -190,17 +203,20 @@ def _loops(recording: Recording, gait: Gait, human: HumanGait, by_leg: bool) -> 
     ends = [*(segment.start for segment in lines[1:]), human.toe_off]
     thesis = []
     for segment, end in zip(lines, ends, strict=True):
-        angle = human.mean("ankle", np.array([segment.start, end]))
+        angle = human.mean("ankle", np.array([segment.start, end]))  # people's, at the two ends
         moment = segment.stiffness * (angle - segment.equilibrium) / (body.total_mass * body.length_scale)
         thesis.append(shown_numbers(np.stack([np.degrees(angle), moment], -1)))
 
-    def of(curves: StrideCurves, joint: str) -> dict[str, Any]:
+    def leg_loop(curves: StrideCurves, joint: str) -> dict[str, Any]:
+        """Return the loop of a joint, "ankle" or "mtp", in the mean curves of a leg or of both."""
         angle = curves.mean(f"{joint}_dorsiflexion_deg")
         moment = curves.mean(f"{joint}_moment_Nm_per_kg")
         return {"x": shown_numbers(angle), "y": shown_numbers(moment)}
 
     def loop(joint: str) -> dict[str, Any]:
-        return of(gait.both, joint) | ({"legs": [of(foot, joint) for foot in gait.feet]} if by_leg else {})
+        """Return the loop of a joint in the mean of both legs, and if `by_leg` in each."""
+        of_each = {"legs": [leg_loop(foot, joint) for foot in gait.feet]} if by_leg else {}
+        return leg_loop(gait.both, joint) | of_each
 
     return [
         {

@@ -32,7 +32,10 @@ def shown_numbers(values: NDArray) -> Any:
 
 
 def figure_data(recording: Recording) -> dict[str, Any]:
-    """Return two strides of the body, tick by tick: joints, forces, masses and plans, in metres of the world."""
+    """Return the drawing's data as JSON values: two strides of the body, tick by tick.
+
+    Joints, forces, masses and plans are in metres of the world, K in N m/rad, rest angles in degrees.
+    """
     settings = recording.settings
     body = body_of(recording.settings)
     _, first, last = clip_of(recording, body)
@@ -43,10 +46,11 @@ def figure_data(recording: Recording) -> dict[str, Any]:
     contacts = foot_contacts(walk["force"][..., 1].sum(axis=2), body)
     percent = [_percent_of(foot.heel_strikes, len(walk["phase"]))[first:last] for foot in contacts]
     steps = np.unique(np.concatenate([foot.heel_strikes for foot in contacts]))
-    phase = np.append(walk["phase"], walk["phase"][-1:], axis=0)[first + 1 : last + 1]  # at the end of each tick
+    # A phase is recorded at the beginning of its tick: at the end it is the next tick's.
+    phase = np.append(walk["phase"], walk["phase"][-1:], axis=0)[first + 1 : last + 1]
     offsets = contact_offsets(body)
     weight = body.mass * GRAVITY
-    units = {"px": 1.0, "vx": weight, "vy": weight}
+    units = {"px": 1.0, "vx": weight, "vy": weight}  # columns of `opensim_forces`: place [m], force in body weights
     return {
         "seconds_a_frame": TICK,
         "strides": bool(np.isfinite(percent[0]).any()),
@@ -90,6 +94,7 @@ def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
     time = TICK * np.arange(1, ticks + 1)
     if len(strikes) < 2:
         return np.full(len(time), np.nan)
+    # Strikes passed so far, with the fraction of the way to the next.
     strides_done = np.interp(time, strikes, np.arange(len(strikes)), left=np.nan, right=np.nan)
     return 100 * (strides_done % 1.0)
 
@@ -100,14 +105,17 @@ def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     It is that of the step of the foot whose stance began last.
     """
     phase = series["phase"] % 1.0
-    side = np.where(phase[:, 0] < phase[:, 1], 0, 1)
+    side = np.where(phase[:, 0] < phase[:, 1], 0, 1)  # the leg whose stride, and so stance, began last
     ticks = np.arange(len(phase))
-    ahead = np.interp(np.minimum(200 * phase[ticks, side], 99.0), PERCENT, recording.plan_zmp)
+    step_percent = 200 * phase[ticks, side]  # a step is half a stride
+    # At 100 percent the plan is at the next foot, so the last percent is held.
+    ahead = np.interp(np.minimum(step_percent, 99.0), PERCENT, recording.plan_zmp)
     return series["ankle"][ticks, side, 0] + ahead
 
 
 def _foot(setting: FootSetting) -> dict[str, Any]:
-    """Describe a foot: its words, whether it is one piece without a toe joint, and the parts at its ankle and toe."""
+    """Return the drawing's data of a foot: its kind and numbers in words, whether it is one piece without a toe joint,
+    the mechanism at ankle and toe, and whether an orthosis is on it."""
     foot = setting.foot
     joints = [_at_joint(joint) for joint in foot.joints]
     orthosis = any(joint.orthosis is not None for joint in foot.joints)
@@ -122,9 +130,9 @@ def _at_joint(joint: FootJoint) -> str:
 
 
 def foot_words(setting: FootSetting) -> str:
-    """Return a foot of the settings in words: its kind, and the numbers that the user gave."""
+    """Return a foot of the settings in words: its kind, and in brackets the numbers that the user gave."""
     given = setting.numbers
-    units = KINDS[setting.kind] | SEGMENT_RATIOS
+    units = KINDS[setting.kind] | SEGMENT_RATIOS  # numbers that this kind can have
     words = [f"{_plain(name)} {given[name]:g} {units[name].unit}" for name in units if name in given]
     words += [f"{_plain(name)} of {len(given[name])} points" for name in given if name.endswith("_table")]
     words += ["on a schedule of its own"] if "schedule" in given else []
@@ -139,7 +147,7 @@ def foot_words(setting: FootSetting) -> str:
 
 
 def walker_words(settings: BipedSettings) -> str:
-    """Return body and feet of the settings in words."""
+    """Return body and feet of the settings in words, such as "1.7 m, 63 kg, both feet intact"."""
     height, mass = (
         f"{bounds[0]:g} to {bounds[1]:g}" if bounds else f"{value:g}"
         for bounds, value in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
@@ -150,4 +158,5 @@ def walker_words(settings: BipedSettings) -> str:
 
 
 def _plain(name: str) -> str:
+    """Return the name of a kind or a number of a foot in plain words: `ankle_deg` is "ankle rest angle"."""
     return name.replace("_deg", " rest angle").replace("_", " ")

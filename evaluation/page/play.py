@@ -41,8 +41,10 @@ def play_page(grid: Grid, recordings: Sequence[Recording], subject: str, command
     `subject` describes the recordings in a sentence; `command` is the one that made the page.
     """
     numbers, series = zip(*map(walk_of, recordings), strict=True)
+    # Recordings from one foot, or one speed of a foot, to the next; one of each shows the body, or people, for all.
     walks_a_foot = len(recordings) // len(grid.feet)
     walks_a_speed = walks_a_foot // len(grid.speed)
+    # The sliders begin in the middle; `pace` is the page's word for speed.
     middle = {"ankle": len(grid.ankle) // 2, "toe": len(grid.toe) // 2, "pace": len(grid.speed) // 2}
     data = {
         "grid": grid._asdict(),

@@ -59,11 +59,11 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
     fell, the end of the longest one, and `ended` names the reason. Positions are forward of the hip, which moves on by
     `length` [m] in `seconds` [s].
     """
-    standing = recording.fall_reason == ""
-    numbers = {"falls": int((~standing).sum()), "episodes": len(standing)}
-    if not standing.any():
+    without_fall = recording.fall_reason == ""
+    numbers = {"falls": int((~without_fall).sum()), "episodes": len(without_fall)}
+    if not without_fall.any():
         return _last_moments(recording, numbers)
-    upright = episodes_of(recording, standing)
+    upright = episodes_of(recording, without_fall)
     gait = measure(upright)
     body = body_of(recording.settings)
     strides = []
@@ -75,15 +75,17 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
         begin, _, end = strides_within(left, (WARM_UP, np.inf)).T
         drawn = _figure_series(upright, series, body)
         times = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, MOMENTS)
-        sampled = sample(drawn, times, TICK, TICK)
+        sampled = sample(drawn, times, TICK, TICK)  # (stride, MOMENTS, column); column 0 is the hip's x
         length = sampled[:, -1, 0] - sampled[:, 0, 0]
+        # Less a steady way forward from the stride's beginning: the hip sways about 0.
         sampled[..., 0] -= sampled[:, :1, 0] + length[:, None] * np.linspace(0, 1, MOMENTS)
         strides = [*strides, *sampled]
         durations = [*durations, *(end - begin)]
         lengths = [*lengths, *length]
     if not (strides and all(foot.count for foot in gait.feet)):
         return _last_moments(recording, numbers)
-    curves = [foot.mean(column)[:: 100 // (MOMENTS - 1)] for column, _, _ in PANELS.values() for foot in gait.feet]
+    percents_a_moment = 100 // (MOMENTS - 1)
+    curves = [foot.mean(column)[::percents_a_moment] for column, _, _ in PANELS.values() for foot in gait.feet]
     metrics = gait.metrics
     numbers |= {
         "seconds": float(np.mean(durations)),
@@ -98,17 +100,18 @@ def walk_of(recording: Recording) -> tuple[dict[str, Any], NDArray]:
 
 
 def episodes_of(recording: Recording, rows: NDArray) -> Recording:
-    """Return some episodes of a recording."""
+    """Return a recording of some episodes of another: those for which `rows` (E,) is True."""
     named = {name: getattr(recording, name)[rows] for name in ("ticks", "returns", "fall_reason")}
     return replace(recording, **named, series={name: values[rows] for name, values in recording.series.items()})
 
 
 def _last_moments(recording: Recording, numbers: dict[str, Any]) -> tuple[dict[str, Any], NDArray]:
-    """Return `numbers` with those of a walk that only fell, and the series of its last moments."""
+    """Return `numbers` with those of a walk that only fell, and the series (MOMENTS, len(PLAY_COLUMNS)) of its last
+    moments; its curves are 0."""
     series = recording.shown()
     drawn = _figure_series(recording, series, body_of(recording.settings))
     end = TICK * len(drawn)
-    seconds = min(FALL_SECONDS, end - TICK)
+    seconds = min(FALL_SECONDS, end - TICK)  # the first sample is at the end of the first tick
     sampled = sample(drawn, np.linspace(end - seconds, end, MOMENTS)[None], TICK, TICK)[0]
     sampled[:, 0] -= sampled[0, 0]
     numbers |= {
@@ -127,8 +130,8 @@ def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body)
     of the hip; forces `forward` and `up` in body weights; `lever`, the vertical force times its CoP forward of the hip,
     0 without a force; `stiffness` K.
     """
-    hip = series["base"][:, :1]
-    ahead = np.array([[1.0, 0.0]]) * hip
+    hip = series["base"][:, :1]  # x (T, 1)
+    ahead = np.array([[1.0, 0.0]]) * hip  # (T, (x, 0)): leaves heights as they are
     force = series["force"] / (body.total_mass * GRAVITY)
     lever = (force[..., 1] * (series["contact"][..., 0] - hip[:, :, None])).sum(axis=-1)
     parts = {
@@ -149,10 +152,10 @@ def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
     """Return all series of a page as JSON values: `low` and `high` of each column, and 16-bit integers between them in
     base 64."""
     values = np.stack(walks)
-    values = np.where(values < LOCK.stiffness, values, 0.0)  # of a locked joint no K is drawn
+    values = np.where(values < LOCK.stiffness, values, 0.0)  # no other number is as large as the K of a locked joint
     low = values.min(axis=(0, 1))
     high = values.max(axis=(0, 1))
-    fraction = (values - low) / np.where(high > low, high - low, 1.0)
+    fraction = (values - low) / np.where(high > low, high - low, 1.0)  # 0 in a column of equal values
     integers = np.round(fraction * LARGEST).astype("<u2")
     return {
         "samples": MOMENTS,
@@ -164,14 +167,15 @@ def packed(walks: Sequence[NDArray]) -> dict[str, Any]:
 
 
 def people_behind(recording: Recording) -> dict[str, Any]:
-    """Return people's mean and SD behind each panel, over percent of the stride, and their toe-off [%]."""
+    """Return people's data for the page as JSON values: mean and SD behind each panel, over percent of the stride, and
+    their toe-off [%], at the speed of a recording."""
     human = reference_gait(recording.settings)
     phase = PERCENT / 100
     curves = {}
     for title, (_, unit, name) in PANELS.items():
         if name is None:
             continue
-        unit_factor = np.degrees(1.0) if unit.endswith("deg") else 1.0
+        unit_factor = np.degrees(1.0) if unit.endswith("deg") else 1.0  # people's angles are in radians
         curves[title] = {
             "people": shown_numbers(unit_factor * human.mean(name, phase)),
             "people_sd": shown_numbers(unit_factor * human.sd(name, phase)),

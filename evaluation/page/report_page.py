@@ -30,12 +30,19 @@ from .page_figure import walker_words
 from .template import as_json, filled
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
+"""Packages whose versions the page names."""
 JUDGED_SPEED = 1.2
 """Commanded speed for which the criteria were chosen [m/s]."""
 
 
 def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str = "") -> None:
-    """Write one page of one or several evaluated policies; `command` names the command that made it."""
+    """Write report.html: one page of one or several evaluated policies.
+
+    Args:
+        path: the file.
+        walks: recording and measured gait of each policy.
+        command: command line that made the page, which it shows; empty for none.
+    """
     data = {
         "policies": [policy_data(recording, gait) for recording, gait in walks],
         "tables": [table_rows(gait.metrics) for _, gait in walks],
@@ -65,7 +72,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def _verdict(index: int, metrics: dict[str, Any]) -> str:
-    """Return the HTML of one policy's verdict."""
+    """Return the HTML of the verdict on policy number `index`; `metrics` is the content of its metrics.json."""
     colour = COLOURS[index % len(COLOURS)]
     items = "".join(f"<dt>{escape(term)}</dt><dd>{escape(text)}</dd>" for term, text in spoken_verdict(metrics).items())
     return (
@@ -79,11 +86,12 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     environment = metrics["environment"]
     settings = settings_from(**environment)
     people = people_metrics(settings)
+    # The criteria hold for people at one speed.
     judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
     falls = metrics["falls"]
     episodes = metrics["episodes"]
     reasons = ", ".join(f"{count} × {reason}" for reason, count in metrics["fall_reasons"].items())
-    episode_count = f"{episodes} episode{'s' * (episodes != 1)}"
+    episode_count = f"{episodes} episode{'' if episodes == 1 else 's'}"
     falls_text = f"Fell in {falls} of {episode_count}: {reasons}." if falls else f"Never fell in {episode_count}."
     joints = metrics["joints"]
     grf = metrics["grf"]
@@ -111,10 +119,14 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
 
 
 _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
+"""Numbers of the vertical force in `grf` of metrics.json: two peaks and the valley between them."""
 
 
 def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: bool) -> str:
-    """Return a sentence that names the missed criteria; unless the walk is `judged`, one that there is no verdict."""
+    """Return a sentence that names those of `criteria` that a walk misses.
+
+    Unless the walk is `judged`, the sentence says that there is no verdict. `metrics` is the content of metrics.json.
+    """
     if not judged:
         return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
     values = with_derived(dict(metrics))
@@ -129,4 +141,5 @@ def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: b
 
 
 def _text(value: float | None, pattern: str) -> str:
+    """Return a number as text; a dash for None."""
     return "–" if value is None else format(value, pattern)

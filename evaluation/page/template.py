@@ -10,7 +10,8 @@ SHARED = {"STYLE": "page.css", "DRAWING": "drawing.js"}
 
 
 def filled(name: str, texts: Mapping[str, str]) -> str:
-    """Return the page `name` with the shared parts, and `texts` in place of their marks."""
+    """Return the page in the file `name`, its marks replaced: `/*MARK*/` by a shared file, `<!--MARK-->` by the text of
+    that name in `texts`."""
     folder = resources.files("springfoot.evaluation.page")
     page = folder.joinpath(name).read_text(encoding="utf-8")
     for mark, file in SHARED.items():
@@ -21,5 +22,5 @@ def filled(name: str, texts: Mapping[str, str]) -> str:
 
 
 def as_json(data: Any) -> str:
-    """Return JSON that is safe inside a page's script."""
+    """Return data as JSON that is safe inside a page's script: without `<`, which could end it."""
     return json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")

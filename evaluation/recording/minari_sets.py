@@ -42,6 +42,7 @@ class WalkedEpisode:
     """One episode of T steps."""
 
     seed: int
+    """Seed of the episode."""
     observations: NDArray
     """(T + 1, D), float32."""
     actions: NDArray
@@ -58,17 +59,20 @@ def set_id(name: str) -> str:
 
 
 def walked_episodes(settings: BipedSettings, policy: PolicyFunction, episodes: int, seed: int) -> list[WalkedEpisode]:
-    """Walk episodes seeded `seed`, `seed` + 1, … and return what a learner sees of each."""
+    """Walk `episodes` episodes, seeded `seed`, `seed` + 1, …; return observations, actions and rewards of each."""
     walked: list[WalkedEpisode] = []
     while len(walked) < episodes:
         count = min(_BATCH, episodes - len(walked))
-        seeds = [seed + len(walked) + index for index in range(count)]
+        seeds = [seed + number for number in range(len(walked), len(walked) + count)]
         walked += _walked_batch(Biped(settings, count), policy, seeds)
     return walked
 
 
 def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[WalkedEpisode]:
-    """Walk one episode in each environment of the batch, seeded by `seeds`."""
+    """Walk one episode in each environment of `biped`, seeded by `seeds`; return the episodes.
+
+    All environments step until the last episode ends; each episode is then cut to its own steps.
+    """
     biped.reset(np.arange(len(seeds)), seeds)
     observations = [biped.observe().copy()]
     actions: list[NDArray] = []
@@ -77,6 +81,7 @@ def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> lis
     fell = np.zeros(len(seeds), bool)
 
     def act(observation: NDArray) -> NDArray:
+        """Return the policy's actions (N, 4), and keep them."""
         actions.append(policy(observation))
         return actions[-1]
 
@@ -86,13 +91,16 @@ def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> lis
         walking_by_step.append(walking)
         fell |= walking & result.terminated
     steps = np.sum(walking_by_step, axis=0)
-    observed, acted, rewarded = np.stack(observations, 1), np.stack(actions, 1), np.stack(rewards, 1)
+    # (environment, step, ...)
+    all_observations = np.stack(observations, 1)
+    all_actions = np.stack(actions, 1)
+    all_rewards = np.stack(rewards, 1)
     return [
         WalkedEpisode(
             seed=seeds[k],
-            observations=observed[k, : steps[k] + 1],
-            actions=acted[k, : steps[k]],
-            rewards=rewarded[k, : steps[k]],
+            observations=all_observations[k, : steps[k] + 1],  # the one after the last step too
+            actions=all_actions[k, : steps[k]],
+            rewards=all_rewards[k, : steps[k]],
             fell=bool(fell[k]),
         )
         for k in range(len(seeds))
@@ -100,10 +108,11 @@ def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> lis
 
 
 def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, dict[str, float]]:
-    """Write Minari sets of `SETS`; return episodes, steps, mean return and falls of each.
+    """Write the Minari sets `names` of `SETS`, each of `episodes` episodes seeded from `seed` on.
 
-    All walk the task of `pretrained`. Minari keeps them in the folder of its variable MINARI_DATASETS_PATH; each is
-    written whole or not at all. Raises `SpringfootError`, with nothing written, for a set that exists.
+    Returns the number of episodes, steps and falls, and the mean return, by the name of the set. All walk the task of
+    `pretrained`. Minari keeps them in the folder of its variable MINARI_DATASETS_PATH; each is written whole or not at
+    all. Raises `SpringfootError`, with nothing written, for a set that exists.
     """
     with naming_extras():
         import h5py  # noqa: F401  # not above: extras
@@ -120,9 +129,9 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
     results = {}
     environment = gym.make(ENVIRONMENT, **settings_to_json(settings))
     for name in names:
-        policy, description = SETS[name]
-        acting = baseline(policy, settings, seed) if policy == "random" else read_policy(policy)
-        walked = walked_episodes(settings, acting, episodes, seed)
+        policy_name, description = SETS[name]
+        policy = baseline(policy_name, settings, seed) if policy_name == "random" else read_policy(policy_name)
+        walked = walked_episodes(settings, policy, episodes, seed)
         buffers = [
             EpisodeBuffer(
                 id=index,
@@ -130,8 +139,8 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
                 observations=walk.observations,  # pyright: ignore[reportArgumentType]  # an array serves
                 actions=walk.actions,  # pyright: ignore[reportArgumentType]
                 rewards=walk.rewards.tolist(),
-                terminations=_last(len(walk.rewards), walk.fell),
-                truncations=_last(len(walk.rewards), not walk.fell),
+                terminations=_false_until_last(len(walk.rewards), walk.fell),
+                truncations=_false_until_last(len(walk.rewards), not walk.fell),
             )
             for index, walk in enumerate(walked)
         ]
@@ -149,6 +158,7 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
                 description=f"{episodes} episodes from seed {seed} on: {description}.",
                 requirements=[f"springfoot=={__version__}"],
             )
+            # Minari writes below the set's id: its data move up, and the emptied folders go.
             (part / set_id(name) / "data").rename(part / "data")
             shutil.rmtree(part / NAMESPACE.split("/")[0])
         results[name] = {
@@ -174,6 +184,6 @@ def _datasets_in(folder: Path) -> Iterator[None]:
             os.environ[DATASETS_FOLDER] = before
 
 
-def _last(steps: int, value: bool) -> list[Any]:
-    """Return False for each step but the last, which has `value`."""
+def _false_until_last(steps: int, value: bool) -> list[Any]:
+    """Return a list with False for each step but the last, which has `value`."""
     return [False] * (steps - 1) + [value]

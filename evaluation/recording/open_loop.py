@@ -15,7 +15,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import tabulated_speeds
 from springfoot.envs.control.standing import steady_walk
-from springfoot.envs.physics.model import SIDES
+from springfoot.envs.physics.model import LEFT, RIGHT, SIDES
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, THEME_OF, BipedSettings, body_of
 from springfoot.errors import SpringfootError
 from springfoot.gait.springs.stiffness import SPRINGS
@@ -42,13 +42,19 @@ SAME_K = 1e-9
 
 
 def deciding_legs(settings: BipedSettings) -> list[int]:
-    """Return the sides whose ankle and toe follow the policy's stiffness; a leg with a device at either is left out."""
+    """Return the legs whose ankle and toe follow the policy's K, 0 left and 1 right.
+
+    A leg with a device at ankle or toe is left out: the device has a stiffness of its own.
+    """
     return [side for side, foot in enumerate(settings.feet) if not any(joint.device for joint in foot.joints)]
 
 
 def alike_legs(settings: BipedSettings) -> list[list[int]]:
-    """Return the `deciding_legs`, or both if there are none, in groups of equal feet: together, or each by itself."""
-    legs = deciding_legs(settings) or [0, 1]
+    """Return the `deciding_legs`, or both legs if there are none, in groups of legs with equal feet.
+
+    [[0, 1]] for equal feet, [[0], [1]] for different ones; 0 is the left leg.
+    """
+    legs = deciding_legs(settings) or [LEFT, RIGHT]
     left, right = settings.feet
     return [legs] if left == right else [[leg] for leg in legs]
 
@@ -56,18 +62,22 @@ def alike_legs(settings: BipedSettings) -> list[list[int]]:
 def decisions_of(
     recording: Recording, sides: Sequence[int] | None = None, series: str = "stiffness"
 ) -> tuple[NDArray, NDArray]:
-    """Return the phase (n,) of a leg at each decision, and K (n, 2) [N m/rad] of ankle and toe from then on.
+    """Return the phase of the leg at each of n decisions, (n,) in [0, 1), and K of its ankle and toe from then on,
+    (n, 2) [N m/rad].
 
-    Decisions are those of the steady walk without its first `WARM_UP` seconds, of all `sides` together: by default the
-    `deciding_legs`, or both legs if there are none. Times with slack muscles are left out. `series` names another
-    recorded pair, such as the rest angles, to return in place of K.
+    A policy decides once a step. The decisions are those of all episodes and all `sides` together (0 left, 1 right; by
+    default the `deciding_legs`, or both legs if there are none), in the steady walk without its first `WARM_UP`
+    seconds. Times with slack muscles (K = 0) are left out. `series` names another recorded pair of ankle and toe, such
+    as the rest angles, to return in place of K.
     """
     begin, end = steady_walk(recording.settings)
-    step = round(recording.settings.step_seconds / TICK)
+    step = round(recording.settings.step_seconds / TICK)  # ticks
+    # The first tick of each step but the walk's first step.
     samples = np.arange(step, recording.series["phase"].shape[1], step)
     samples = samples[(samples * TICK >= begin + WARM_UP) & (samples * TICK < end)]
-    deciding = deciding_legs(recording.settings) or [0, 1]
-    chosen = np.ix_(range(len(recording.ticks)), samples, deciding if sides is None else sides)
+    if sides is None:
+        sides = deciding_legs(recording.settings) or [LEFT, RIGHT]
+    chosen = np.ix_(range(len(recording.ticks)), samples, sides)  # (episode, decision, side)
     phase = recording.series["phase"][chosen].ravel().astype(float)  # at the tick's beginning, when K was decided
     values, stiffness = (
         recording.series[name][chosen].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
@@ -77,9 +87,11 @@ def decisions_of(
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """Fit a periodic curve, linear between `MEAN_KNOTS` even knots, to `values` (n, C) at `phase` (n,) in [0, 1).
+    """Return the mean of `values` (n, C) over the phase, as a periodic curve: its values at `MEAN_KNOTS` even phases,
+    (MEAN_KNOTS, C).
 
-    Returns the curve's values at the knots (MEAN_KNOTS, C), by least squares with a price on curvature.
+    `phase` (n,) is that of each value, in [0, 1). The curve is linear between its knots, and fitted by least squares
+    with a price on curvature (`SMOOTHING`).
     """
     # Each value lies between two knots, whose weights are 1 - fraction and fraction.
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
@@ -107,7 +119,7 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
 def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
     """Return the mean K over the stride, (SAMPLES, 2) on `GRID`, of decisions at `phase` (n,) of `stiffness` (n, 2).
 
-    Both in N m/rad; the mean is clipped to the range of the decisions.
+    Both in N m/rad. The mean is clipped to the range of the decisions, beyond which the fit's knots may lie.
     """
     knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
     knot_phases = np.arange(MEAN_KNOTS) / MEAN_KNOTS
@@ -117,12 +129,13 @@ def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
 def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     """Return `feedback` of metrics.json: the variation of log K of ankle and toe that the phase does not explain.
 
-    `share` is its part of the variance [0, 1], `spread` its standard deviation (0.1: at equal phase K varies by 10 %);
-    None without K. The variance at equal phase is half the mean squared difference of neighbours in phase (Rice, Annals
-    of Statistics 12 (1984) 1215), so that any schedule has none, with or without steps. Legs with different feet have
-    schedules of their own: the variances of each leg are averaged.
+    `share` is the fraction of the variance that is left at equal phase [0, 1], `spread` the standard deviation at equal
+    phase (0.1: K varies by 10 %); both are None without K. The variance at equal phase is half the mean squared
+    difference of neighbours in phase (Rice, Annals of Statistics 12 (1984) 1215), so that any schedule has none, with
+    or without steps. Legs with different feet have schedules of their own: the variances of each leg are averaged.
     """
     by_leg = [decisions_of(recording, legs) for legs in alike_legs(recording.settings)]
+    # log K (n, 2) of each group of legs, in the order of the phase
     logarithms = [np.log(stiffness[np.argsort(phase)]) for phase, stiffness in by_leg if len(phase) >= 2]
     if not logarithms:
         return {joint: {"share": None, "spread": None} for joint in SPRINGS}
@@ -159,9 +172,9 @@ def open_loop_copy(
     """
     undisturbed = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     groups = alike_legs(settings)
-    # A leg with a device follows no K: it is given that of the other one.
+    # Group of each side. A leg with a device is in none, and follows no K: it is given that of the other leg.
     group_of = [next((number for number, legs in enumerate(groups) if side in legs), 0) for side in range(len(SIDES))]
-    means: dict[float, NDArray] = {}
+    means: dict[float, NDArray] = {}  # by speed; without the speeds at which the policy walks no strides
     speeds = tabulated_speeds(settings).tolist()
     recorded: dict[str, Any] = {"name": name, "episodes": COPY_EPISODES, "threads": threads}
     recorded["progress"] = watch(len(speeds) * COPY_EPISODES * COPY_SECONDS)
@@ -170,6 +183,7 @@ def open_loop_copy(
         decisions = [decisions_of(recording, legs) for legs in groups]
         if all(len(phase) for phase, _ in decisions):
             curves = [_mean_stiffness(phase, stiffness) for phase, stiffness in decisions]
+            # (SAMPLES, side, joint)
             means[speed] = np.stack([curves[group] for group in group_of], axis=1)
     if not means:
         raise SpringfootError(f"{name} walks no strides after {WARM_UP:g} s whose mean stiffness could be taken")

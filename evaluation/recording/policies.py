@@ -35,7 +35,7 @@ def policy_and_settings(
     threads: int = 2,
     watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
-    """Return the policy of that name, and the environment settings to evaluate it with.
+    """Return the policy called `name`, and the environment settings to evaluate it with.
 
     Args:
         name: a trained policy: a .safetensors or .onnx file, a run folder (its best policy), one of `SHIPPED`, or
@@ -44,7 +44,7 @@ def policy_and_settings(
             open-loop policy (`open_loop_copy` walks with the trained one first to measure it).
         given: environment settings asked for. They replace `CONDITIONS`, and `CONDITIONS` replace the policy's own.
         seed: of the baseline `random`.
-        threads: of the physics where a copy is made; any number gives the same bits.
+        threads: of the physics in the walk from which `frozen:POLICY` is made; any number gives the same bits.
         watch: reports the progress of that walk, see `Watch`.
 
     Raises `SpringfootError` for an unknown name or a bad setting.
@@ -53,14 +53,15 @@ def policy_and_settings(
     kind = name.partition(":")[0]
     if kind == FROZEN:
         return _frozen_copy(name, given, threads, watch)
+    # Settings that an evaluation replaces, among them body and speed: both kinds of policy below depend on those.
+    replaced = {key: overriding[key] for key in CONDITIONS}
     if kind in BASELINES:
-        conditions = settings_from(**{key: overriding[key] for key in CONDITIONS})
-        settings = settings_from(**(own_settings(name, conditions) | overriding))
+        settings = settings_from(**(own_settings(name, settings_from(**replaced)) | overriding))
         return baseline(name, settings, seed), settings
     if is_schedule_file(name):
-        schedule_settings, make = schedule_file(name, settings_from(**{key: overriding[key] for key in CONDITIONS}))
+        schedule_settings, policy_for = schedule_file(name, settings_from(**replaced))
         settings = settings_from(**(schedule_settings | overriding))
-        return make(settings), settings
+        return policy_for(settings), settings
     if name not in SHIPPED and not Path(name).exists() and not is_function(name):
         names = ", ".join(
             [*(name for name in SHIPPED if name not in OF_FEET), f"{OF_FEET[0]} to {OF_FEET[-1]}", *BASELINES]
@@ -74,9 +75,11 @@ def policy_and_settings(
 
 
 def _frozen_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -> tuple[PolicyFunction, BipedSettings]:
-    """Return the open-loop copy `frozen:POLICY` and its settings.
+    """Return the open-loop copy `frozen:POLICY`, called `name`, and its settings; arguments as in
+    `policy_and_settings`.
 
-    The setting `decisions` is the copy's alone: for the mean K the policy walks with its own.
+    A setting `decisions` in `given` is the copy's alone: for the mean K the policy walks with its own. Raises
+    `SpringfootError` without a policy to copy, and for one that is its own copy.
     """
     copied = name.partition(":")[2]
     if not copied:
@@ -97,13 +100,14 @@ def policy_label(name: str) -> str:
     The label can name a folder, whatever `name` is: it is printable, no path, not hidden and not too long.
     """
     kind, _, copied = name.partition(":")
-    label = f"{FROZEN}-{policy_label(copied)}" if kind == FROZEN and copied else _own_name(name)
+    label = f"{FROZEN}-{policy_label(copied)}" if kind == FROZEN and copied else _name_without_folder(name)
     safe = "".join(letter if letter.isprintable() and letter not in "/\\" else "-" for letter in label)
     return safe.lstrip(".")[:LONGEST_LABEL] or "policy"
 
 
-def _own_name(name: str) -> str:
-    """Return the name of a policy without folder and suffix.
+def _name_without_folder(name: str) -> str:
+    """Return the name of a policy without folder and suffix: `runs/mine` is `mine`, `constant:300,40`
+    `constant-300-40`.
 
     The best and last policy of a run have the run's name before theirs.
     """

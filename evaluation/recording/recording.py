@@ -113,7 +113,7 @@ class Recording:
         return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
 
     def save(self, path: Path) -> None:
-        """Write `strides.npz`: the series and a header of JSON text. No object arrays."""
+        """Write the recording as `strides.npz`: its arrays, and all else as a header of JSON text, without pickles."""
         header = {
             "policy": self.policy,
             "settings": settings_to_json(self.settings),
@@ -146,7 +146,7 @@ def load_recording(path: str | Path) -> Recording:
 
 
 def _require_whole(recording: Recording) -> None:
-    """Raise `SpringfootError` for arrays of different numbers of episodes or ticks."""
+    """Raise `SpringfootError` if the arrays of a file's recording disagree on the number of episodes or ticks."""
     episodes, length = recording.series["phase"].shape[:2]
     for name in ("ticks", "returns", "fall_reason"):
         if getattr(recording, name).shape != (episodes,):
@@ -182,13 +182,13 @@ def record(
     """Record `episodes` episodes of `settings.episode_seconds` each, episode i from seed `seed` + i.
 
     Args:
-        policy: deterministic, observations to actions.
+        policy: deterministic function of observations (N, D) that returns actions (N, 4).
         settings: of the environment.
         name: of the policy, in reports.
-        episodes: how many.
-        seed: of the first.
+        episodes: number of episodes.
+        seed: of the first episode.
         threads: of the physics; any number gives the same bits.
-        model: of the body, with other options, as for `envs.physics.simulation.Simulation`.
+        model: compiled model with other physics options, in place of the settings' one.
         legs: leg constants in place of the committed ones.
         progress: called after every step with the seconds that it simulated, all episodes together.
 
@@ -214,11 +214,11 @@ def record_each(
     threads: int = 2,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> list[Recording]:
-    """Record, as `record` does, one episode for each of E bodies and speeds, side by side.
+    """Record, as `record` does, one episode for each of E bodies and speeds, episode i from seed `seed` + i.
 
-    Returns a recording for each, with its own settings. `walkers` holds `height` [m], `mass` [kg] and `speed` [m/s],
-    (E,) each, within the ranges that the `settings` draw from. Raises `SpringfootError` for settings whose commanded
-    speed changes within an episode.
+    Returns a recording for each, with the settings of its body and speed. `walkers` holds `height` [m], `mass` [kg] and
+    `speed` [m/s], (E,) each, within the ranges that the `settings` draw from. Raises `SpringfootError` for settings
+    whose commanded speed changes within an episode.
     """
     if settings.speed_interval is not None:
         raise SpringfootError(
@@ -252,9 +252,10 @@ def record_feet(
 ) -> list[Recording]:
     """Record, as `record` does, the same episodes on each of the `right_feet` (settings of feet), side by side.
 
-    Returns a recording for each foot.
+    Returns a recording for each foot. Episode i on each of them is from seed `seed` + i.
     """
     settings_by_foot = [replace(settings, right_foot=foot) for foot in right_feet]
+    # One walk after another: all episodes on the first foot, then all on the next.
     feet = [foot_settings.feet for foot_settings in settings_by_foot for _ in range(episodes)]
     seeds = [seed + episode for _ in settings_by_foot for episode in range(episodes)]
     course: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
@@ -277,7 +278,8 @@ class Episodes:
     fall_reason: NDArray
     """(E,) reason of a fall, "" without one."""
     series: dict[str, NDArray]
-    """Name -> (E, length, ...) float32, NaN beyond an episode's samples."""
+    """Name -> (E, length, ...) float32, NaN beyond an episode's samples; those of `SERIES` appear with the first
+    tick."""
     length: int
     """Most ticks of an episode."""
 
@@ -314,26 +316,33 @@ def record_walk(
     steps: int | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> None:
-    """Walk the episodes `rows` of `kept` in the batch `biped`, which has just been reset, and keep every tick.
+    """Walk one episode in each environment of a batch, and write every tick into the series of `kept`.
 
-    All measurements of walks start from these series. `act` and `steps` as for
-    `springfoot.envs.batch.walk.walked_steps`; `progress` is called after every step with the seconds that it simulated.
+    All measurements of walks start from these series.
+
+    Args:
+        biped: batch that has just been reset.
+        act: policy, a function of observations (N, D) that returns actions (N, 4).
+        kept: room for episodes, which is filled.
+        rows: episodes of `kept` that are walked, one for each environment.
+        steps: most steps to walk; None for episodes of the settings' length.
+        progress: called after every step with the seconds that it simulated.
     """
     ticks = kept.ticks[rows]
 
     def keep(tick: Tick) -> None:
         """Write the tick's values into all series, NaN for episodes that have ended."""
-        index = int(ticks.max())
+        index = int(ticks.max())  # episodes begin together: the longest one has no gap
         for name, take in SERIES.items():
             value = take(tick)
             if name not in kept.series:
                 kept.series[name] = np.full((len(kept.ticks), kept.length, *value.shape[1:]), np.nan, np.float32)
-            walking = tick.active.reshape(-1, *[1] * (value.ndim - 1))
+            walking = tick.active.reshape(-1, *[1] * (value.ndim - 1))  # (N, 1, ...), as the value
             kept.series[name][rows, index] = np.where(walking, value, np.nan)
         ticks[:] += tick.active
 
     biped.on_tick = keep
-    first = 0
+    first = 0  # tick at which the step begins; `last` is that of the next step
     for active, result in walked_steps(biped, act, steps):
         last = int(ticks.max())
         kept.series[REWARD][rows, first:last][active] = result.values[active, None, _TERMS]
@@ -357,9 +366,15 @@ def record_all(
     feet: Sequence[Feet] | None = None,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> Episodes:
-    """Walk one episode for each of E `seeds`, `BATCH` of them side by side.
+    """Walk one episode for each of E `seeds`, `BATCH` of them side by side; return their series.
 
-    `given` as in `Biped.reset`, `model` and `legs` as in `record`; `feet` are those of each episode.
+    Args:
+        policy: function of observations (N, D) that returns actions (N, 4).
+        settings: of the environment.
+        seeds: (E,) seed of each episode.
+        given: name -> (E,) `height`, `mass` or `speed` of each episode, where the settings draw them.
+        threads, model, legs, progress: as in `record`.
+        feet: (E,) feet of each episode; None for those of the settings.
     """
     require_recordable(settings, len(seeds))
     step = settings.step_seconds
@@ -376,7 +391,8 @@ def record_all(
 
 
 def planned_course(plan: ComPlan) -> dict[str, NDArray]:
-    """Return `plan_com` and `plan_zmp` of a `Recording`: the course of CoM and ZMP over percent of the step."""
+    """Return `plan_com` (101, 2) and `plan_zmp` (101,) of a `Recording` [m]: the plan's CoM and ZMP over percent of the
+    step."""
     # Percent 100 is the end of this step, not the beginning of the next.
     step_phase = np.minimum(PERCENT / 100, 1 - 1e-9)
     return {"plan_com": np.stack(plan.com(step_phase), -1), "plan_zmp": plan.zmp(step_phase)}

@@ -24,6 +24,7 @@ OVERSAMPLING = 3
 TICKS_PER_FRAME = 3
 """Ticks of 10 ms in a frame; GIF delays are whole hundredths of a second."""
 STRIDES = 2
+"""Strides that the animation shows."""
 LONGEST = 3.0
 """Longest clip [s], for gaits without strides."""
 MARKS_A_METRE = 4
@@ -31,6 +32,7 @@ MARKS_A_METRE = 4
 FORCE_LENGTH = 0.55
 """Length of an arrow of one body weight [m at 1.70 m]."""
 
+# Colours; the near leg is the left one.
 PAPER = (255, 255, 255)
 INK = (34, 34, 34)
 FAINT = (140, 140, 140)
@@ -43,10 +45,11 @@ FAR_FORCE = (243, 178, 145)
 PLAN = (209, 73, 91)
 SOFT = np.array([255, 236, 179])
 STIFF = np.array([122, 18, 60])
+"""Colours of the softest and of the stiffest joint."""
 
 
 def save_animation(path: Path, recording: Recording) -> None:
-    """Write the animation: two strides from a left heel strike, or the last seconds of a walk that only fell."""
+    """Write the animation of a recording: two strides from a left heel strike, or the end of a walk that only fell."""
     body = body_of(recording.settings)
     episode, first, last = clip_of(recording, body)
     series = {name: values[episode, first:last].astype(float) for name, values in recording.series.items()}
@@ -58,7 +61,8 @@ def save_animation(path: Path, recording: Recording) -> None:
 
 
 def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
-    """Return the episode to show, and the first and last tick of the clip: two strides, or the walk's end.
+    """Return the episode to show, and the clip's first tick and the tick after its last: two strides, or the walk's
+    end.
 
     The strides begin at a left heel strike after the warm-up; an episode that fell, or has too few, shows its end.
     """
@@ -74,16 +78,24 @@ def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
 
 
 class _Canvas:
-    """Draws one frame after another, world metres to pixels, by a camera that moves at the walk's mean speed."""
+    """Draw a clip, one frame after another, through a camera that moves at the walk's mean speed.
+
+    Points are (x, z) in metres of the world. Frames are drawn `OVERSAMPLING` times as large and then reduced.
+
+    Args:
+        body: the walking body.
+        series: name -> (T, ...) of the clip's ticks, as in a recording.
+        recording: the whole recording, for names and settings.
+    """
 
     def __init__(self, body: Body, series: dict[str, NDArray], recording: Recording):
         self._body = body
         self._series = series
-        self._scale = OVERSAMPLING * SIZE[1] / (1.30 * body.height)  # pixels a metre
+        self._scale = OVERSAMPLING * SIZE[1] / (1.30 * body.height)  # pixels a metre: 1.3 body heights fill a frame
         self._floor = OVERSAMPLING * SIZE[1] * 0.865  # pixel row of the floor
         ticks = np.arange(len(series["com"]))
         slope, start = np.polyfit(ticks, series["com"][:, 0], 1) if len(ticks) > 1 else (0.0, series["com"][0, 0])
-        self._camera = start + slope * ticks
+        self._camera = start + slope * ticks  # (T,) x in the middle of the frame [m]
         settings = recording.settings
         self._title = recording.policy
         self._subtitle = f"{settings.height:.2f} m, {settings.mass:g} kg, {settings.speed:.2f} m/s"
@@ -93,7 +105,7 @@ class _Canvas:
                 for (side, kind), shade in zip(kinds_of(settings).items(), ("dark", "light"), strict=True)
             )
         self._fonts = {size: ImageFont.load_default(OVERSAMPLING * size) for size in (11, 15)}
-        self._stiffness_range = np.log(np.stack(stiffness_ranges(settings, body), axis=-1))
+        self._stiffness_range = np.log(np.stack(stiffness_ranges(settings, body), axis=-1))  # (joint, end)
 
     def frame(self, tick: int) -> Image.Image:
         """Return the picture of the body at a tick."""
@@ -111,19 +123,22 @@ class _Canvas:
         return image.reduce(OVERSAMPLING)
 
     def _at(self, name: str) -> NDArray:
+        """Return the values of a series at the frame's tick."""
         return self._series[name][self._tick]
 
     def _pixel(self, point: NDArray) -> tuple[float, float]:
+        """Return the pixel (column, row) of a point (x, z) [m]."""
         x = OVERSAMPLING * SIZE[0] * 0.5 + (point[0] - self._camera[self._tick]) * self._scale
         return x, self._floor - point[1] * self._scale
 
     def _disc(self, centre: NDArray, radius: float, **style) -> None:
+        """Draw a disc of `radius` [m] around a point (x, z) [m]; `style` as Pillow's `ellipse` takes it."""
         x, y = self._pixel(centre)
         r = radius * self._scale
         self._draw.ellipse((x - r, y - r, x + r, y + r), **style)
 
     def _capsule(self, start: NDArray, end: NDArray, radius: float, colour: tuple) -> None:
-        """Draw a round-ended line with `radius` [m]."""
+        """Draw a round-ended line between two points (x, z) [m], twice `radius` [m] wide."""
         width = max(1, round(2 * radius * self._scale))
         self._draw.line([self._pixel(start), self._pixel(end)], fill=colour, width=width)
         self._disc(start, radius, fill=colour)
@@ -137,6 +152,7 @@ class _Canvas:
         self._draw.line((0, self._floor, width, self._floor), fill=FAINT, width=OVERSAMPLING)
         reach = 0.5 * width / self._scale
         middle = self._camera[self._tick]
+        # Numbers of the marks that lie in the frame.
         first = int(np.floor((middle - reach) * MARKS_A_METRE))
         last = int(np.ceil((middle + reach) * MARKS_A_METRE))
         for mark in range(first, last + 1):
@@ -159,7 +175,7 @@ class _Canvas:
         self._disc(shoulder + 0.165 * size * along, 0.095 * size, fill=TRUNK)
 
     def _leg(self, side: int, colour: tuple) -> None:
-        """Draw thigh, shank and foot of one leg from its joint angles."""
+        """Draw thigh, shank and foot of one leg from its joint angles; widths [m at 1.70 m] by eye."""
         body = self._body
         size = self._body.length_scale
         angle = self._at("angle")[side]
@@ -178,20 +194,23 @@ class _Canvas:
         self._capsule(hip, knee, 0.048 * size, colour)
         self._capsule(knee, ankle, 0.034 * size, colour)
         # The sole's outline runs below the spheres' centres, by their radii.
-        under = [ankle + _turned((f, u - r), foot) for f, u, r in (offsets["heel"], offsets["ball"])]
-        self._draw.polygon([self._pixel(p) for p in (ankle, heel, *under, ball)], fill=colour)
+        under = [
+            ankle + _turned((forward, up - radius), foot) for forward, up, radius in (offsets["heel"], offsets["ball"])
+        ]
+        self._draw.polygon([self._pixel(point) for point in (ankle, heel, *under, ball)], fill=colour)
         self._disc(heel, offsets["heel"][2], fill=colour)
         self._capsule(ankle, ball, offsets["ball"][2], colour)
         self._capsule(ball, tip, 0.85 * offsets["toe"][2], colour)
-        for joint, centre, radius in ((0, ankle, 0.026), (1, toe_joint, 0.017)):
+        for joint, centre, radius in ((0, ankle, 0.026), (1, toe_joint, 0.017)):  # columns of the series `stiffness`
             self._disc(
                 centre, radius * size, fill=self._stiffness_colour(side, joint), outline=PAPER, width=OVERSAMPLING
             )
         self._disc(knee, 0.014 * size, fill=PAPER)
 
     def _stiffness_colour(self, side: int, joint: int) -> tuple[int, int, int]:
-        """Return the colour of a joint by its K, from soft to stiff."""
+        """Return the colour of a joint (0 ankle, 1 toe) by its K, from soft to stiff on a log scale."""
         low, high = self._stiffness_range[joint]
+        # K of slack muscles is 0, and has no logarithm: 1 N m/rad at least.
         fraction = np.clip((np.log(max(self._at("stiffness")[side, joint], 1.0)) - low) / (high - low), 0, 1)
         red, green, blue = (SOFT + fraction * (STIFF - SOFT)).astype(int)
         return int(red), int(green), int(blue)
@@ -204,28 +223,29 @@ class _Canvas:
         weight = self._body.mass * GRAVITY
         if vertical < CONTACT_THRESHOLD_BW * weight:
             return
-        foot = np.array([(force[:, 1] * contact[:, 0]).sum() / vertical, 0.0])
+        cop = np.array([(force[:, 1] * contact[:, 0]).sum() / vertical, 0.0])
         arrow = force.sum(axis=0) / weight * FORCE_LENGTH * self._body.length_scale
-        end = foot + arrow
+        end = cop + arrow
         length = np.hypot(*arrow)
         along = arrow / length
-        head = min(0.07 * self._body.length_scale, length)
+        head = min(0.07 * self._body.length_scale, length)  # length of the tip
         across = np.array([-along[1], along[0]])
-        neck = end - head * along
+        neck = end - head * along  # where the tip begins
         line = round(0.016 * self._body.length_scale * self._scale)
-        self._draw.line([self._pixel(foot), self._pixel(neck)], fill=colour, width=line)
+        self._draw.line([self._pixel(cop), self._pixel(neck)], fill=colour, width=line)
         corners = [end, neck + 0.4 * head * across, neck - 0.4 * head * across]
         self._draw.polygon([self._pixel(point) for point in corners], fill=colour)
 
     def _masses(self) -> None:
-        """Draw the CoM, and its planned place."""
+        """Draw the CoM as a ring with a dot, and the place where the plan wants it as a larger ring."""
         size = self._body.length_scale
         self._disc(self._at("com_reference"), 0.034 * size, outline=PLAN, width=round(1.8 * OVERSAMPLING))
         self._disc(self._at("com"), 0.020 * size, fill=PAPER, outline=INK, width=OVERSAMPLING)
         self._disc(self._at("com"), 0.008 * size, fill=INK)
 
     def _words(self) -> None:
-        """Write title, subtitle and the legend below the picture."""
+        """Write title and subtitle above the picture, and the legend below it; places in pixels of the reduced
+        frame."""
         unit = OVERSAMPLING
         width, height = SIZE
         self._text((14 * unit, 10 * unit), self._title, 15, INK, "la")
@@ -243,12 +263,13 @@ class _Canvas:
         self._text((x + 23 * unit, y), "ground force", 11, FAINT, "lm")
         x = (width - 128) * unit
         self._text((x - 6 * unit, y), "ankle, toe: soft", 11, FAINT, "rm")
-        for step in range(60):
+        for step in range(60):  # the scale from soft to stiff, a pixel a step
             colour = tuple(int(c) for c in SOFT + step / 59 * (STIFF - SOFT))
             draw.rectangle((x + step * unit, y - 4 * unit, x + (step + 1) * unit, y + 4 * unit), fill=colour)
         self._text((x + 66 * unit, y), "stiff", 11, FAINT, "lm")
 
     def _text(self, position: tuple[float, float], words: str, size: int, colour: tuple, anchor: str) -> None:
+        """Write words of a font size at a pixel; `anchor` is Pillow's: the point of the text that lies there."""
         self._draw.text(position, words, font=self._fonts[size], fill=colour, anchor=anchor)
 
 

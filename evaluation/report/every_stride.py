@@ -24,15 +24,15 @@ STRIDE_KEYS = ("episode", "side", "stride", "begin_s", "stride_time_s", "fell", 
 
 
 def write_every_stride(folder: Path, recording: Recording) -> None:
-    """Write `every_stride.csv`, and `every_stride.parquet` where pyarrow is installed."""
+    """Write `every_stride.csv` of a recording into `folder`, and `every_stride.parquet` where pyarrow is installed."""
     strides = list(each_stride(recording))
     with (folder / "every_stride.csv").open("w", encoding="utf-8", newline="") as file:
         file.write(",".join((*STRIDE_KEYS, *GAIT_CYCLE_COLUMNS)) + "\n")
         for keys, curves in strides:
-            start = ",".join(str(value) for value in keys.values())
-            numbers = ",".join(["%.7g"] * curves.shape[1])
+            stride_cells = ",".join(str(value) for value in keys.values())
+            pattern = ",".join(["%.7g"] * curves.shape[1])  # seven digits: all that float32 has
             rows = map(tuple, curves.tolist())
-            file.writelines(f"{start},{percent},{numbers % row}\n" for percent, row in enumerate(rows))
+            file.writelines(f"{stride_cells},{percent},{pattern % row}\n" for percent, row in enumerate(rows))
     if find_spec("pyarrow") is not None:
         _write_parquet(folder / "every_stride.parquet", strides)
 
@@ -54,20 +54,22 @@ def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]
             curves = stride_curves(series, side, body, strides).astype(np.float32)
             for stride, ((start, _, stop), curve) in enumerate(zip(strides.tolist(), curves, strict=True)):
                 key_values = (episode, SIDES[side], stride, round(start, 6), round(stop - start, 6), fell)
-                yield dict(zip(STRIDE_KEYS, key_values, strict=False)), curve
+                yield dict(zip(STRIDE_KEYS, key_values, strict=False)), curve  # the last key, percent, is the row's
 
 
 def _write_parquet(path: Path, strides: Sequence[tuple[dict[str, Any], NDArray]]) -> None:
-    """Write the table as Parquet, with pyarrow."""
+    """Write the strides of `each_stride` as a Parquet table, a row for each percent of each stride; needs pyarrow."""
     import pyarrow as pa  # pyright: ignore[reportMissingImports]  # optional
     import pyarrow.parquet as pq  # pyright: ignore[reportMissingImports]
 
+    # Types of `STRIDE_KEYS` but the last one, percent, which differs between a stride's rows.
     kinds = (pa.int32(), pa.string(), pa.int32(), pa.float64(), pa.float64(), pa.int8())
     columns = {
         name: pa.array([keys[name] for keys, _ in strides for _ in PERCENT], kind)
         for name, kind in zip(STRIDE_KEYS, kinds, strict=False)
     }
     columns["percent"] = pa.array(np.tile(PERCENT, len(strides)), pa.int8())
+    # The empty first part gives a walk without strides its columns.
     curves = np.concatenate([np.empty((0, len(GAIT_CYCLE_COLUMNS)), np.float32), *(curve for _, curve in strides)])
     columns |= {name: pa.array(curve) for name, curve in zip(GAIT_CYCLE_COLUMNS, curves.T, strict=True)}
     pq.write_table(pa.table(columns), path, compression="zstd")

@@ -32,17 +32,21 @@ def write_opensim(folder: Path, recording: Recording) -> None:
 
 
 def opensim_coordinates(recording: Recording) -> dict[str, NDArray]:
-    """Return column of `walk.mot` -> (T,): time at the end of each tick [s], angles [deg], positions [m]."""
+    """Return column of `walk.mot` -> (T,): time at the end of each tick [s], angles [deg], positions [m].
+
+    The episode is the recording's `example`.
+    """
     series = recording.shown()
     x, height, pitch = series["base"].T
     columns = {
         "time": TICK * np.arange(1, len(x) + 1),
         "pelvis_tilt": -np.degrees(pitch),
         "pelvis_tx": x,
-        "pelvis_ty": height + _slope(recording.settings) * x,
+        "pelvis_ty": height + _slope(recording.settings) * x,  # recorded heights are above the mean ground
     }
     for side, name in enumerate(SIDES):
         for joint, coordinate in enumerate(COORDINATES.values()):
+            # OpenSim's sides are the letters l and r.
             columns[f"{coordinate}_{name[0]}"] = np.degrees(series["angle"][:, side, joint])
     return columns
 
@@ -66,7 +70,7 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
         centre = (pressing * contact_x).sum(axis=1) / np.where(loaded, total, 1.0)
         centre = np.where(loaded, centre, mid_tick(series["ankle"][:, side, 0]))
         zero = np.zeros(len(centre))
-        start = f"ground_force_{name[0]}"
+        start = f"ground_force_{name[0]}"  # l or r
         columns |= {f"{start}_vx": force[..., 0].sum(axis=1), f"{start}_vy": force[..., 1].sum(axis=1)}
         columns |= {f"{start}_vz": zero, f"{start}_px": centre, f"{start}_py": slope * centre, f"{start}_pz": zero}
         columns |= {f"ground_torque_{name[0]}_{axis}": zero for axis in "xyz"}
@@ -77,7 +81,10 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
 
 
 def write_model(path: Path, recording: Recording) -> None:
-    """Write the body as MJCF: its key `walk` is the first posture recorded, its ground has the walk's slope."""
+    """Write the recorded body as a model for MuJoCo, in MJCF.
+
+    Its key `walk` is the first posture recorded, its ground has the walk's slope.
+    """
     spec = sloping_spec(recording)
     walk = postures(recording)
     if len(walk):
@@ -89,14 +96,17 @@ def sloping_spec(recording: Recording) -> MjSpec:
     """Return MuJoCo's specification of the recorded body and feet, its ground with the walk's slope."""
     settings = recording.settings
     spec = build_spec(body_of(settings), settings.friction, settings.feet)
-    half_angle = radians(settings.slope_deg) / 2
+    half_angle = radians(settings.slope_deg) / 2  # a quaternion holds the half
     for side in SIDES:
         spec.body(ground_name(side)).quat = (cos(half_angle), 0.0, -sin(half_angle), 0.0)
     return spec
 
 
 def postures(recording: Recording) -> NDArray:
-    """Return the positions (T, 11) of the joints of `sloping_spec`'s model at the end of each tick."""
+    """Return the positions of the joints of `sloping_spec`'s model at the end of each tick, (T, 11) [m] and [rad].
+
+    They are hip x, hip z and trunk pitch, then four angles of the left and four of the right leg.
+    """
     series = recording.shown()
     x, height, pitch = series["base"].T
     base = np.stack([x, height + _slope(recording.settings) * x, pitch], axis=-1)
@@ -104,11 +114,13 @@ def postures(recording: Recording) -> NDArray:
 
 
 def _slope(settings: BipedSettings) -> float:
+    """Return the rise of the ground per metre forward [-]."""
     return tan(radians(settings.slope_deg))
 
 
 def _write_storage(path: Path, kind: str, columns: Mapping[str, NDArray], in_degrees: bool) -> None:
-    """Write columns as a storage file of OpenSim."""
+    """Write columns, name -> (T,), as a storage file of OpenSim; `kind` is its title, `in_degrees` the unit of
+    angles."""
     rows = np.stack(list(columns.values()), axis=-1)
     head = [
         f"springfoot {kind}",

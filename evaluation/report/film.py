@@ -34,7 +34,7 @@ def film_seconds(recording: Recording) -> float:
 
 
 def save_film(path: Path, recording: Recording, progress: Callable[[float], object] = lambda seconds: None) -> None:
-    """Write the film; call `progress` with the seconds of film that each picture adds.
+    """Write the film of a recording's `example`; call `progress` with the seconds of film that each picture adds.
 
     Raises `SpringfootError` without OpenGL or an encoder, and if the encoder fails.
     """
@@ -49,7 +49,7 @@ def save_film(path: Path, recording: Recording, progress: Callable[[float], obje
         writer: Any = imageio_ffmpeg.write_frames(
             str(path), (WIDTH, HEIGHT), fps=per_second, quality=QUALITY, ffmpeg_log_level="error"
         )
-        writer.send(None)
+        writer.send(None)  # begins: the writer is a generator
         for posture in postures(recording)[: round(FILM_SECONDS / TICK) : TICKS_A_FRAME]:
             data.qpos[:] = posture
             mujoco.mj_forward(model, data)

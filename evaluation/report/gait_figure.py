@@ -20,6 +20,7 @@ from ..numbers.metrics import MOMENT_CURVES, Gait
 from ..numbers.per_leg import ANGLE_COLUMNS, feet_differ, kinds_of
 from ..recording.recording import Recording
 
+# Colours of the model's curves (of the left leg where the feet differ), of its right leg, of plan and of people.
 MODEL = "#0b6e8f"
 OTHER_LEG = "#c77800"
 PLAN = "#d1495b"
@@ -45,7 +46,8 @@ STYLE: dict[Any, Any] = {
 
 
 def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
-    """Draw angles, moments, forces, CoM and stiffness, people's mean ± SD behind each."""
+    """Draw the mean curves of a gait into the picture `path`: angles, moments, forces, CoM and stiffness, with people's
+    mean ± SD behind them."""
     settings = recording.settings
     metrics = gait.metrics
     human = reference_gait(settings)
@@ -54,7 +56,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
         legs = tuple(zip(gait.feet, (MODEL, OTHER_LEG), strict=True))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(12.5, 10.2), layout="constrained")
-        grid = figure.subplots(4, 4)
+        grid = figure.subplots(4, 4)  # rows: angles; moments; two forces, two of the CoM; springs
         for ax, (joint, column) in zip(grid[0], ANGLE_COLUMNS.items(), strict=True):
             _angle(ax, legs, human, joint, column, metrics["joints"][joint])
         for ax, (joint, column) in zip(grid[1], MOMENT_CURVES.items(), strict=True):
@@ -70,7 +72,8 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
 
 
 def _angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
-    """Draw the angle of one joint over the stride, people's behind it."""
+    """Draw the angle of one joint over the stride, people's behind it; `numbers` are the joint's entry in
+    metrics.json."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}.get(joint, "flexion")
     ax.set(title=f"{joint.capitalize()} angle", ylabel=f"{positive} (deg)")
     phase = PERCENT / 100
@@ -80,7 +83,8 @@ def _angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numb
 
 
 def _moment(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
-    """Draw the moment of one joint over the stride, people's behind it."""
+    """Draw the moment of one joint over the stride, people's behind it; `numbers` are the joint's entry in
+    metrics.json."""
     positive = "extension" if joint in ("hip", "knee") else "plantarflexion"
     ax.set(title=f"{joint.capitalize()} moment", ylabel=f"{positive} (N·m/kg)")
     if joint != "toe":
@@ -90,18 +94,19 @@ def _moment(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, num
 
 
 def _force(ax: Axes, legs: Legs, human: HumanGait, direction: str, title: str, numbers: dict) -> None:
-    """Draw a component of the ground reaction force over the stride, people's behind it."""
+    """Draw a component of the ground reaction force over the stride, people's behind it; `direction` is "vertical" or
+    "forward", `numbers` are `grf` of metrics.json."""
     ax.set(title=title, ylabel=f"{'up' if direction == 'vertical' else 'forward'} (body weights)")
     name = f"grf_{direction}"
     _people(ax, human.mean(name, PERCENT / 100), human.sd(name, PERCENT / 100))
     _model(ax, legs, f"{name}_bw")
-    keys = (
-        ("vertical_peak1_bw", "vertical_peak2_bw")
-        if direction == "vertical"
-        else ("braking_peak_bw", "forward_peak_bw")
-    )
-    if numbers[keys[0]] is not None:
-        text = f"{numbers[keys[0]]:.2f} / {numbers[keys[1]]:.2f}"
+    peaks = {
+        "vertical": ("vertical_peak1_bw", "vertical_peak2_bw"),
+        "forward": ("braking_peak_bw", "forward_peak_bw"),
+    }
+    first_peak, second_peak = (numbers[name] for name in peaks[direction])
+    if first_peak is not None:
+        text = f"{first_peak:.2f} / {second_peak:.2f}"
         _note(ax, numbers[f"{direction}_r"], text + ", r {:.2f}", None)
 
 
@@ -117,7 +122,8 @@ def _com(axes: NDArray, recording: Recording, gait: Gait) -> None:
         ax.grid(color="#ededed", lw=0.6)
         numbers = gait.metrics["com"]
         error = numbers[f"{name}_rmse_m"]
-        _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", numbers["z_r"] if name == "z" else None)
+        r = numbers["z_r"] if name == "z" else None  # x is nearly a straight line: r would say nothing
+        _note(ax, None if error is None else 1000 * error, "RMSE {:.0f} mm", r)
     low, high = axes[1].get_ylim()
     middle = (low + high) / 2
     half_height = max(0.04, (high - low) / 2)  # at least 8 cm high, so that a flat CoM looks flat
@@ -160,7 +166,8 @@ def _model(ax: Axes, legs: Legs, name: str) -> None:
 
 
 def _note(ax: Axes, value: float | None, pattern: str, r: float | None) -> None:
-    """Write numbers above the panel, flush right."""
+    """Write numbers above a panel, flush right: `value` as `pattern` says, and the correlation `r`; None writes
+    nothing."""
     parts = [] if value is None else [pattern.format(value)]
     parts += [] if r is None else [f"r {r:.2f}"]
     ax.text(1.0, 1.02, ", ".join(parts), transform=ax.transAxes, ha="right", va="bottom", fontsize=8, color="#666666")

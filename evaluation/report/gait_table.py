@@ -22,7 +22,10 @@ from ..numbers.criteria import fault
 
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
-    """Print the evaluation as a table, people beside the model; plain text where the output is no terminal."""
+    """Print an evaluation as a table, people beside the model; plain text where the output is no terminal.
+
+    `metrics` is the content of metrics.json, `console` the place to print, standard output unless given.
+    """
     console = console or Console(highlight=False)
     environment = metrics["environment"]
     people = metrics["reference"]
@@ -37,7 +40,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
     reference = "people" if environment["human"] is None else "own"
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     narrow = console.width < NARROW
-    for name in ("", "model", reference, "r", "in ±SD") if narrow else ("", "", "model", reference, "r", "in ±SD"):
+    label_columns = ("",) if narrow else ("", "")  # quantity and unit, or both in one column
+    for name in (*label_columns, "model", reference, "r", "in ±SD"):
         table.add_column(
             name,
             justify="right" if name else "left",
@@ -46,14 +50,15 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
         )
     for section in _sections(metrics):
         for label, unit, *values in section:
-            named = [f"{label}, {unit}" if unit else label] if narrow else [label, unit]
-            table.add_row(*named, *values)
+            label_with_unit = f"{label}, {unit}" if unit else label
+            labels = [label_with_unit] if narrow else [label, unit]
+            table.add_row(*labels, *values)
         table.add_section()
     console.print(table)
     if metrics["per_leg"] is not None:
         console.print(_leg_table(metrics, narrow))
-    if found := fault(metrics):
-        console.print(f"[bold red]{escape(found)}[/]", soft_wrap=not console.is_terminal)
+    if warning := fault(metrics):
+        console.print(f"[bold red]{escape(warning)}[/]", soft_wrap=not console.is_terminal)
     for reason, count in metrics["fall_reasons"].items():
         console.print(f"{count} × {reason}")
     if environment["human"] is not None:
@@ -68,7 +73,10 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
 
 
 def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
-    """Return the table of the two legs, for feet that differ; a foot's name may take two lines."""
+    """Return the table of the two legs, for feet that differ; a foot's name may take two lines.
+
+    `metrics` is the content of metrics.json; in a `narrow` terminal the unit goes into the label.
+    """
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     for name in ("each leg",) if narrow else ("each leg", ""):
         table.add_column(name, no_wrap=not narrow)
@@ -80,15 +88,20 @@ def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
 
 
 def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return rows of quantity, unit, left leg and right leg; none if the feet are the same."""
+    """Return the rows of the table of the two legs: quantity, unit, left leg, right leg; none if the feet are the same.
+
+    `metrics` is the content of metrics.json.
+    """
     if metrics["per_leg"] is None:
         return []
     legs = metrics["per_leg"].values()
 
     def row(label: str, unit: str, values: Iterable[float | None], pattern: str) -> tuple[str, str, str, str]:
+        """Return a row with the two legs' `values` as text."""
         left, right = (text_of(value, pattern) for value in values)
         return label, unit, left, right
 
+    # Label, unit, key of the number in `per_leg`, format.
     of_leg = (
         ("step length", "m", "step_length_m", ".3f"),
         ("stance", "%", "stance_percent", ".1f"),
@@ -106,7 +119,8 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
 
 
 def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
-    """Return the table's rows one after another, for the page."""
+    """Return the rows of an evaluation's table one after another, for the page; `metrics` is the content of
+    metrics.json."""
     return [row for section in _sections(metrics) for row in section]
 
 
@@ -129,7 +143,11 @@ TableRow = tuple[str, str, str, str, str, str]
 
 
 def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
-    """Return the table's rows in groups: gait, angles, forces, moments and work, energy, plan, stiffness."""
+    """Return the rows of an evaluation's table in groups: gait, angles, forces, moments and work, energy, plan,
+    stiffness.
+
+    `metrics` is the content of metrics.json.
+    """
     people = people_metrics(settings_from(**metrics["environment"]))
     grf = metrics["grf"]
     their_grf = people["grf"]
@@ -141,7 +159,8 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     def row(
         label: str, unit: str, value: Any, pattern: str, of_people: Any = None, r: Any = None, inside: Any = None
     ) -> TableRow:
-        """Return a row: number or spread, people's number, r, and the percent of the stride inside people's SD."""
+        """Return a row: `value`, a number or its mean and SD, people's number, r, and the percent of the stride inside
+        people's SD; None leaves a cell empty."""
         text = plus_minus(value, pattern) if isinstance(value, dict) else text_of(value, pattern)
         inside_text = "" if inside is None else f"{inside:.0f} %"
         return (
@@ -154,9 +173,11 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         )
 
     def percent(value: float | None) -> str:
+        """Return a fraction as text of its percent."""
         return text_of(None if value is None else 100 * value, ".0f")
 
     def mm(label: str, value: float | None, r: float | None = None) -> TableRow:
+        """Return the row of a length [m], in millimetres."""
         return row(label, "mm", None if value is None else 1000 * value, ".0f", None, r)
 
     return [
@@ -233,7 +254,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
 def people_metrics(settings: BipedSettings) -> dict[str, Any]:
     """Return the numbers of people, or of own data, at the body and speed of `settings`; keys as in metrics.json.
 
-    They are of mean curves. Effort is without the toe, whose moment is not measured.
+    They are of people's mean curves. Effort is without the toe, whose moment is not measured.
     """
     human = reference_gait(settings)
     body = body_of(settings)
@@ -245,6 +266,7 @@ def people_metrics(settings: BipedSettings) -> dict[str, Any]:
         "speed_m_s": human.speed,
         "step_length_m": human.step_length,
         "cadence_steps_min": 2 * 60 / human.stride_time,
+        # From the heel strike of the other foot, half a stride on, to the toe-off.
         "double_support_s": (human.toe_off - 0.5) * human.stride_time,
         "toe_off_percent": 100 * human.toe_off,
         "grf": {
@@ -257,6 +279,7 @@ def people_metrics(settings: BipedSettings) -> dict[str, Any]:
         "moments": {name: score.largest(human.mean(f"{name}_moment", phase))[0] for name in ("hip", "knee", "ankle")},
         "ankle_work_J_kg": work["ankle"],
         "joint_work_J_kg": work,
+        # Effort is per weight with load and metre, this number per mass of the body alone and metre.
         "fibre_J_kg_m": effort.work * GRAVITY * body.total_mass / body.mass,
         "effort": effort.total,
     }
@@ -264,6 +287,6 @@ def people_metrics(settings: BipedSettings) -> dict[str, Any]:
 
 def _people_work(human: HumanGait, joint: str) -> dict[str, float]:
     """Return positive and negative work of one of people's joints in a stride [J/kg], from their mean power."""
-    power = human.mean(f"{joint}_power", PERCENT / 100)[None]
+    power = human.mean(f"{joint}_power", PERCENT / 100)[None]  # (1, 101): of one stride
     positive, negative = score.stride_work(power, np.array([human.stride_time]))
     return {"positive": float(positive[0]), "negative": float(negative[0])}

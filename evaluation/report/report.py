@@ -73,9 +73,11 @@ def _write_numbers(folder: Path, recording: Recording, gait: Gait) -> None:
 
 
 def write_gait_cycle(path: Path, curves: StrideCurves, metrics: dict[str, Any]) -> None:
-    """Write one gait_cycle.csv: 101 rows, each curve's mean and `_sd` over strides, empty where missing.
+    """Write one gait_cycle.csv: a row for each percent of the stride, each curve's mean and `_sd` over strides, empty
+    where missing.
 
-    The leading columns repeat the whole gait's values on each row, as in the reference data.
+    `curves` are those of both legs or of one, `metrics` is the content of metrics.json. The leading columns repeat the
+    whole gait's values on each row, as in the reference data.
     """
     cadence = metrics["cadence_steps_min"]
     leading = {

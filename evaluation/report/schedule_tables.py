@@ -73,15 +73,15 @@ def schedule_curves(recording: Recording) -> dict[str, NDArray]:
             for joint, spring in enumerate(SPRINGS):
                 curves[f"{spring}_{name}_{column}"] = mean[:, joint]
                 curves[f"{spring}_{name}_{column}_sd"] = sd[:, joint]
-    return dict(sorted(curves.items(), key=lambda item: "equilibrium" in item[0]))
+    return dict(sorted(curves.items(), key=lambda item: "equilibrium" in item[0]))  # first all K, then all rest angles
 
 
 def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """Return mean and standard deviation over percent of the phase, (101, 2) each, of `values` (n, 2) at `phase`
-    (n,)."""
+    """Return mean and standard deviation over percent of the phase, (101, 2) each, of `values` (n, 2) at `phase` (n,);
+    NaN without values."""
     if not len(phase):
-        nothing = np.full((len(PERCENT), values.shape[1]), np.nan)
-        return nothing, nothing
+        missing = np.full((len(PERCENT), values.shape[1]), np.nan)
+        return missing, missing
     knots = np.clip(mean_over_phase(phase, values), values.min(0), values.max(0))
     squares = (values - _between_knots(knots, phase)) ** 2
     variance = np.maximum(mean_over_phase(phase, squares), 0.0)
@@ -89,6 +89,7 @@ def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
+    """Return at `phase` (n,) the periodic curves (n, C) that are linear between `knots` (MEAN_KNOTS, C)."""
     knot_phases = np.arange(MEAN_KNOTS) / MEAN_KNOTS
     return np.stack([np.interp(phase, knot_phases, curve, period=1.0) for curve in knots.T], -1)
 
@@ -96,24 +97,26 @@ def _between_knots(knots: NDArray, phase: NDArray) -> NDArray:
 def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
     """Return the content of `finite_states.json`: K, beta and theta_eq of ankle and toe in each of `STATES`.
 
-    They are of all `legs` together. K is the mean over the state; theta_eq is the rest angle with which the spring has
-    the state's mean torque at its mean angle and rate. None stands for a state that the walk does not have; times with
-    slack muscles are left out. The states begin at the gait events of the target (`gait_events`), the inner ones
-    half-way between two.
+    They are of all `legs` (0 left, 1 right) together. K is the mean over the state; theta_eq is the rest angle with
+    which the spring has the state's mean torque at its mean angle and rate. None stands for a state that the walk does
+    not have; times with slack muscles are left out. The states begin at the gait events of the target (`gait_events`),
+    the inner ones half-way between two.
     """
     settings = recording.settings
     body = body_of(recording.settings)
     strike, flat, heel_off, toe_off = gait_events(reference_gait(settings))
     starts = [strike, flat, (flat + heel_off) / 2, heel_off, (heel_off + toe_off) / 2, toe_off]
-    events = ["heel strike", "foot flat", None, "heel-off", None, "toe-off"]
+    events = ["heel strike", "foot flat", None, "heel-off", None, "toe-off"]  # None: half-way between two events
     begin, end = steady_walk(settings)
     ticks = slice(round((begin + WARM_UP) / TICK), round(end / TICK) if np.isfinite(end) else None)
     phase = recording.series["phase"][:, ticks, legs].ravel().astype(float)
+    # Name -> (episode, tick, leg, ankle and toe); all but K have hip and knee too, which are left out below.
     columns = {
         name: recording.series[name][:, ticks][:, :, legs] for name in ("stiffness", "angle", "velocity", "torque")
     }
     usable = np.isfinite(phase) & (columns["stiffness"] > 0.0).all(-1).ravel()
     columns |= {name: columns[name][..., FEET] for name in ("angle", "velocity", "torque")}
+    # Name -> (n, (ankle, toe)) of all usable ticks of all legs.
     springs = {name: values.reshape(-1, len(SPRINGS))[usable].astype(float) for name, values in columns.items()}
     phase = phase[usable] % 1.0
     beta = damping_times(body)[FEET]
@@ -128,6 +131,7 @@ def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
             entry["damping_time_s"] = float(beta[joint])
             if inside.any():
                 mean = {key: float(values[inside, joint].mean()) for key, values in springs.items()}
+                # torque = K (rest - angle - beta rate), solved for the rest angle
                 rest = mean["torque"] / mean["stiffness"] + mean["angle"] + beta[joint] * mean["velocity"]
                 entry |= {"stiffness_Nm_per_rad": mean["stiffness"], "equilibrium_deg": float(np.degrees(rest))}
             state[spring] = entry

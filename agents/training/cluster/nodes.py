@@ -45,7 +45,8 @@ def joined(processors: int | None = None) -> Iterator[None]:
 
 
 def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
-    """Run commands (name, words), each on one processor of the cluster; print their standard error, name first.
+    """Run commands (name, words), each on one processor of the cluster; print the standard error of each as it ends,
+    its name before every line.
 
     Raises `KeyboardInterrupt` after a signal, with the commands ended.
     """

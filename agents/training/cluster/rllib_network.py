@@ -56,7 +56,10 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
 
 
 def _network(widths: list[int], gain: float) -> nn.Sequential:
-    """Return tanh layers with orthogonal weights and biases of 0, the last one linear with this gain."""
+    """Return a network of these `widths`, input first: tanh layers, and a last one that is linear.
+
+    Weights are orthogonal, those of the last layer times `gain`; biases are 0.
+    """
     layers: list[nn.Module] = []
     for index, (below, above) in enumerate(pairwise(widths)):
         last = index == len(widths) - 2
@@ -71,6 +74,6 @@ def actor_layers(state: dict[str, np.ndarray]) -> list[tuple[np.ndarray, np.ndar
     """Return weight and bias of each layer of the actor, from the state of an `ActorCritic`."""
     names = sorted(
         (name.removesuffix(".weight") for name in state if name.startswith("actor.") and name.endswith(".weight")),
-        key=lambda name: int(name.split(".")[1]),
+        key=lambda name: int(name.split(".")[1]),  # actor.INDEX: 10 after 9
     )
     return [(np.array(state[f"{name}.weight"]), np.array(state[f"{name}.bias"])) for name in names]

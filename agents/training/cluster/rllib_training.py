@@ -57,7 +57,7 @@ _ENVIRONMENT = "springfoot-batch"
 """Name under which RLlib finds our environments."""
 
 
-class _Batch(gym.vector.VectorWrapper):
+class _ScaledRewards(gym.vector.VectorWrapper):
     """Multiply the rewards of a vector environment by `scale`, and drop its infos, of which RLlib would make N
     dictionaries a step."""
 
@@ -66,18 +66,19 @@ class _Batch(gym.vector.VectorWrapper):
         self._scale = scale
 
     def reset(self, **arguments: Any) -> tuple[NDArray, dict[str, Any]]:
-        """Reset as the environment does."""
+        """Reset as the environment does; return the observations (N, D) and an empty info."""
         return self.env.reset(**arguments)[0], {}
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        """Step as the environment does."""
+        """Step as the environment does; return observations (N, D), scaled rewards, terminated and truncated (N,), and
+        an empty info."""
         observation, reward, terminated, truncated, _ = self.env.step(actions)
         return observation, reward * self._scale, terminated, truncated, {}
 
 
 def _batch(context: Mapping[str, Any]) -> gym.vector.VectorEnv:
     """Make the environments of a runner from RLlib's `context`: their number, their settings, the reward's scale."""
-    return _Batch(SegmentedFootBipedVector(context["num_envs"], **context["settings"]), context["scale"])
+    return _ScaledRewards(SegmentedFootBipedVector(context["num_envs"], **context["settings"]), context["scale"])
 
 
 def train(config: TrainingConfig, out: str | Path, num_env_runners: int | None = None) -> dict[str, Any]:
@@ -160,7 +161,7 @@ class _Run:
         self._config = config
         self._out = out
         self._checkpoint = checkpoint
-        self._runners = num_env_runners
+        self._runners = num_env_runners  # None until a cluster is joined
         self._trained = record.get("timesteps", 0)
         self._seconds_before = float(record.get("seconds", 0.0))
         self._record = {name: record[name] for name in ("sessions", "evaluations")}
