@@ -15,7 +15,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import read_bytes
 
-from .contacts import Contacts
+from .gait_events import Contacts
 from .human import FORCES
 from .motion_files import FILE_SIDES, Series, Trial, not_empty
 

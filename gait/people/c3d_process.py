@@ -14,7 +14,7 @@ from springfoot.errors import SpringfootError, quoted
 from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, output_in_process
 from springfoot.files.text_table import existing
 
-from .contacts import Contacts
+from .gait_events import Contacts
 from .motion_files import Trial
 
 _CHILD = "from springfoot.gait.people.c3d_process import main; main()"

@@ -14,7 +14,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from ..body.body import ANGLES, GRAVITY, REFERENCE_MASS
-from .contacts import PERCENT
+from .gait_events import PERCENT
 from .human import COLUMNS, HumanGait
 from .strides import MeasuredWalk, cut_strides
 

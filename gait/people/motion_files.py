@@ -18,7 +18,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import Table, make_table, text_lines
 
-from .contacts import Contacts
+from .gait_events import Contacts
 from .human import COLUMNS, FORCES
 
 LONGEST_HEADER = 200

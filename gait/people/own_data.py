@@ -18,7 +18,7 @@ from springfoot.files.text_table import Table, read_csv
 from ..body.body import MASS_RANGE
 from .c3d_process import c3d_trial
 from .checks import AS_IT_IS, require_plausible, require_plausible_legs
-from .contacts import CONTACT_THRESHOLD_BW, PERCENT
+from .gait_events import CONTACT_THRESHOLD_BW, PERCENT
 from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
 from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
 from .strides import MeasuredWalk, cut_strides, merge_trials

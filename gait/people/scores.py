@@ -1,8 +1,8 @@
 """Compute statistics of a gait, each in a function of its own.
 
-Curves are arrays (101,) over percent 0..100 of the stride (`contacts.PERCENT`) unless said otherwise. A statistic that
-cannot be computed (no data, no spread) is None, never NaN. The windows contain people's two force peaks and the valley
-between them at every walking speed.
+Curves are arrays (101,) over percent 0..100 of the stride (`gait_events.PERCENT`) unless said otherwise. A statistic
+that cannot be computed (no data, no spread) is None, never NaN. The windows contain people's two force peaks and the
+valley between them at every walking speed.
 """
 
 from dataclasses import dataclass

@@ -11,7 +11,7 @@ from springfoot.errors import SpringfootError
 from ..body.body import GRAVITY, Body
 from ..body.leg import FOOT_SEGMENT, joint_positions, segment_turns
 from ..body.rockers import turned
-from .contacts import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
+from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .human import COLUMNS, FORCES
 from .motion_files import Series, Trial, refuse_absurd
 
