@@ -171,6 +171,7 @@ def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[st
     moments = {}
     for index, (name, joint) in enumerate(joint_positions(body, motion.turn, motion.hip).items()):
         turning = -_cross(load.point - joint[..., None, :], load.force)  # (..., 2): by the foot's load and the toe's
+        # The toe joint carries the toe's load alone.
         moments[name] = _MOMENT_SIGN[index] * (turning[..., 1] if index == TOE_SEGMENT else turning.sum(-1))
     return moments
 

@@ -141,6 +141,7 @@ def muscle_use(
     give = np.array(TENDON_GIVE) * [1.0, 1.0, muscle.tendon, muscle.toe_tendon] / scale
     work = interval_work(moment[:-2], moment[1:-1], moment[2:], delivered[1:-1], give)
     extends = moment > 0.0
+    # The moment over the largest one in its own direction: extension is the first strength, flexion the second.
     activation = moment / np.where(extends, strength[..., 0], strength[..., 1])
     change = activation[2:] - activation[:-2]
     # The weight of the extensors where the moment extends, otherwise that of the flexors.

@@ -102,7 +102,8 @@ class FootPath:
 
     def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
         """Return the height of the ball of the foot above the floor [m]: the toe joint above its standing height."""
-        return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
+        _, z = self.toe_joint(stride_phase)
+        return z - self.body.toe_joint_height
 
     @property
     def heel_strike_pitch(self) -> float:

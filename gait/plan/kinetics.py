@@ -65,9 +65,11 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
     shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` if a foot would have to pull: for a ZMP that is
     not between p1 and p2, or a force that does not point up.
     """
-    if not np.all(force[..., 1] > 0):
+    forward, up = np.moveaxis(force, -1, 0)
+    com_x, com_z = np.moveaxis(com, -1, 0)
+    if not np.all(up > 0):
         raise SpringfootError("the ground can only push: the upward force must be > 0 N")
-    zmp = com[..., 0] - com[..., 1] * force[..., 0] / force[..., 1]
+    zmp = com_x - com_z * forward / up
     rear = np.asarray(rear_cop)
     front = np.asarray(front_cop)
     outside = float(np.max(np.maximum(np.minimum(rear, front) - zmp, zmp - np.maximum(rear, front)), initial=0.0))
@@ -77,12 +79,13 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
         )
     # Where both centres coincide, a small distance avoids 0 / 0.
     cop_distance = np.where(front == rear, ZMP_TOLERANCE, front - rear)
-    on_front = np.clip((zmp - rear) / cop_distance, 0.0, 1.0) * force[..., 1]
+    on_front = np.clip((zmp - rear) / cop_distance, 0.0, 1.0) * up  # upward part [N]
 
-    def towards_com(up: NDArray, cop: NDArray) -> NDArray:
-        return np.stack([up * (com[..., 0] - cop) / com[..., 1], up], -1)
+    def towards_com(upward: NDArray, cop: NDArray) -> NDArray:
+        """Return the force with this upward part that points from `cop` to the CoM."""
+        return np.stack([upward * (com_x - cop) / com_z, upward], -1)
 
-    return towards_com(force[..., 1] - on_front, rear), towards_com(on_front, front)
+    return towards_com(up - on_front, rear), towards_com(on_front, front)
 
 
 def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -108,13 +111,13 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     rear, front = _double_support_cops(plan, step_phase)
     # In single support the stance foot is the front foot and bears the whole force, at the ZMP; the rear foot, without
     # force, may then be anywhere, 1 m behind.
-    on_rear, on_front = share_forces(
-        force, pivot, np.where(double_support, rear, zmp - 1.0), np.where(double_support, front, zmp)
-    )
-    on_this_foot = np.where(is_rear[..., None], np.where(double_support[..., None], on_rear, 0.0), on_front)
+    front_cop = np.where(double_support, front, zmp)
+    on_rear, on_front = share_forces(force, pivot, np.where(double_support, rear, zmp - 1.0), front_cop)
+    # The rear foot swings after double support; its own frame is a step behind the front foot's.
+    on_rear = np.where(double_support[..., None], on_rear, 0.0)
     tip = plan.body.ankle_to_toe_joint + plan.body.toe_length
-    on_foot = np.where(double_support, front, zmp)
-    return on_this_foot, np.where(is_rear, np.where(double_support, rear + plan.step_length, tip), on_foot)
+    rear_cop = np.where(double_support, rear + plan.step_length, tip)
+    return np.where(is_rear[..., None], on_rear, on_front), np.where(is_rear, rear_cop, front_cop)
 
 
 def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:

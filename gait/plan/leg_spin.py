@@ -86,6 +86,8 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     moment = mass * (leg.hip - com) + moment_about_hip  # first mass moment of trunk and load about the CoM [kg m]
     turning += moment[:, 0] * leg.hip_acceleration[:, 1] - moment[:, 1] * leg.hip_acceleration[:, 0]
     time = np.arange(half + 1) / half * motion.step_time
-    force = body.total_mass * (-gravity(motion.slope)[1] + motion.acceleration(time[:-1])[1])  # upward [N]
-    ahead = turning[:half] / force
+    _, com_acceleration = motion.acceleration(time[:-1])
+    _, g = gravity(motion.slope)
+    upward_force = body.total_mass * (-g + com_acceleration)  # [N]
+    ahead = turning[:half] / upward_force
     return CubicSpline(time, np.append(ahead, ahead[0]), bc_type="periodic")

@@ -5,7 +5,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 
 from ..body.body import ANGLES, GRAVITY
-from ..body.leg import JOINTS, inverse_dynamics
+from ..body.leg import JOINTS, LEG_SEGMENTS, inverse_dynamics
 from ..people.human import HARMONICS, STANCE_TERMS, FootHabits, HumanGait
 from .kinetics import foot_force, planned_leg
 from .plan import WalkPlan
@@ -31,12 +31,11 @@ def gait_of(plan: WalkPlan) -> HumanGait:
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     angles = plan.joint_angles(phase)
-    turn = motion.turn
-    rate = motion.rate
-    # Rates of the joints from those of thigh, shank, foot and toe (`LEG_SEGMENTS`).
-    rates = {"hip": rate[:, 0], "knee": rate[:, 0] - rate[:, 1], "ankle": rate[:, 2] - rate[:, 1]}
-    rates["toe"] = rate[:, 3] - rate[:, 2]
-    mean = {name: _fourier_coefficients(angles[name]) for name in ANGLES} | {"hip": _fourier_coefficients(turn[:, 0])}
+    thigh, shank, foot, toe = np.moveaxis(motion.rate, -1, 0)
+    rates = {"hip": thigh, "knee": thigh - shank, "ankle": foot - shank, "toe": toe - foot}  # of the joints
+    mean = {name: _fourier_coefficients(angles[name]) for name in ANGLES} | {
+        "hip": _fourier_coefficients(motion.turn[:, LEG_SEGMENTS.index("thigh")])  # the pelvis does not turn
+    }
     unit = body.total_mass * body.length_scale  # [N m] of 1 N m/kg at 1.70 m
     for joint in JOINTS:
         mean[f"{joint}_moment"] = _fourier_coefficients(dynamics.moment[joint] / unit)
