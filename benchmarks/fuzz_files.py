@@ -26,8 +26,8 @@ from springfoot.evaluation.recording.recording import Recording, load_recording,
 from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
 from springfoot.files.json_file import read_object
 from springfoot.files.tensor_file import DIGEST, read_tensors, write_tensors
-from springfoot.gait.people.contacts import PERCENT
 from springfoot.gait.people.fit_human import COP_TABLE, CURVES_TABLE, TOE_TABLE, fit
+from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.people.human import COLUMNS, PEOPLE_FILE, HumanGait, foot_habits, harmonics, human_gait
 from springfoot.gait.people.own_data import OwnGait, read_gait
 from springfoot.gait.plan.walk_style import STYLES, styles_of

@@ -52,6 +52,7 @@ def read_arrays(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDArra
     try:
         with open_file(path) as file, ZipFile(file) as archive:
             members = archive.infolist()
+            # Members that are stored cannot claim more bytes than the file has: reading them cannot fill the memory.
             if (
                 any(member.compress_type != ZIP_STORED for member in members)
                 or sum(member.file_size for member in members) > os.fstat(file.fileno()).st_size
@@ -59,6 +60,7 @@ def read_arrays(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDArra
                 raise SpringfootError(f"{path} is no {kind}: it is compressed")
             arrays = {member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in members}
         header = json.loads(str(arrays.pop(HEADER)))
+        # The digest does not cover itself.
         digest = header.pop(DIGEST, None)
         unchanged = digest == digest_of(header, arrays)
     except SpringfootError:
@@ -81,6 +83,7 @@ def _array(content: bytes) -> NDArray:
     Raises `ValueError` for objects, and for a header that claims more data than there is.
     """
     file = io.BytesIO(content)
+    # NumPy's two versions of the format, each with its reader.
     read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(npy.read_magic(file))
     if read_header is None:
         raise ValueError("another version of the format")

@@ -28,6 +28,7 @@ def require_unchanged(path: Path, content: bytes) -> None:
     if DIGEST.encode() not in content:
         return  # the file is not springfoot's, or an earlier version wrote it
     written = _DIGITS.search(content)
+    # The content as it was when its digest was computed.
     blank = content.replace(written[1], BLANK_DIGEST.removeprefix(f"{DIGEST}:").encode()) if written else b""
     if written is None or sha256(blank).hexdigest().encode() != written[1]:
         raise SpringfootError(

@@ -61,7 +61,7 @@ def owned(folder: Path) -> Iterator[None]:
     new_folders: list[Path] = []
     try:
         handle, locked = _open_and_lock(path, new_folders)
-        removes_file = True
+        removes_file = True  # at the end, unless the file is not ours
         ended = threading.Event()
         try:
             try:
@@ -104,7 +104,7 @@ def _dead_owner(folder: Path, handle: int, locked: bool) -> dict[str, Any]:
     # With the lock, an owner of this host is dead. Otherwise its process tells, and on another host its last touch.
     if owner and (owner.get("host") != socket.gethostname() or (not locked and _is_running(owner))):
         silence = time.time() - path.stat().st_mtime
-        if silence < -DEAD:
+        if silence < -DEAD:  # touched in the future: the clocks of the two hosts differ
             ahead = _time_in_words(-silence)
             raise TakenError(_taken_message(folder, owner, f", by a clock {ahead} ahead; remove {path} if not"))
         if silence < DEAD:
@@ -148,6 +148,7 @@ def _open_and_lock(path: Path, new_folders: list[Path]) -> tuple[int, bool]:
             locked = False
         if _is_file_at(handle, path):
             return handle, locked
+        # Otherwise try again with a new file.
         os.close(handle)  # the former owner has just removed its file
 
 
@@ -203,17 +204,18 @@ def _may_be_ours(file: os.stat_result) -> bool:
 
 
 def _is_running(owner: dict[str, Any]) -> bool:
-    """Tell whether this host runs a process with the owner's id."""
+    """Tell whether this host runs a process with the owner's id; False for a record without a proper id."""
     try:
-        os.kill(int(owner["pid"]), 0)
+        os.kill(int(owner["pid"]), 0)  # signal 0 only asks
     except (ProcessLookupError, KeyError, TypeError, ValueError, OverflowError):
         return False
-    except OSError:  # somebody else's
+    except OSError:  # it runs, but belongs to another user, and must not be asked
         return True
     return True
 
 
 def _taken_message(folder: Path, owner: dict[str, Any], detail: str = "") -> str:
+    """Return the message of `TakenError`, with a `detail` about the owner."""
     return f"{folder} is being written by {_owner_in_words(owner)}{detail}; wait for it, or choose another folder"
 
 
@@ -229,6 +231,6 @@ def _owner_in_words(owner: dict[str, Any]) -> str:
 def _time_in_words(seconds: float) -> str:
     """Return a time [s] in words."""
     for unit, size in (("d", 86400), ("h", 3600), ("min", 60)):
-        if seconds >= 2 * size:
+        if seconds >= 2 * size:  # 1.5 h are better told as 90 min
             return f"{seconds / size:.0f} {unit}"
     return f"{max(seconds, 0):.0f} s"

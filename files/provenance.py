@@ -15,12 +15,14 @@ def versions_and_commit(packages: Iterable[str]) -> dict[str, Any]:
     """
 
     def git(*words: str) -> str | None:
+        """Return the output of a git command in this folder; None if it fails, as without git or outside a clone."""
         command = ["git", "-C", str(Path(__file__).parent), *words]
         try:
             return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
         except (OSError, subprocess.CalledProcessError):
             return None
 
+    # An installed copy may lie in somebody else's repository: there git does not track this file.
     in_clone = git("ls-files", "--error-unmatch", Path(__file__).name) is not None
     return {
         "commit": git("rev-parse", "HEAD") if in_clone else None,

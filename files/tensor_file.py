@@ -54,6 +54,7 @@ def read_tensors(
     try:
         if (size := existing(path).stat().st_size) > MOST_TENSOR_BYTES:
             raise SpringfootError(f"{path} must have at most {MOST_TENSOR_BYTES:,} bytes, has {size:,}")
+        # A .safetensors file begins with the size of its header, as 8 bytes.
         with path.open("rb") as opened:
             if (header_size := int.from_bytes(opened.read(8), "little")) > MOST_HEADER:
                 raise SpringfootError(
@@ -75,7 +76,7 @@ def read_tensors(
     if unknown := sorted(header.keys() - entries - {DIGEST}):
         raise SpringfootError(f"{path} is damaged: its header has an entry {quoted(unknown[0])}")
     if DIGEST in header:
-        same_text = text == _text(header)
+        same_text = text == _text(header)  # a change of blanks would not change the digest
         if header.pop(DIGEST) != digest_of(header, tensors) or not same_text:
             raise SpringfootError(f"{path} is damaged: its contents are not those that were written")
     elif needs_digest:
@@ -87,12 +88,12 @@ def read_tensors(
 
 
 def _text(header: Mapping[str, Any]) -> str:
+    """Return a header as JSON; equal headers give equal text."""
     return json.dumps(header, sort_keys=True)
 
 
 def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:
-    """Return the digest of a JSON header and of arrays, with their names, types and shapes; their order is no
-    matter."""
+    """Return the digest of a JSON header and of arrays, with their names, types and shapes, in any order."""
     digest = sha256(_text(header).encode())
     for name in sorted(tensors):
         digest.update(f"\n{name} {tensors[name].dtype.str} {tensors[name].shape}\n".encode())

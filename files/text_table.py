@@ -51,6 +51,7 @@ class Table:
         """Return a column's cells as `numbers` does; raise `SpringfootError` unless each is greater than the one
         before."""
         values = self.numbers(column)
+        # Each value after the first, with its line and the value before.
         for (line, _), before, value in zip(self.rows[1:], values[:-1], values[1:], strict=True):
             if value <= before:
                 raise self.error(line, column, f"{value:g} must be greater than {before:g} in the row before")
@@ -138,14 +139,20 @@ def text_lines(path: Path) -> Iterator[str]:
 
 
 def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
-    """Return the table of numbered lines of cells: the first is the header, empty lines are left out."""
+    """Return the table of numbered lines of cells: the first is the header, empty lines are left out.
+
+    `name`, that of the file, stands in errors. Raises `SpringfootError` for a table without data, with rows of another
+    length, a repeated column or another separator, and for one that is too large.
+    """
+    # Read line by line, so that a table too large is refused before it fills the memory.
     filled = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
-    header, names = next(filled, (0, []))
+    header, names = next(filled, (0, []))  # number and cells of the line of names; a file without lines has no names
     columns = [_coordinate(column.strip()) for column in names]
     if len(columns) > MOST_COLUMNS:
         raise SpringfootError(
             f"{name}, line {header}: must have at most {MOST_COLUMNS:,} columns, has {len(columns):,}"
         )
+    # A single column whose name holds another separator: the file is not separated by commas.
     if len(columns) == 1 and (separator := next((mark for mark in ";\t" if mark in names[0]), None)):
         raise SpringfootError(
             f"{name}, line {header}: cells must be separated by commas, with decimal points, got {separator!r}"

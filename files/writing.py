@@ -56,6 +56,7 @@ def remove_temporary(folder: Path) -> None:
 
 
 def _is_temporary(path: Path) -> bool:
+    """Tell whether a name is one that `write_atomically` gives a temporary file: .NAME.EXTENSION. and 8 letters."""
     return re.fullmatch(r"\..+\.(safetensors|json|png)\.[a-z0-9_]{8}", path.name) is not None
 
 
@@ -104,7 +105,7 @@ def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
             try:
                 part = stack.enter_context(_hidden_folder(name))
             except TakenError:
-                if out is not None:
+                if out is not None:  # without an `out` the next number is tried
                     raise
             else:
                 yield part, name
@@ -149,13 +150,14 @@ def _is_ours(part: Path) -> bool:
 def _rename_finished(part: Path, out: Path) -> None:
     """Rename a finished folder; if another process has taken the name meanwhile, use another name and say so."""
     name = out
+    # The name of a try, or after it out-2, out-3, ...
     for number in count(2):
         try:
             if not is_taken(name):
                 part.rename(name)
                 break
         except OSError:
-            if not is_taken(name):
+            if not is_taken(name):  # the name is free: it failed for another reason
                 raise
         name = out.with_name(f"{out.name}-{number}")
     (name / OWNER).unlink(missing_ok=True)
@@ -185,6 +187,7 @@ def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 
 def _cell(value: Any) -> Any:
+    """Return a value as a cell for `csv_text`."""
     if not isinstance(value, float):
         return value
     return f"{value:.6g}" if isfinite(value) else ""

@@ -4,7 +4,7 @@ from springfoot.errors import SpringfootError
 
 from .body.body import GRAVITY, Body
 from .body.leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
-from .people.contacts import PERCENT
+from .people.gait_events import PERCENT
 from .people.human import HumanGait, human_gait
 from .people.own_data import OwnGait, read_gait
 from .plan.kinetics import foot_force, ground_reaction, planned_moments, projection_table

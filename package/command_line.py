@@ -55,6 +55,7 @@ def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flag
 
 def _repeated_flag(words: Sequence[str]) -> str:
     """Return the first flag that stands twice among the words, "" if none does; tyro would take the last silently."""
+    # --name=value and --name, with - or _ for the parts of the name.
     flags = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
     return next((flag for flag, count in Counter(flags).items() if count > 1), "")
 
@@ -62,12 +63,14 @@ def _repeated_flag(words: Sequence[str]) -> str:
 def _message_in_box(text: str) -> str:
     """Return one line for the error that tyro has printed in a box: its first part, and the first suggested flag."""
     lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
+    # Rules of dashes divide the box into its error and its suggestions.
     parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))
     if not text.startswith("╭"):  # where there is no UTF-8, the title is above a line of its own
         parts = parts[1:] or parts
     message = " ".join(parts[0].split())
     for pattern, wording in _REWORDED.items():
         message = re.sub(pattern, wording, message)
+    # As the rest of a line: a small first letter, no full stop; an ellipsis stays.
     message = message[:1].lower() + re.sub(r"(?<!\.)\.$", "", message[1:])
     suggestion = re.search(r"Perhaps you meant: (--\S+)", " ".join(" ".join(parts[1:]).split()))
     return f"{message}; perhaps {suggestion[1]}?" if suggestion else message
@@ -82,6 +85,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:  # None: closed
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
+    # The work may set handlers of signals, as `end_in_order` does; only the main thread can put them back.
     in_main = threading.current_thread() is threading.main_thread()
     handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)] if in_main else []
     try:
@@ -121,7 +125,7 @@ def _terminate(_number: int, _frame: object) -> None:
 
 
 def stopped_by(record: dict[str, Any]) -> int:
-    """Return the exit code of a training that a signal ended in good order."""
+    """Return the exit code of a training that a signal ended in good order; its `record` names the signal."""
     return TERMINATED if record.get("signal") == "SIGTERM" else INTERRUPTED
 
 
@@ -141,5 +145,5 @@ def _error_message(error: Exception) -> str:
 
 def _one_line(text: str) -> str:
     """Return a text as one line for a terminal, with words such as names of files cut to `LONGEST_WORD`."""
-    half = LONGEST_WORD // 2 - 2
+    half = LONGEST_WORD // 2 - 2  # characters kept at each end, the three dots between
     return re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: f"{word[0][:half]}...{word[0][-half:]}", printable(text))

@@ -53,10 +53,13 @@ def require_within(name: str, value: object, allowed: tuple[float, float], unit:
 def require_number(
     name: str, value: object, low: float, high: float = inf, unit: str = "", *, above: bool = False
 ) -> float:
-    """Return `value` as a float; raise `SpringfootError` unless it is finite and in [low, high], with `above` in (low,
-    high]."""
+    """Return `value` as a float; raise `SpringfootError` unless it is a finite number in [low, high] of `unit`.
+
+    With `above` it must be above `low` itself. Messages call the value `name`.
+    """
     number = as_float(value)
-    if not (isfinite(number) and low <= number <= high) or (above and number == low):
+    is_allowed = isfinite(number) and low <= number <= high and not (above and number == low)
+    if not is_allowed:
         bounds = f"{'>' if above else '>='} {low:g}" + ("" if high == inf else f" and <= {high:.4g}")
         given = "infinity" if isinf(number) else quoted(value)
         raise SpringfootError(f"{name} must be a finite number {bounds} {unit}".rstrip() + f", got {given}")
@@ -67,7 +70,9 @@ def require_count(name: str, value: object, least: int = 1, most: int = MOST_COU
     """Return `value` as an int; raise `SpringfootError` unless it is a whole number in [least, most]."""
     count = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if count is None or not least <= count <= most:
-        bounds = f">= {least}" + ("" if most == MOST_COUNT and (count is None or count <= most) else f" and <= {most}")
+        # The largest count of anything is told only to a larger one.
+        names_most = most != MOST_COUNT or (count is not None and count > most)
+        bounds = f">= {least}" + (f" and <= {most}" if names_most else "")
         given = "infinity" if isinf(as_float(value)) else quoted(value)
         raise SpringfootError(f"{name} must be a whole number {bounds}, got {given}")
     return count

@@ -16,6 +16,7 @@ def lazy_names(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]
     """
 
     def find(name: str) -> Any:
+        """Return the public `name` from its module, which is imported now."""
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         with naming_extras():

@@ -20,7 +20,7 @@ from springfoot.errors import SpringfootError, as_float, require_number, require
 from springfoot.files.json_file import read_object
 from springfoot.files.text_table import Table, read_csv
 from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS, STIFFNESS_RANGE, Segment, StiffnessSchedule
 
 from .baselines import PolicyFunction, follow, schedule

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 
 @dataclass(kw_only=True, eq=False)

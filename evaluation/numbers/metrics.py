@@ -17,7 +17,7 @@ from springfoot.envs.physics.timing import ACTION_STEP
 from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, body_of, reference_gait, settings_to_json
 from springfoot.envs.task.reward import TERMS
 from springfoot.gait.people import scores as score
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording

@@ -8,7 +8,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, SIDES, TOE
 from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
+from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 
 from ..recording.recording import TICK
 

@@ -16,7 +16,7 @@ from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.envs.task.reward import TERMS
 from springfoot.gait import GRAVITY
 from springfoot.gait.people import scores as score
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
+from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
 
 from ..recording.recording import REWARD, TICK, WARM_UP, Recording
 from .curves import StrideCurves

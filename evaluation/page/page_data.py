@@ -13,7 +13,7 @@ from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import body_of, reference_gait
 from springfoot.envs.task.reward import TERMS
 from springfoot.gait import HumanGait
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS, thesis_schedule
 
 from ..numbers.curves import StrideCurves

@@ -13,7 +13,7 @@ from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import ENGAGES, KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.gait import GRAVITY
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 from ..numbers.series import foot_contacts
 from ..recording.recording import TICK, Recording

@@ -16,7 +16,7 @@ from springfoot.envs.physics.foot import LOCK
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import body_of, reference_gait
 from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.contacts import PERCENT, sample
+from springfoot.gait.people.gait_events import PERCENT, sample
 
 from ..numbers.metrics import MOMENT_CURVES, measure
 from ..numbers.per_leg import ANGLE_COLUMNS

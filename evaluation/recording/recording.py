@@ -33,7 +33,7 @@ from springfoot.envs.settings.settings import (
 from springfoot.envs.task.reward import TERMS
 from springfoot.errors import SpringfootError
 from springfoot.files.array_file import read_arrays, write_arrays
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.plan.com_plan import ComPlan
 
 TICK = Biped.tick_dt

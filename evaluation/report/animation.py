@@ -11,7 +11,7 @@ from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings.settings import body_of
 from springfoot.gait import GRAVITY, Body
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW
+from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW
 
 from ..numbers.per_leg import feet_differ, kinds_of
 from ..numbers.series import foot_contacts

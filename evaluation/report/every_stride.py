@@ -14,7 +14,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import body_of
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 from ..numbers.series import GAIT_CYCLE_COLUMNS, foot_contacts, stride_curves, strides_within
 from ..recording.recording import WARM_UP, Recording

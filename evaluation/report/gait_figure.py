@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from springfoot.arrays import NDArray
 from springfoot.envs.settings.settings import reference_gait
 from springfoot.gait import HumanGait
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 from ..numbers.curves import StrideCurves
 from ..numbers.metrics import MOMENT_CURVES, Gait

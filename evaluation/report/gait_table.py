@@ -15,7 +15,7 @@ from springfoot.errors import printable
 from springfoot.files.markdown import plus_minus, text_of
 from springfoot.gait import GRAVITY, HumanGait
 from springfoot.gait.people import scores as score
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.plan.effort import effort_of_people
 
 from ..numbers.criteria import fault

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from springfoot.files.writing import csv_text
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 from ..numbers.curves import StrideCurves
 from ..numbers.metrics import Gait

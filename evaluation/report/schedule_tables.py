@@ -19,7 +19,7 @@ from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import body_of, reference_gait
 from springfoot.files.digest import BLANK_DIGEST, DIGEST, with_digest
 from springfoot.files.writing import csv_text
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS
 
 from ..recording.open_loop import MEAN_KNOTS, alike_legs, deciding_legs, decisions_of, mean_over_phase

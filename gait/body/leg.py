@@ -112,6 +112,7 @@ def leg_motion(angles: Mapping[str, ArrayLike], hip: ArrayLike, tick: float, slo
 def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArray]:
     """Return joints (..., 2) (x, z) [m] by name, from segment turns (..., 4) [rad] and the hip (..., 2) [m]."""
     joints = [hip]
+    # Each joint hangs on the joint above it.
     for index, offset in enumerate(_far_ends(body)):
         joints.append(joints[-1] + np.stack(turned(turn[..., index], *offset), -1))
     return dict(zip(JOINTS, joints, strict=True))
@@ -137,7 +138,7 @@ def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
     """
     joints = list(joint_positions(body, motion.turn, motion.hip).values())
     rate = np.zeros(motion.hip.shape[:-1])
-    for index, (mass, inertia) in enumerate(_inertial(body)):
+    for index, (mass, inertia) in enumerate(_masses_and_inertias(body)):
         com, acceleration = _com(body, motion, joints, index)
         rate = rate + mass * _cross(com - centre, acceleration) + inertia * motion.acceleration[..., index]
     return rate
@@ -169,7 +170,8 @@ def projection_moments(body: Body, motion: LegMotion, load: FootLoad) -> dict[st
     """
     moments = {}
     for index, (name, joint) in enumerate(joint_positions(body, motion.turn, motion.hip).items()):
-        turning = -_cross(load.point - joint[..., None, :], load.force)
+        turning = -_cross(load.point - joint[..., None, :], load.force)  # (..., 2): by the foot's load and the toe's
+        # The toe joint carries the toe's load alone.
         moments[name] = _MOMENT_SIGN[index] * (turning[..., 1] if index == TOE_SEGMENT else turning.sum(-1))
     return moments
 
@@ -178,23 +180,25 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     """Compute joint moments and forces by planar Newton-Euler inverse dynamics of toe, foot, shank, thigh, from the toe
     up.
 
+    `motion` and `load` are of one leg, signs as in the module's head; `slope` of the ground [rad], uphill positive.
     Exact for the given turns, rates and accelerations. At the upper joint of each segment F = m (a - g) less the other
     forces on it, and the moment is I times the turn's acceleration less the other moments about the CoM, that of F
     included (Winter 2009, section 5.1).
     """
     joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    # Loads at the upper joint of the segment below; nothing hangs on the toe.
     force = np.zeros(motion.hip.shape)
     turning = np.zeros(motion.hip.shape[:-1])
     moments = {}
     forces = {}
     for index in reversed(range(len(LEG_SEGMENTS))):
-        mass, inertia = _inertial(body)[index]
+        mass, inertia = _masses_and_inertias(body)[index]
         com, acceleration = _com(body, motion, joints, index)
-        # Newton and Euler about the segment's CoM, less the ground's push and the loads at the joint below.
+        # Newton, and Euler about the segment's CoM, less the ground's push and the loads at the joint below.
         force_below = force
         force = mass * (acceleration - gravity(slope)) + force_below
         turning = inertia * motion.acceleration[..., index] + turning
-        if index >= FOOT_SEGMENT:
+        if index >= FOOT_SEGMENT:  # the ground pushes on foot and toe alone
             push = load.force[..., index - FOOT_SEGMENT, :]
             point = load.point[..., index - FOOT_SEGMENT, :]
             force = force - push
@@ -229,7 +233,7 @@ def _far_ends(body: Body) -> tuple[tuple[float, float], ...]:
     return (0.0, -body.thigh_length), (0.0, -body.shank_length), (body.ankle_to_toe_joint, -drop)
 
 
-def _inertial(body: Body) -> tuple[tuple[float, float], ...]:
+def _masses_and_inertias(body: Body) -> tuple[tuple[float, float], ...]:
     """Return mass [kg] and sagittal inertia about the CoM [kg m^2] of each segment."""
     return (
         (body.thigh_mass, body.thigh_inertia),
@@ -247,11 +251,12 @@ def _com(body: Body, motion: LegMotion, joints: list[NDArray], index: int) -> tu
     forward, below = body.foot_com
     com_from_joint = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
     com = joints[index] + np.stack(turned(motion.turn[..., index], *com_from_joint[index]), -1)
-    # From the hip down, each segment adds its tangential and centripetal acceleration.
+    # From the hip down, each segment adds its tangential acceleration, along its offset turned by a quarter, and its
+    # centripetal one. The last offset is from the joint above segment `index` to the segment's CoM.
     acceleration = motion.hip_acceleration
     for segment, (start, end) in enumerate(zip(joints[: index + 1], [*joints[1 : index + 1], com], strict=True)):
         offset = end - start
-        tangential_unit = np.stack([-offset[..., 1], offset[..., 0]], -1)
-        acceleration = acceleration + motion.acceleration[..., segment, None] * tangential_unit
+        quarter_turned = np.stack([-offset[..., 1], offset[..., 0]], -1)
+        acceleration = acceleration + motion.acceleration[..., segment, None] * quarter_turned
         acceleration = acceleration - motion.rate[..., segment, None] ** 2 * offset
     return com, acceleration

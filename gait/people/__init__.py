@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .contacts import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
+    from .gait_events import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
     from .human import HumanGait, human_gait
     from .own_data import read_gait
     from .scores import (
@@ -44,22 +44,22 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     __getattr__ = lazy_names(
         __name__,
         {
-            "CONTACT_THRESHOLD_BW": "contacts",
+            "CONTACT_THRESHOLD_BW": "gait_events",
             "LOADING_END_PERCENT": "scores",
-            "PERCENT": "contacts",
+            "PERCENT": "gait_events",
             "PUSH_OFF_BEGIN_PERCENT": "scores",
-            "Contacts": "contacts",
+            "Contacts": "gait_events",
             "HumanGait": "human",
             "correlation": "scores",
-            "find_contacts": "contacts",
-            "find_steps": "contacts",
+            "find_contacts": "gait_events",
+            "find_steps": "gait_events",
             "force_features": "scores",
             "human_gait": "human",
             "mean_sd": "scores",
-            "on_percent": "contacts",
+            "on_percent": "gait_events",
             "read_gait": "own_data",
             "rmse": "scores",
-            "sample": "contacts",
+            "sample": "gait_events",
             "stride_work": "scores",
         },
     )

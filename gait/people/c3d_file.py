@@ -15,7 +15,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import read_bytes
 
-from .contacts import Contacts
+from .gait_events import Contacts
 from .human import FORCES
 from .motion_files import FILE_SIDES, Series, Trial, not_empty
 
@@ -35,7 +35,8 @@ def read_c3d(path: Path) -> Trial:
     - the events Foot Strike and Foot Off;
     - the force plates; the markers `LHEE` and `LTOE` tell the foot on each plate, and the forward direction.
 
-    Raises `SpringfootError` for a file that ezc3d cannot read, or with gaps.
+    Frames with gaps at the beginning and end of the record are left out. Raises `SpringfootError` for a file that ezc3d
+    cannot read, and for a gap between other frames.
     """
     import ezc3d  # an extra: only C3D files need it
 
@@ -50,12 +51,14 @@ def read_c3d(path: Path) -> Trial:
     points = file["data"]["points"]
     parameters = file["parameters"]
     rate = float(file["header"]["points"]["frame_rate"])
+    # A label is NAME or SUBJECT:NAME; a marker's first three rows are x, y, z.
     labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
     markers = {label: points[:3, k] for k, label in enumerate(labels)}
     legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
+    # Plug-in Gait writes N mm/kg unless the file says N m.
     newton_metres = parameters["POINT"].get("MOMENT_UNITS", {}).get("value", ["Nmm"])[0].strip() == "Nm"
     for side, curves in legs.items():
-        letter = side[0].upper()
+        letter = side[0].upper()  # L or R
         for curve, label in _PLUG_IN_GAIT.items():
             if letter + label in markers:
                 x = markers[letter + label][0]
@@ -70,7 +73,7 @@ def read_c3d(path: Path) -> Trial:
     for side, (vertical, forward) in _plate_forces(file["data"].get("platform") or [], feet, frames).items():
         legs[side] |= {"grf_vertical": vertical, "grf_forward": forward}
     legs = not_empty(path.name, legs)
-    complete = _without_gaps(path.name, legs, frames)
+    complete = _frames_without_gaps(path.name, legs)
     first = int(file["header"]["points"]["first_frame"])
     return Trial(
         name=path.name,
@@ -91,14 +94,18 @@ def _refuse_broken(path: Path) -> None:
     data = read_bytes(path)
     broken = SpringfootError(f"{path.name} is not a C3D file, or it is damaged")
     try:
+        # The header's first byte is the number of the first block of parameters; this block begins with their number of
+        # blocks in its byte 2 and the processor that wrote the file in its byte 3.
         start = 512 * (data[0] - 1)
         order = {84: "little", 85: "little", 86: "big"}[data[start + 3]]  # Intel, DEC, MIPS
         sign_byte = {84: 15, 85: 13, 86: 12}[data[start + 3]]  # of the scale: negative for floating-point data
 
-        def word(position: int) -> int:  # 16 bits
+        def word(position: int) -> int:
+            """Return the 16-bit number that begins at byte `position`."""
             return int.from_bytes(data[position : position + 2], order)  # type: ignore[arg-type]
 
         end = start + 512 * data[start + 2]
+        # 80 marks a C3D file.
         if data[1] != 80 or start < 512 or not start < end <= len(data):
             raise broken
         # An entry: length of its name (negative if locked), its group's number, name, link to the next entry, content.
@@ -119,7 +126,8 @@ def _refuse_broken(path: Path) -> None:
             position = following
             if position == end:
                 break
-        # Words of the header: 2 3-D points, 4 analog samples a frame, 6 first and 8 last frame, 16 first block of data.
+        # Byte of the header -> number: 2 -> points, 4 -> analog samples a frame, 6 and 8 -> first and last frame, 16 ->
+        # first block of data. A point has four numbers, and a number 4 bytes in floating point, otherwise 2.
         frames = word(8) - word(6) + 1
         expected = 512 * (word(16) - 1) + frames * (4 * word(2) + word(4)) * (4 if data[sign_byte] & 128 else 2)
     except (IndexError, KeyError):
@@ -129,9 +137,12 @@ def _refuse_broken(path: Path) -> None:
 
 
 def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
-    """Return side -> foot strikes and foot offs marked by the laboratory."""
+    """Return side -> foot strikes and foot offs marked by the laboratory, for the sides with foot strikes.
+
+    `event` is the group EVENT of the file's parameters.
+    """
     contexts, labels = (event.get(key, {}).get("value", []) for key in ("CONTEXTS", "LABELS"))
-    times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")
+    times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")  # rows of minutes and of seconds
     seconds = 60 * times[0] + times[1]
     seconds_of: dict[tuple[str, str], list[float]] = {}
     for context, label, second in zip(contexts, labels, seconds, strict=False):
@@ -147,10 +158,10 @@ def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
 
 
 def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int) -> dict[str, tuple[NDArray, NDArray]]:
-    """Return side -> force up and forward (T,) [N] of each foot.
+    """Return side -> force up and forward (T,) [N] of each foot that stood on a plate, T the number of `frames`.
 
     `plates` are ezc3d's; `feet` is side -> markers of heel and toe (3, T), None if missing. Each contact on a plate
-    belongs to the foot whose markers are nearest to its centre of pressure.
+    belongs to the foot whose markers are nearest to its centre of pressure; without markers no foot has a force.
     """
     if any(marker is None for pair in feet.values() for marker in pair):
         return {}
@@ -164,6 +175,7 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], loaded, [False]]).astype(int)))
         for start, stop in edges.reshape(-1, 2):
             contact = slice(start, stop)
+            # Mean distance of the middle of each foot from the centre of pressure; a foot must have been seen.
             distances = {
                 side: np.nanmean(np.linalg.norm((heel + toe)[:, contact] / 2 - cop[:, contact], axis=0))
                 for side, (heel, toe) in feet.items()
@@ -189,16 +201,22 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
 
 
 def _per_frame(samples: NDArray, frames: int) -> NDArray:
-    """Return analog samples (3, R x T) as their mean around each frame (3, T)."""
-    ratio = max(samples.shape[1] // max(frames, 1), 1)
+    """Average a plate's samples (3, R x T), taken R a frame, around each of T frames: return (3, T)."""
+    ratio = max(
+        samples.shape[1] // max(frames, 1), 1
+    )  # R; 1 also for a file without frames, or a plate without samples
+    # The first sample is repeated half of R times, so that each mean has its frame in the middle.
     centred = np.pad(np.nan_to_num(samples), ((0, 0), (ratio // 2, 0)), mode="edge")
     cut = centred[:, : ratio * frames]
     return cut.reshape(3, -1, ratio).mean(axis=2)
 
 
-def _without_gaps(name: str, legs: Mapping[str, Series], frames: int) -> slice:
-    """Return the frames without the gaps at the record's beginning and end; raise `SpringfootError` for a gap in
-    between."""
+def _frames_without_gaps(name: str, legs: Mapping[str, Series]) -> slice:
+    """Return the slice from the first to the last frame in which all curves have numbers.
+
+    Raises `SpringfootError`, which names the file by `name`, for a gap between these two frames, or if no frame has all
+    curves.
+    """
     missing = {
         f"{side} {curve}": ~np.isfinite(values) for side, curves in legs.items() for curve, values in curves.items()
     }

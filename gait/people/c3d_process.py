@@ -14,7 +14,7 @@ from springfoot.errors import SpringfootError, quoted
 from springfoot.files.bounded_process import MOST_MEMORY, MOST_SECONDS, bound_resources, output_in_process
 from springfoot.files.text_table import existing
 
-from .contacts import Contacts
+from .gait_events import Contacts
 from .motion_files import Trial
 
 _CHILD = "from springfoot.gait.people.c3d_process import main; main()"
@@ -36,15 +36,20 @@ def c3d_trial(path: Path) -> Trial:
 
 
 def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
-    """Return the walk that the child process has written, as its header and arrays; raise the child's error."""
+    """Return the walk from the header and arrays that the child process (`main`) wrote; raise the child's error.
+
+    The arrays are named leg/SIDE/CURVE, contacts/SIDE/EVENT and time//.
+    """
     if "error" in header:
         raise SpringfootError(header["error"])
     legs: dict[str, dict[str, np.ndarray]] = {}
     contacts: dict[str, dict[str, np.ndarray]] = {}
     for name, values in arrays.items():
-        kind, side, curve = name.split("/")
-        if kind != "time":
-            {"leg": legs, "contacts": contacts}[kind].setdefault(side, {})[curve] = values
+        kind, side, entry = name.split("/")
+        if kind == "leg":
+            legs.setdefault(side, {})[entry] = values
+        elif kind == "contacts":
+            contacts.setdefault(side, {})[entry] = values
     return Trial(
         name=header["name"],
         time=arrays["time//"],
@@ -57,7 +62,7 @@ def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
 
 def main() -> None:
     """Run the child process: read the C3D file named on the command line, write its curves to standard output."""
-    import ezc3d  # noqa: F401  # before the bounds
+    import ezc3d  # noqa: F401  # before the bounds, which do not count what imports take
 
     from .c3d_file import read_c3d
 

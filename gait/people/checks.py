@@ -14,7 +14,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from ..body.body import ANGLES, GRAVITY, REFERENCE_MASS
-from .contacts import PERCENT
+from .gait_events import PERCENT
 from .human import COLUMNS, HumanGait
 from .strides import MeasuredWalk, cut_strides
 
@@ -50,9 +50,10 @@ CURVE_LIMITS = {
     "grf_vertical": Limits(0.2, 3.5, 0.35),  # 0.59 to 2.26, 0.53
     "grf_forward": Limits(0.2, 5.0, 0.0),  # 0.38 to 3.25, 0.23
 }
-"""Limits of each curve; chosen from the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits
-drawn as in the tests, and walks here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5
-deg, on all kinds of feet, of people who have adapted and of others, by people's curves or a plan."""
+"""Limits of each curve, and behind them the least and largest excursion and the least likeness of right curves. Chosen
+from the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits drawn as in the tests, and
+walks here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5 deg, on all kinds of feet, of
+people who have adapted and of others, by people's curves or a plan."""
 SMALL_MEANS_NOTHING = ("toe", "knee_moment", "hip_power", "knee_power", "ankle_power", "grf_forward")
 """Curves that are small in some walks; with a rigid ankle, which its power tells, the ankle's curves too."""
 ALONE = 1.65
@@ -153,9 +154,10 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
 def _bears_downward(force: NDArray) -> bool:
     """Tell whether a vertical force (T,) is that of a walk upside down: below 0 often, but not always.
 
-    An empty plate shows noise, or an offset.
+    An empty plate shows noise, or an offset: it is below 0 hardly ever, or all the time.
     """
     least = force.min(initial=0.0)
+    # A foot bears in about half of the samples, 25 to 90 %; there the force is beyond half of its extreme.
     return bool(-least > force.max(initial=0.0) and 0.25 < np.mean(force < 0.5 * least) < 0.9)
 
 
@@ -167,12 +169,13 @@ def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
             "shank? flexion is 180 deg less that"
         )
     sizes = {curve: float(np.ptp(mean[curve]) / np.ptp(usual[curve])) for curve in mean}
-    yield from _noisy(mean, usual)
-    yield from _wrong_size(mean, sizes)
+    yield from _doubts_of_noise(mean, usual)
+    yield from _doubts_of_size(mean, sizes)
     large_enough = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
+    # Entry k is the correlation after a shift of k % of the stride: entry 0 is that of the curve as it is.
     likeness = {curve: _likeness(mean[curve], usual[curve]) for curve in large_enough}
     backward = {curve: _likeness(mean[curve][::-1], usual[curve]) for curve in large_enough}
-    yield from _at_another_time(likeness, backward)
+    yield from _doubts_of_time(likeness, backward)
     moments = [curve for curve in _LEVERS if curve in mean]
     if len(moments) > 1 and all(curve in likeness and likeness[curve][0] < TURNED for curve in moments):
         yield "hip, knee and ankle moments are opposite to people's: external moments? internal ones are needed"
@@ -186,53 +189,53 @@ def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
     guesses = {curve: _guess(curve, mean[curve], usual, likeness[curve], backward[curve][0]) for curve in unlike}
     for curve in unlike:
         if guesses[curve] == _OPPOSITE:
-            yield f"{COLUMNS[curve]} is opposite to people's (r = {likeness[curve][0]:.2f}): {_sign(curve)}"
-    yield from _other_zero(mean, usual)
-    yield from _misfit_forces(mean)
+            yield f"{COLUMNS[curve]} is opposite to people's (r = {likeness[curve][0]:.2f}): {_needed_sign(curve)}"
+    yield from _doubts_of_zero(mean, usual)
+    yield from _doubts_of_forces(mean)
     for curve, guess in guesses.items():
         yield f"{COLUMNS[curve]} is not like people's (r = {likeness[curve][0]:.2f}){guess}?"
 
 
-def _noisy(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Yield a text for each curve with more noise than `ROUGHNESS`."""
+def _doubts_of_noise(mean: Curves, usual: Curves) -> Iterator[str]:
+    """Yield a text for each mean curve (101,) with more noise than `ROUGHNESS`; `usual` are people's curves."""
     for curve, values in mean.items():
         jump = float(np.median(np.abs(np.diff(values, 2))))
         if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
             yield f"{COLUMNS[curve]} jumps up and down from percent to percent: noise? filter it, or take more strides"
 
 
-def _wrong_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
+def _doubts_of_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
     """Yield a text for each curve that is too large or too small, with the mistaken unit if there is one.
 
     `sizes` are excursions over people's.
     """
     for curve, size in sizes.items():
         kind = _kind(curve)
-        low, high, _ = CURVE_LIMITS[curve]
+        low, high, _ = CURVE_LIMITS[curve]  # the third limit is that of the likeness
         if curve == "ankle_moment" and "grf_vertical" not in mean:
             high = ALONE
         if size > high or (size < low and not _may_be_small(curve, sizes)):
             if size == 0:
                 yield f"{COLUMNS[curve]} is {mean[curve][0] + 0.0:.3g} throughout the stride: was it measured?"
                 continue
-            least, most = _as_written(curve, mean[curve])
+            least, most = _range_as_written(curve, mean[curve])
             yield (
                 f"{COLUMNS[curve]} goes from {least:.3g} to {most:.3g}, {size:.2g} times as far as people's: "
-                f"{_unit(kind, size)}?"
+                f"{_mistaken_unit(kind, size)}?"
             )
 
 
 def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
     """Tell whether a curve may be this small because some walks hardly have it, and not by a wrong unit.
 
-    In a wrong unit all curves of its kind would be small.
+    In a wrong unit all curves of its kind would be small. `sizes` is curve -> excursion over people's.
     """
     rigid = curve == "ankle" and sizes.get("ankle_power", np.inf) < CURVE_LIMITS["ankle"].least
     others = [size >= CURVE_LIMITS[name].least for name, size in sizes.items() if _kind(name) == _kind(curve)]
     return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
 
 
-def _unit(kind: str, size: float) -> str:
+def _mistaken_unit(kind: str, size: float) -> str:
     """Return the mistaken unit that makes a curve about `size` times as large as people's, or a vaguer cause."""
     factors = MISTAKEN_UNITS[kind]
     nearest = min(factors, key=lambda unit: abs(np.log(size / factors[unit])))
@@ -240,7 +243,7 @@ def _unit(kind: str, size: float) -> str:
     return nearest if near else "another scale, or another joint's"
 
 
-def _other_zero(mean: Curves, usual: Curves) -> Iterator[str]:
+def _doubts_of_zero(mean: Curves, usual: Curves) -> Iterator[str]:
     """Yield a text for each angle whose mean is far from people's, as if counted from another zero."""
     for curve in (name for name in mean if name in _ALL_ANGLES):
         offset = float(mean[curve].mean() - usual[curve].mean())
@@ -259,13 +262,13 @@ def _kind(curve: str) -> str:
     return "grf" if curve.startswith("grf") else curve.rpartition("_")[2]
 
 
-def _as_written(curve: str, values: NDArray) -> tuple[float, float]:
-    """Return the least and largest value in the unit of the column."""
+def _range_as_written(curve: str, values: NDArray) -> tuple[float, float]:
+    """Return a curve's least and largest value in the unit of its column: degrees for angles."""
     unit = 180 / np.pi if curve in _ALL_ANGLES else 1.0
     return float(values.min()) * unit, float(values.max()) * unit
 
 
-def _at_another_time(likeness: Curves, backward: Curves) -> Iterator[str]:
+def _doubts_of_time(likeness: Curves, backward: Curves) -> Iterator[str]:
     """Yield a text if one shift of all curves, or their reversal in time, brings each nearer to people's.
 
     `likeness` and `backward` are curve -> correlations (100,) of the curve and of the reversed curve (`_likeness`).
@@ -275,8 +278,10 @@ def _at_another_time(likeness: Curves, backward: Curves) -> Iterator[str]:
     unshifted = np.array([[correlations[0]] for correlations in likeness.values()])
     shift_gain = np.array([*likeness.values()]) - unshifted
     reversed_gain = np.array([*backward.values()]) - unshifted
+    # The shift, the same for all curves, that gains most in sum; shifts near 0 and 100 % do not count.
     shift = LEAST_SHIFT + int(shift_gain.sum(axis=0)[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
     is_shifted = shift_gain[:, shift].min() > SHIFT_GAIN
+    # A reversed curve may need any shift besides.
     reversed_shift = int(reversed_gain.sum(axis=0).argmax())
     if reversed_gain[:, reversed_shift].min() > 0 and reversed_gain[:, reversed_shift].mean() > max(
         REVERSED_GAIN, shift_gain[:, shift].mean() if is_shifted else 0.0
@@ -295,29 +300,31 @@ _OPPOSITE = ": opposite"
 def _guess(curve: str, values: NDArray, usual: Curves, likeness: NDArray, backward: float) -> str:
     """Return words for the change that makes a curve most like people's: turned, reversed, shifted, or another's name.
 
-    `likeness` (100,) is its `_likeness`, `backward` the correlation of the reversed curve.
+    `likeness` (100,) is the curve's `_likeness`, `backward` the correlation of the reversed curve.
     """
+    # The best shift; shifts near 0 and 100 % do not count.
     shift = LEAST_SHIFT + int(likeness[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
     others = [other for other in usual if other != curve and _kind(other) == _kind(curve)]
     likeness_of_others = {other: _likeness(values, usual[other])[0] for other in others}
     likest = max(likeness_of_others, key=lambda other: likeness_of_others[other])
-    gains = {
+    # Words for a change -> correlation with people's curve after it.
+    correlations = {
         _OPPOSITE: -likeness[0],
         ": backward in time": backward,
         f", but so {shift} % of the stride late: of the other foot": likeness[shift],
         f", but like {COLUMNS[likest]}: were columns interchanged": likeness_of_others[likest],
     }
-    return max(gains, key=lambda other: gains[other])
+    return max(correlations, key=lambda change: correlations[change])
 
 
-def _misfit_forces(mean: Curves) -> Iterator[str]:
+def _doubts_of_forces(mean: Curves) -> Iterator[str]:
     """Yield a text if the vertical force does not bear half a body, or does not fit the ankle's moment."""
     if "grf_vertical" not in mean:
         return
     force = mean["grf_vertical"]
     least, most = BORNE
     nearest, farthest = LEVERS
-    borne = float(force[:-1].mean())
+    borne = float(force[:-1].mean())  # percent 100 is percent 0 of the next stride
     if not least <= borne <= most:
         guess = "both feet together, or not per body weight?" if borne > most else "not per body weight?"
         yield f"{COLUMNS['grf_vertical']} is {borne:.2g} on the average, where each foot bears half of 1: {guess}"
@@ -345,12 +352,13 @@ def _likeness(values: NDArray, usual: NDArray) -> NDArray:
 
     Shifts are towards earlier. It is a circular cross-correlation, by Fourier transform.
     """
+    # Percent 100 repeats percent 0. A constant curve has a scale of 0, and then correlations of 0.
     centred, usual_centred = (curve[:-1] - curve[:-1].mean() for curve in (values, usual))
     scale = float(np.sqrt((centred @ centred) * (usual_centred @ usual_centred))) or 1.0
     return np.fft.irfft(np.fft.rfft(centred) * np.conj(np.fft.rfft(usual_centred)), len(centred)) / scale
 
 
-def _sign(curve: str) -> str:
+def _needed_sign(curve: str) -> str:
     """Return a text that says which direction of a curve must be positive."""
     positive = {"knee_moment": "extension", "hip_moment": "extension", "ankle_moment": "plantarflexion"}
     positive |= {"ankle": "dorsiflexion", "toe": "toe-up", "grf_vertical": "up", "grf_forward": "forward"}

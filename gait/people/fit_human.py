@@ -65,7 +65,7 @@ def fit(reference: Path) -> dict:
     conditions = []
     table = {"mean": {}, "sd": {}}
     for condition in names:
-        selected = _rows_of(rows, condition)
+        selected = _rows_of(rows, condition)  # all rows repeat the condition's own numbers: read them in the first
         keys = ("speed_m_s", "stride_time_s", "step_length_m", "toe_off_percent")
         conditions.append({"name": condition} | {key: _number(selected[0], key) for key in keys})
         stance = _number(selected[0], "toe_off_percent") / 100
@@ -107,9 +107,10 @@ def _centre_of_pressure(rows: list[dict[str, str]]) -> list[float]:
     swing = [row for row in rows if not _text(row, column)]
     if len(stance) <= COP_DEGREE or not swing:
         raise SpringfootError(f"{COP_TABLE}: {column} must have numbers in stance, and none in swing")
-    ends = min(_column(swing, "percent"))
+    stance_end = min(_column(swing, "percent"))
     forward = _column(stance, column)
-    powers = (_column(stance, "percent") / ends)[:, None] ** np.arange(COP_DEGREE + 1)
+    # Columns are the powers of the time over stance, from 0 to the degree.
+    powers = (_column(stance, "percent") / stance_end)[:, None] ** np.arange(COP_DEGREE + 1)
     return np.round(np.linalg.lstsq(powers, forward / np.ptp(forward), rcond=None)[0], DIGITS).tolist()
 
 
@@ -168,7 +169,7 @@ def main() -> int:
 
 
 def _compact(value: object) -> str:
-    """Return JSON with one line a curve."""
+    """Return a value as JSON; a dictionary has one line an entry, such as a curve."""
     if not isinstance(value, dict):
         return json.dumps(value)
     return (

@@ -16,7 +16,8 @@ def fourier_jet(samples: NDArray, harmonics: int, phase: NDArray, period: float)
     """
     count = len(samples)
     weight = np.fft.rfft(samples, axis=0)[: harmonics + 1] / count
-    weight[1:] *= 2
+    weight[1:] *= 2  # each term stands for its negative frequency too, the mean for itself
+    # Each time derivative multiplies a term by its angular frequency.
     turn = 2j * np.pi * np.arange(harmonics + 1)
     wave = np.exp(phase[..., None] * turn)
     return [np.real((wave * (turn / period) ** derivative) @ weight) for derivative in range(3)]

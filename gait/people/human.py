@@ -129,11 +129,17 @@ class HumanGait:
         return self._evaluate(self.mean_series, name, phase)
 
     def sd(self, name: str, phase: ArrayLike) -> NDArray:
-        """Return standard deviation over the subjects' trials of curve `name`, never negative; units as the mean."""
+        """Return the standard deviation of curve `name` over the measured people, never negative; units as the mean.
+
+        `phase` are stride phases of any shape.
+        """
         return np.maximum(self._evaluate(self.sd_series, name, phase), 0.0)
 
     def rate(self, name: str, phase: ArrayLike) -> NDArray:
-        """Return derivative of the mean curve to phase (units per stride); divide by the stride time for per second."""
+        """Return the phase derivative of the mean curve `name`, in its unit per stride.
+
+        Divided by the stride time it is the rate per second. `phase` are stride phases of any shape.
+        """
         return self._evaluate(self.mean_series, name, phase, derivative=True)
 
     def _evaluate(self, series: Curves, name: str, phase: ArrayLike, derivative: bool = False) -> NDArray:
@@ -154,13 +160,14 @@ class HumanGait:
 
 
 def fourier_series(values: NDArray) -> list[list[float]]:
-    """Fit a Fourier series to rows 0..100 % by least squares: [real, imaginary] of c_k, k from 0.
+    """Fit a Fourier series to a curve's values (101,) at 0..100 % of the stride by least squares.
 
-    The two ends meet half-way, the series being periodic.
+    Returns [real, imaginary] of c_k of Re sum c_k exp(2 pi i k phase), k from 0. The two ends meet half-way, the series
+    being periodic.
     """
     phase = np.linspace(0, 1, len(values))
     turn = 2 * np.pi * np.outer(phase, np.arange(HARMONICS + 1))
-    basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])
+    basis = np.hstack([np.cos(turn), -np.sin(turn[:, 1:])])  # of real parts, and of imaginary ones but that of k = 0
     solution = np.linalg.lstsq(basis, values, rcond=None)[0]
     real = solution[: HARMONICS + 1]
     imaginary = np.concatenate([[0.0], solution[HARMONICS + 1 :]])
@@ -168,8 +175,10 @@ def fourier_series(values: NDArray) -> list[list[float]]:
 
 
 def stance_series(values: NDArray, toe_off: float) -> list[float]:
-    """Fit a sine series over stance to rows 0..100 % by least squares, without rows after `toe_off` (phase): b_k, k
-    from 1."""
+    """Fit a sine series over stance to a curve's values (101,) at 0..100 % of the stride by least squares.
+
+    Returns b_k of sum b_k sin(k pi phase / toe_off), k from 1. Values after the stride phase `toe_off` do not count.
+    """
     phase = np.linspace(0, 1, len(values))
     inside = phase < toe_off
     basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
@@ -190,12 +199,14 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Pat
     conditions = table["conditions"]
     speeds = np.array([condition["speed_m_s"] for condition in conditions])
 
+    # The speed of people of the measured height that is equal by its Froude number, and the conditions beside it.
     asked = speed / sqrt(length_ratio)
     measured = float(np.clip(asked, speeds[0], speeds[-1]))
     upper = min(max(int(np.searchsorted(speeds, measured)), 1), len(speeds) - 1)
     weight = (measured - speeds[upper - 1]) / (speeds[upper] - speeds[upper - 1])
 
     def between(values):
+        """Interpolate between a value's entries for the two conditions beside the speed."""
         return (1 - weight) * values[upper - 1] + weight * values[upper]
 
     def parameter(key):
@@ -233,7 +244,7 @@ def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDAr
     were not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
     fraction = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
-    coefficients = np.array(harmonics(people)["cop"]["coefficients"])
+    coefficients = np.array(harmonics(people)["cop"]["coefficients"])  # of the powers of the fraction, from 0
     return fraction[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
@@ -272,7 +283,11 @@ def _require_conditions(conditions: Any) -> None:
 
 
 def _series(name: str, rows: Any, conditions: int) -> NDArray:
-    """Return the series of a curve as an array (conditions, coefficients); raise `SpringfootError` for bad rows."""
+    """Return the series of a curve as an array (conditions, coefficients); raise `SpringfootError` for bad rows.
+
+    `rows` are a file's lists, one a condition; `conditions` is the number of conditions. Fourier coefficients are
+    [real, imaginary] in the file and complex here.
+    """
     _require_numbers(name, list(_flat(rows)), (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
     series = np.array(rows, float)
     shape = (conditions, STANCE_TERMS) if name in FORCES else (conditions, HARMONICS + 1, 2)
@@ -295,7 +310,8 @@ def _require_habits(foot: Mapping[str, Any]) -> None:
         _require_numbers(f"foot: {name}", values, allowed)
         if len(values) != count:
             raise SpringfootError(f"foot: {name} must be {count} numbers, got {len(values)}")
-        if allowed == (0.0, 1.0) and any(one > other for one, other in pairwise(values)):
+        is_phase = allowed == (0.0, 1.0)
+        if is_phase and any(earlier > later for earlier, later in pairwise(values)):
             raise SpringfootError(f"foot: the phases {name} must ascend")
 
 

@@ -18,7 +18,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import Table, make_table, text_lines
 
-from .contacts import Contacts
+from .gait_events import Contacts
 from .human import COLUMNS, FORCES
 
 LONGEST_HEADER = 200
@@ -75,6 +75,7 @@ def our_columns(table: Table, suffix: str = "") -> Series:
         if table.has(column + suffix):
             values = table.numbers(column + suffix)
             curves[name] = np.radians(values) if column.endswith("_deg") else values
+    # The pelvis has a column with the suffix, or one for both legs; a spread of the thigh does not follow from spreads.
     pelvis = next((PELVIS + end for end in (suffix, "") if table.has(PELVIS + end)), None)
     if "hip" in curves and "thigh" not in curves and pelvis and suffix != "_sd":
         curves["thigh"] = curves["hip"] - np.radians(table.numbers(pelvis))
@@ -82,10 +83,12 @@ def our_columns(table: Table, suffix: str = "") -> Series:
 
 
 _OPENSIM = {"hip_flexion": "hip", "knee_angle": "knee", "ankle_angle": "ankle", "mtp_angle": "toe"}
+"""Coordinate of a model -> curve."""
 _OPENSIM_FORCE = {
     "right": ("ground_force_v", "ground_force_1_v", "ground_force_r_v", "r_ground_force_v"),
     "left": ("1_ground_force_v", "ground_force_2_v", "ground_force_l_v", "l_ground_force_v"),
 }
+"""Side -> beginnings of the names of its forces, before x or y."""
 
 
 def opensim_trial(path: Path) -> Trial:
@@ -105,6 +108,7 @@ def opensim_trial(path: Path) -> Trial:
         raise SpringfootError(f"{path.name}: no line 'endheader', so not an OpenSim .mot or .sto file")
     in_degrees = next((m[1].lower() for line in header if (m := re.match(r"\s*inDegrees\s*=\s*(\w+)", line))), "")
     end = len(header)
+    # The line of names is two below the header's last line.
     table = make_table(path.name, ((n, _split(line)) for n, line in enumerate(lines, end + 2)))
     names = table.columns
     if "time" not in names:
@@ -121,6 +125,7 @@ def opensim_trial(path: Path) -> Trial:
     if any(legs.values()) and in_degrees not in ("yes", "no"):
         raise SpringfootError(f"{path.name}: its header must say inDegrees=yes or inDegrees=no")
     unit = np.pi / 180 if in_degrees == "yes" else 1.0
+    # The pelvis's first and last position tell the speed, and whether the walk is towards the laboratory's -x.
     travelled = table.numbers("pelvis_tx")[[0, -1]] if "pelvis_tx" in names else np.zeros(2)
     time = table.ascending("time")
     velocity = float(np.diff(travelled)[0] / (time[-1] - time[0])) if len(time) > 1 else 0.0
@@ -129,14 +134,16 @@ def opensim_trial(path: Path) -> Trial:
         for name in curves:
             curves[name] = curves[name] * unit
         for coordinate, curve in _OPENSIM.items():
+            # `HumanGait` has no moment of the toe.
             if curve != "toe" and (column := f"{coordinate}_{side[0]}_moment") in names:
                 curves[f"{curve}_moment"] = -table.numbers(column)
+        # Files differ in the case of the forces' names.
         lower = {name.lower(): name for name in names}
-        start = next((start for start in _OPENSIM_FORCE[side] if f"{start}y" in lower), None)
-        if start:
-            curves["grf_vertical"] = table.numbers(lower[f"{start}y"])
-            if f"{start}x" in lower:
-                curves["grf_forward"] = forward * table.numbers(lower[f"{start}x"])
+        force = next((name for name in _OPENSIM_FORCE[side] if f"{name}y" in lower), None)
+        if force:
+            curves["grf_vertical"] = table.numbers(lower[f"{force}y"])
+            if f"{force}x" in lower:
+                curves["grf_forward"] = forward * table.numbers(lower[f"{force}x"])
     return Trial(
         name=path.name,
         time=time,
@@ -159,11 +166,15 @@ def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:
 
 
 def _split(line: str) -> list[str]:
+    """Return the cells of a line, which are separated by tabs or, in a line without tabs, by blanks."""
     return line.strip().split("\t") if "\t" in line.strip() else line.split()
 
 
-def refuse_absurd(name: str, curves: Mapping[str, NDArray]) -> None:
-    """Raise `SpringfootError` for angles [rad] that no leg has."""
+def refuse_impossible_angles(name: str, curves: Mapping[str, NDArray]) -> None:
+    """Raise `SpringfootError` for angles [rad] that no leg has: beyond half a turn, or of a knee bent backward.
+
+    `curves` is curve -> (...) of the file `name`.
+    """
     for joint in ("thigh", "hip", "knee", "ankle", "toe"):
         if joint in curves and (largest := np.abs(curves[joint]).max()) > np.pi:
             raise SpringfootError(f"{name}: the {joint} reaches {np.degrees(largest):.0f} deg; degrees or radians?")

@@ -18,9 +18,9 @@ from springfoot.files.text_table import Table, read_csv
 from ..body.body import MASS_RANGE
 from .c3d_process import c3d_trial
 from .checks import AS_IT_IS, require_plausible, require_plausible_legs
-from .contacts import CONTACT_THRESHOLD_BW, PERCENT
+from .gait_events import CONTACT_THRESHOLD_BW, PERCENT
 from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
-from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_absurd
+from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_impossible_angles
 from .strides import MeasuredWalk, cut_strides, merge_trials
 
 ACCEPTED = {
@@ -93,7 +93,7 @@ class OwnGait:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON values, SI units; `OwnGait.from_json` is the inverse."""
-        return asdict(self) | {kind: _rows(getattr(self, kind)) for kind in ("mean", "sd")}
+        return asdict(self) | {kind: _lists_of(getattr(self, kind)) for kind in ("mean", "sd")}
 
     @classmethod
     def from_json(cls, values: object) -> "OwnGait":
@@ -104,8 +104,8 @@ class OwnGait:
                 f"human must be what springfoot.gait.read_gait(FILE).to_json() gives ({', '.join(sorted(names))}), "
                 f"got {values!r:.80}"
             )
-        gait = cls(**{**values, "mean": _series("mean", values["mean"]), "sd": _series("sd", values["sd"])})
-        return _checked(gait)
+        gait = cls(**{**values, "mean": _arrays_of("mean", values["mean"]), "sd": _arrays_of("sd", values["sd"])})
+        return _check(gait)
 
 
 def read_gait(
@@ -167,6 +167,7 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
 
     toe_off = parameter("toe_off_percent")
     if toe_off is None and "grf_vertical" in mean:
+        # The percent after the last one under load.
         toe_off = float(PERCENT[mean["grf_vertical"] > CONTACT_THRESHOLD_BW].max(initial=0)) + 1
     strides = parameter("n")
     if strides is not None and strides % 1:
@@ -175,11 +176,11 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
         name=table.name,
         strides=None if strides is None else round(strides),
         toe_off=None if toe_off is None else toe_off / 100,
-        mean={},
+        mean={},  # `_with_series` puts the series here
         sd={},
         **{name: parameter(column) for name, column in _PARAMETERS.items()},
     )
-    return _fitted(gait, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
+    return _with_series(gait, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
 
 
 def _one_condition(table: Table, condition: str | None) -> Table:
@@ -188,7 +189,7 @@ def _one_condition(table: Table, condition: str | None) -> Table:
     Raises `SpringfootError` for other percents, or if the condition is unknown or missing.
     """
     percent = table.numbers("percent")
-    size = len(PERCENT)
+    size = len(PERCENT)  # rows of one gait
     for k, ((line, _), value) in enumerate(zip(table.rows, percent, strict=True)):
         if value != k % size:
             raise table.error(line, "percent", f"must be {k % size} here (0, 1, ..., 100), got {value:g}")
@@ -200,7 +201,8 @@ def _one_condition(table: Table, condition: str | None) -> Table:
         return table
     if "condition" not in table.columns:
         raise SpringfootError(f"{table.name} holds {len(blocks)} gaits and no column condition to tell them apart")
-    names = [block[0][1][table.columns.index("condition")] for block in blocks]
+    column = table.columns.index("condition")
+    names = [cells[column] for (_, cells), *_ in blocks]  # in the first row of each gait
     if condition not in names:
         raise SpringfootError(
             f"{table.name} holds the conditions {', '.join(names)}; condition must be one of them (on the command "
@@ -211,9 +213,10 @@ def _one_condition(table: Table, condition: str | None) -> Table:
 
 def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
     """Return the mean gait of a walk's strides, or raise `SpringfootError` for curves that no walk has."""
-    strides, curves = cut_strides(walk, side, mass)
+    strides, curves = cut_strides(walk, side, mass)  # strides: heel strike, toe-off, next heel strike
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
     for name in ("thigh", "hip"):
+        # At 0 %, heel strike, the thigh is ahead of where it is half a stride later.
         if name in mean and mean[name][0] <= mean[name][50]:
             raise SpringfootError(
                 f"{walk.name}: the {name} is behind at heel strike; are left and right, or a sign, interchanged?"
@@ -229,10 +232,10 @@ def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: b
         stride_time=stride_time,
         step_length=None if walk.speed is None else walk.speed * stride_time / 2,
         toe_off=float(np.mean((strides[:, 1] - strides[:, 0]) / duration)),
-        mean={},
+        mean={},  # `_with_series` puts the series here
         sd={},
     )
-    return _fitted(gait, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
+    return _with_series(gait, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
 
 
 def _require_one_speed(gait: OwnGait) -> None:
@@ -252,25 +255,32 @@ def _people_at(speed: float | None) -> HumanGait:
     return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
 
 
-def _fitted(gait: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
-    """Return `gait` with series fitted to mean curves and spreads (101,), all checked."""
+def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
+    """Return `gait` with series fitted to mean curves and spreads (101,); raise `SpringfootError` for implausible ones.
+
+    `trust_units` accepts curves that differ from people's.
+    """
 
     def fit(curves: Series) -> dict[str, list]:
-        rows = {}
+        lists = {}
         for name, curve in curves.items():
-            rows[name] = stance_series(curve, gait.toe_off or 1.0) if name in FORCES else fourier_series(curve)
-        return rows
+            # Forces without a toe-off are fitted over the whole stride here, and refused by the last check.
+            lists[name] = stance_series(curve, gait.toe_off or 1.0) if name in FORCES else fourier_series(curve)
+        return lists
 
-    refuse_absurd(gait.name, mean)
+    refuse_impossible_angles(gait.name, mean)
     if not trust_units:
         require_plausible(gait.name, mean, _people_at(gait.speed), sd)
         _require_one_speed(gait)
-    gait = _checked(gait)
-    return _checked(replace(gait, mean=_series("mean", fit(mean)), sd=_series("sd", fit(sd))))
+    gait = _check(gait)
+    return _check(replace(gait, mean=_arrays_of("mean", fit(mean)), sd=_arrays_of("sd", fit(sd))))
 
 
-def _checked(gait: OwnGait) -> OwnGait:
-    """Return `gait`; raise `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a toe-off."""
+def _check(gait: OwnGait) -> OwnGait:
+    """Return `gait` itself.
+
+    Raises `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a toe-off.
+    """
     for name, (low, high, unit) in ACCEPTED.items():
         if getattr(gait, name) is not None:
             require_within(f"{gait.name}: {name}", getattr(gait, name), (low, high), unit)
@@ -281,7 +291,7 @@ def _checked(gait: OwnGait) -> OwnGait:
     return gait
 
 
-def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
+def _lists_of(series: Mapping[str, NDArray]) -> dict[str, list]:
     """Return curve -> coefficients as plain lists, complex ones as [real, imaginary]."""
     return {
         name: (np.stack([np.real(c), np.imag(c)], -1) if np.iscomplexobj(c) else c).tolist()
@@ -289,10 +299,10 @@ def _rows(series: Mapping[str, NDArray]) -> dict[str, list]:
     }
 
 
-def _series(kind: str, rows: object) -> dict[str, NDArray]:
-    """Return curve -> coefficients from the lists that `_rows` returned; raise `SpringfootError` for any other value.
+def _arrays_of(kind: str, rows: object) -> dict[str, NDArray]:
+    """Return curve -> array of coefficients from the lists that `_lists_of` returned.
 
-    `kind`, mean or sd, stands in the error's text.
+    Raises `SpringfootError` for any other value. `kind`, mean or sd, stands in the error's text.
     """
     if not isinstance(rows, Mapping):
         raise SpringfootError(f"human {kind} must map curves to coefficients, got {rows!r:.60}")
@@ -304,6 +314,7 @@ def _series(kind: str, rows: object) -> dict[str, NDArray]:
             array = np.array(values, float)
         except (TypeError, ValueError, OverflowError):
             array = np.empty(0)
+        # Forces have real coefficients (n,), other curves pairs of real and imaginary part (n, 2).
         shape_fits = array.ndim == 1 if name in FORCES else array.ndim == 2 and array.shape[1:] == (2,)
         if not shape_fits or not 0 < len(array) <= _MOST_COEFFICIENTS or not (np.abs(array) < _LARGEST).all():
             raise SpringfootError(f"human {kind} {name} must be finite coefficients, got {values!r:.60}")

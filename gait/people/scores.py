@@ -1,8 +1,8 @@
 """Compute statistics of a gait, each in a function of its own.
 
-Curves are arrays (101,) over percent 0..100 of the stride (`contacts.PERCENT`) unless said otherwise. A statistic that
-cannot be computed (no data, no spread) is None, never NaN. The windows contain people's two force peaks and the valley
-between them at every walking speed.
+Curves are arrays (101,) over percent 0..100 of the stride (`gait_events.PERCENT`) unless said otherwise. A statistic
+that cannot be computed (no data, no spread) is None, never NaN. The windows contain people's two force peaks and the
+valley between them at every walking speed.
 """
 
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ def force_features(vertical: NDArray, forward: NDArray) -> ForceFeatures:
 
 
 def largest(curve: NDArray) -> tuple[float | None, int | None]:
-    """Return the largest value of a curve and its percent."""
+    """Return the largest value of a curve and its percent; None for both if the curve is not finite throughout."""
     if not np.all(np.isfinite(curve)):
         return None, None
     percent = int(np.argmax(curve))
@@ -91,11 +91,12 @@ def largest(curve: NDArray) -> tuple[float | None, int | None]:
 def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]:
     """Return positive and negative work of each stride (S,), the negative as a positive number.
 
-    `power` (S, 101) over percent of strides lasting `stride_time` (S,) [s]; trapezoidal rule.
+    `power` (S, 101) [W] or [W/kg] over percent of strides lasting `stride_time` (S,) [s]; the work is in J or J/kg.
+    Trapezoidal rule.
     """
     positive = np.maximum(power, 0.0)
     negative = np.maximum(-power, 0.0)
-    spacing = np.asarray(stride_time) / 100
+    spacing = np.asarray(stride_time) / 100  # from percent to percent [s]
     return np.trapezoid(positive, axis=-1) * spacing, np.trapezoid(negative, axis=-1) * spacing
 
 
@@ -121,13 +122,13 @@ def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | Non
 
 
 def travel(position: NDArray, force: NDArray, least: float) -> float:
-    """Return the path [m] along the ground of contact points (T, C) that bear `force` (T, C) [N].
+    """Return the path [m] along the ground of C contact points of a foot while they bear load.
 
-    Each point counts by its fraction of the foot's load, so that a rigid foot that slides by d travels d with any
-    number of contact points; an interval between two samples counts only if the foot bears more than `least` [N] at
-    both.
+    They are at `position` (T, C) [m] and bear `force` (T, C) [N]. Each point counts by its fraction of the foot's load,
+    so that a rigid foot that slides by d travels d with any number of contact points. An interval between two samples
+    counts only if the foot bears more than `least` [N] at both.
     """
-    between = force[1:] + force[:-1]
+    between = force[1:] + force[:-1]  # in each interval, twice the mean
     fraction = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
     loaded = force.sum(axis=1) > least
     return float(np.sum((np.abs(np.diff(position, axis=0)) * fraction)[loaded[1:] & loaded[:-1]]))
@@ -150,9 +151,11 @@ def mean_sd(values: ArrayLike) -> dict[str, float | None]:
 
 
 def _window(curve: NDArray, percent: tuple[int, int]) -> NDArray:
+    """Return a curve's values from the first to the last percent of a window, both included."""
     return curve[percent[0] : percent[1] + 1]
 
 
 def _number(value: SupportsFloat) -> float | None:
+    """Return a value as a float; None if it is not finite."""
     number = float(value)
     return number if isfinite(number) else None

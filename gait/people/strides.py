@@ -11,9 +11,9 @@ from springfoot.errors import SpringfootError
 from ..body.body import GRAVITY, Body
 from ..body.leg import FOOT_SEGMENT, joint_positions, segment_turns
 from ..body.rockers import turned
-from .contacts import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
+from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .human import COLUMNS, FORCES
-from .motion_files import Series, Trial, refuse_absurd
+from .motion_files import Series, Trial, refuse_impossible_angles
 
 FEWEST_STRIDES = 2
 """Fewest strides, of both feet together, for a mean and its spread."""
@@ -70,7 +70,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     name = ",".join(trial.name for trial in trials)
     for trial in trials:
         gaps = np.diff(trial.time)
-        if not len(gaps) or (tick := float(np.median(gaps))) > LONGEST_TICK * 1.001:
+        if not len(gaps) or (tick := float(np.median(gaps))) > LONGEST_TICK * 1.001:  # times are rounded
             sampling = f"one every {tick:.3g} s" if len(gaps) else "a single one"
             raise SpringfootError(f"{trial.name} must have at least 30 samples a second, has {sampling}")
         if gaps.max() > LONGEST_GAP:
@@ -83,10 +83,11 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     last = min(trial.time[-1] for trial in trials)
     if last - first < tick:
         raise SpringfootError(f"{name}: the files have no time in common")
+    # The factor: a last sample must not be lost to rounding.
     time = first + tick * np.arange(int((last - first) / tick * (1 + 1e-12)) + 1)
     legs: dict[str, Series] = {}
     unscaled = set()
-    unsigned = {}
+    unsigned = {}  # side -> curves whose sign is that of the model's coordinate
     for trial in trials:
         for side, curves in trial.legs.items():
             for curve in curves.keys() - legs.get(side, {}).keys():
@@ -98,7 +99,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     for side, leg in legs.items():
         if side in unsigned and "knee" in leg and leg["knee"].mean() < 0:
             leg |= {curve: -leg[curve] for curve in unsigned[side] if curve in leg}
-        refuse_absurd(name, leg)
+        refuse_impossible_angles(name, leg)
         for joint in ("hip", "knee", "ankle"):
             moment = f"{joint}_moment"
             power = f"{joint}_power"
@@ -106,6 +107,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
                 leg[power] = -leg[moment] * np.gradient(_smooth(leg[joint], tick), tick)
                 if (side, moment) in unscaled:
                     unscaled.add((side, power))
+    # Reversed: of several trials with a side's events the first counts, being the last to be put in.
     contacts = {side: events for trial in reversed(trials) for side, events in trial.contacts.items()}
     speed = next((trial.speed for trial in trials if trial.speed is not None), None)
     return MeasuredWalk(name=name, first=first, tick=tick, legs=legs, unscaled=unscaled, contacts=contacts, speed=speed)
@@ -119,20 +121,21 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
     `SpringfootError` for too few strides.
     """
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
-    strides = {name: _strides(walk, name) for name in chosen}
+    strides = {name: _strides_of_leg(walk, name) for name in chosen}
     times = np.concatenate([*strides.values(), np.empty((0, 3))])
     if len(times) < FEWEST_STRIDES:
         raise SpringfootError(
             f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {len(times)} "
             "(they are found in grf_vertical, events, or thigh or hip with knee)"
         )
-    cut: dict[tuple[str, str], NDArray] = {}
+    cut: dict[tuple[str, str], NDArray] = {}  # (side, curve) -> (strides, 101)
     for name, leg in chosen.items():
         begin, _, end = strides[name].T
         for curve, series in leg.items():
             cut[name, curve] = on_percent(series, begin, end, walk.tick, walk.first)
         _drop_unmeasured_forces(cut, name)
-    _scale(cut, walk.unscaled, mass)
+    _normalise(cut, walk.unscaled, mass)
+    # Both legs' strides, one below the other.
     curves = {
         curve: np.concatenate([values for (_, name), values in cut.items() if name == curve])
         for curve in COLUMNS
@@ -141,7 +144,7 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
     return times, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
 
 
-def _strides(walk: MeasuredWalk, side: str) -> NDArray:
+def _strides_of_leg(walk: MeasuredWalk, side: str) -> NDArray:
     """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough.
 
     Methods: the vertical force, the events in the file, the leg's motion.
@@ -149,13 +152,13 @@ def _strides(walk: MeasuredWalk, side: str) -> NDArray:
     leg = walk.legs[side]
     candidates = []
     if "grf_vertical" in leg:
-        threshold = CONTACT_THRESHOLD_BW * _bearing(leg["grf_vertical"])
+        threshold = CONTACT_THRESHOLD_BW * _body_weight(leg["grf_vertical"])
         candidates.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
     if side in walk.contacts:
         candidates.append(walk.contacts[side])
     thigh = leg.get("thigh", leg.get("hip"))
     if thigh is not None and "knee" in leg:
-        candidates.append(_contacts_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first))
+        candidates.append(_events_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first))
     best = np.empty((0, 3))
     for contacts in candidates:
         strides = contacts.strides(after=walk.first)
@@ -163,16 +166,18 @@ def _strides(walk: MeasuredWalk, side: str) -> NDArray:
         duration = strides[:, 2] - strides[:, 0]
         usual = np.median(duration) if len(duration) else 0.0
         strides = strides[np.abs(duration - usual) <= UNEVEN_STRIDE * usual]
+        # A later method counts only if those before it found too few.
         if len(strides) > len(best) and len(best) < FEWEST_STRIDES:
             best = strides
     return best
 
 
-def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float, first: float) -> Contacts:
-    """Find events from joint angles (T,): the heel is farthest ahead of the hip, the toe hindmost.
+def _events_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float, first: float) -> Contacts:
+    """Find heel strikes and toe-offs from joint angles (T,) [rad]: the heel is farthest ahead, the toe hindmost.
 
-    After Zeni, Richards, Higginson, Gait & Posture 27 (2008) 710-714, who take markers from the sacrum, with the delay
-    of people's events after these extremes.
+    Samples are `tick` [s] apart, the first at time `first` [s]. Distances are from the hip, on a body of average
+    proportions: only the times of the extremes count. After Zeni, Richards, Higginson, Gait & Posture 27 (2008)
+    710-714, who take markers from the sacrum, with the delay of people's events after these extremes.
     """
     from scipy.signal import find_peaks  # as below
 
@@ -194,21 +199,25 @@ def _contacts_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: flo
 
     strikes = peaks(heel)
     offs = peaks(-toe)
-    stride = float(np.median(np.diff(strikes))) if len(strikes) > 1 else 0.0
+    stride = float(np.median(np.diff(strikes))) if len(strikes) > 1 else 0.0  # stride time [s]
     return Contacts(heel_strikes=strikes + HEEL_STRIKE_AFTER * stride, toe_offs=offs + TOE_OFF_AFTER * stride)
 
 
 def _smooth(angle: NDArray, tick: float) -> NDArray:
-    """Return the angle after a low-pass without delay (fourth order in all)."""
+    """Return the angle (T,) after a low-pass without delay: a Butterworth filter of second order, forward and back."""
     from scipy.signal import butter, sosfiltfilt  # half a second to import, and only files need it
 
+    # The ends are continued by half a second, or by as much as a short record has.
     return sosfiltfilt(
         butter(2, CUTOFF, fs=1 / tick, output="sos"), angle, padlen=min(len(angle) - 1, round(0.5 / tick))
     )
 
 
-def _bearing(force: NDArray) -> float:
-    """Return about the body weight, in the unit of `force`: the median of all samples beyond half of the largest."""
+def _body_weight(force: NDArray) -> float:
+    """Return about the body weight, in the unit of a vertical `force`: 1 for a force that is never positive.
+
+    It is the median of the samples beyond half of the largest.
+    """
     return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
 
 
@@ -220,20 +229,23 @@ def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> N
     vertical = cut.get((side, "grf_vertical"))
     if vertical is not None:
         low, high = WEIGHT_BEARING
-        measured = vertical[:, low : high + 1].min(axis=1) > 0.3 * _bearing(vertical)
+        # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
+        measured = vertical[:, low : high + 1].min(axis=1) > 0.3 * _body_weight(vertical)
         for name in FORCES:
             if (side, name) in cut:
                 cut[side, name] = cut[side, name][measured]
 
 
-def _scale(cut: dict[tuple[str, str], NDArray], unscaled: set[tuple[str, str]], mass: float | None) -> None:
+def _normalise(cut: dict[tuple[str, str], NDArray], unscaled: set[tuple[str, str]], mass: float | None) -> None:
     """Divide the `unscaled` curves in place: forces by body weight, moments and powers by body mass.
 
-    The mass is `mass` [kg], or the one that the vertical forces bear; without either these curves are dropped.
+    `cut` is (side, curve) -> (strides, 101). The mass is `mass` [kg], or the one that the vertical forces bear; without
+    either these curves are dropped.
     """
-    weight = None if mass is None else mass * GRAVITY
+    weight = None if mass is None else mass * GRAVITY  # [N]
+    # Mean vertical force of each stride [N]; percent 100 is percent 0 of the next stride.
     borne = [cut[key][:, :-1].mean(axis=1) for key in unscaled if key[1] == "grf_vertical" and key in cut]
-    if weight is None and sum(map(len, borne)):
+    if weight is None and sum(map(len, borne)):  # at least one stride with a measured force
         # Over a stride the two feet bear just the body's weight, and so one bears half of it.
         weight = 2 * float(np.mean(np.concatenate(borne)))
     for key in unscaled & cut.keys():

@@ -29,7 +29,7 @@ def zmp(
 
     On a `slope` [rad], uphill positive, x is along the ground and z at right angles to it.
     """
-    back, down = -gravity(slope)
+    back, down = -gravity(slope)  # parts of g along the ground, against x, and into the ground
     return np.asarray(x) - np.asarray(z) * (np.asarray(x_acceleration) + back) / (np.asarray(z_acceleration) + down)
 
 
@@ -147,12 +147,12 @@ def periodic_com(
     1e-9 m. With `ahead` [m] over time [s] (`ComMotion`) x + ahead replaces x on the right-hand side.
     """
     if ahead is not None:
-        path = _stepped(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
+        path = _path_by_matrices(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
     elif bob.amplitude == 0:
         lines = PPoly(np.stack([np.diff(zmp_points) / np.diff(zmp_times), zmp_points[:-1]]), zmp_times)
         path = closed_form(lines, step_length, height, slope)
     else:
-        path = _integrated(zmp_times, zmp_points, step_length, height, bob, slope)
+        path = _path_by_integration(zmp_times, zmp_points, step_length, height, bob, slope)
     return ComMotion(
         step_time=float(zmp_times[-1]),
         height=height,
@@ -174,8 +174,11 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     rate = sqrt(down / height)
     coefficients = np.array(zmp.c, float)
     for order in range(2, len(coefficients), 2):
+        # An even derivative has `order` coefficients fewer, those of the highest powers, which come first.
         coefficients[order:] += zmp.derivative(order).c / rate**order
-    coefficients[-1] += height * back / down
+    coefficients[-1] += (
+        height * back / down
+    )  # the constant terms, which are also the values at the starts of the pieces
     polynomial = PPoly(coefficients, zmp.x)
 
     # Jumps of the polynomials, in x and in x' / rate, from the end of each piece to the start of the next: the
@@ -198,7 +201,7 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     )
 
 
-def _integrated(
+def _path_by_integration(
     zmp_times: NDArray,
     zmp_points: NDArray,
     step_length: float,
@@ -218,14 +221,15 @@ def _integrated(
         z = height + bob(t)
         return (down + bob(t, 2)) / z
 
-    driven = np.array([1.0, 0.0, 0.0])  # columns: driven by ZMP and slope, from unit position, from unit velocity
+    # Solutions: driven by ZMP and slope from rest at 0; undriven from unit position; undriven from unit velocity.
+    driven = np.array([1.0, 0.0, 0.0])
 
     def motion(t: float, state: NDArray) -> NDArray:
         x = state[:3]
         v = state[3:]
         return np.concatenate([v, squared_rate(t) * (x - driven * np.interp(t, zmp_times, zmp_points)) - driven * back])
 
-    state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    state = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 1.0])  # x of the three solutions, then their x'
     times = []
     states = []
     # The ZMP has corners: integrating piece by piece keeps the order of the method.
@@ -236,7 +240,7 @@ def _integrated(
         states.append(piece.y[:, :-1])
         state = piece.y[:, -1]
     t = np.append(np.concatenate(times), step_time)
-    x, v = np.column_stack([*states, state]).reshape(2, 3, -1)
+    x, v = np.column_stack([*states, state]).reshape(2, 3, -1)  # each (solution, time)
 
     # Weights of the homogeneous solutions, x(0) and x'(0), that make x and x' periodic.
     ends = np.array([x[:, -1], v[:, -1]])
@@ -249,7 +253,7 @@ def _integrated(
     return PPoly.from_bernstein_basis(quintics)
 
 
-def _stepped(
+def _path_by_matrices(
     zmp_times: NDArray,
     zmp_points: NDArray,
     step_length: float,
@@ -285,16 +289,16 @@ def _stepped(
     tick = np.diff(t)[:, None, None]
     unit = np.eye(3)
     middle = equation(0.5 * (t[1:] + t[:-1]))
-    # The classical Runge-Kutta method, for all steps at once.
-    slope_start = matrices[:-1]
-    slope_middle = middle @ (unit + tick / 2 * slope_start)
-    slope_middle_again = middle @ (unit + tick / 2 * slope_middle)
-    slope_end = matrices[1:] @ (unit + tick * slope_middle_again)
-    step_matrices = unit + tick / 6 * (slope_start + 2 * slope_middle + 2 * slope_middle_again + slope_end)
+    # The classical Runge-Kutta method, for all steps at once: each `rate` is the matrix of one of its four slopes.
+    rate_start = matrices[:-1]
+    rate_middle = middle @ (unit + tick / 2 * rate_start)
+    rate_middle_again = middle @ (unit + tick / 2 * rate_middle)
+    rate_end = matrices[1:] @ (unit + tick * rate_middle_again)
+    step_matrices = unit + tick / 6 * (rate_start + 2 * rate_middle + 2 * rate_middle_again + rate_end)
     products = [unit]
     for step in step_matrices:
         products.append(step @ products[-1])
-    whole_step = products[-1][:2]
+    whole_step = products[-1][:2]  # rows of x and x'; the third stays 1
     # Solve x(T) = x(0) + step_length, x'(T) = x'(0) for the start (x, x').
     start = np.linalg.solve(whole_step[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole_step[:, 2])
     state = np.stack(products) @ np.append(start, 1.0)

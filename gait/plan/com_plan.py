@@ -98,7 +98,7 @@ def over_peoples_zmp(plan: ComPlan) -> ComPlan:
     zmp_from, zmp_to = np.array(PEOPLES_ZMP) * plan.body.length_scale
     motion = periodic_com(
         np.array([0.0, double_support, plan.step_time]),
-        np.array([zmp_to - plan.step_length, zmp_from, zmp_to]),
+        np.array([zmp_to - plan.step_length, zmp_from, zmp_to]),  # it starts where the step before ended
         plan.step_length,
         plan.motion.height,
         replace(plan.motion.bob, lowest_at=min(double_support / 2, LOWEST * plan.step_time)),

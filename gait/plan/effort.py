@@ -75,12 +75,15 @@ def metabolic_energy(work: Any) -> Any:
 
 
 def strengths(body: Body) -> NDArray:
-    """Return the largest moments (joint, 2) [N m] of a sound leg's muscles in extension and in flexion."""
+    """Return the largest moments (4, 2) [N m] of a sound leg's muscles in extension and in flexion.
+
+    Joints are in the order of `JOINTS`.
+    """
     return body.mass * GRAVITY * body.height * np.array([STRENGTH[joint] for joint in JOINTS])
 
 
 def volume_weights() -> NDArray:
-    """Return the weight (joint, 2) of a joint's extensors and flexors in the activation: `VOLUME` over its mean [-]."""
+    """Return the weights (4, 2) of each joint's extensors and flexors in the activation: `VOLUME` over its mean [-]."""
     volume = np.array([VOLUME[joint] for joint in JOINTS])
     return volume / volume.mean()
 
@@ -134,11 +137,14 @@ def muscle_use(
         scale: of stiffness, `Body.stiffness_scale`.
         muscle: factors on its properties.
     """
+    # Intervals 1 to S - 2 have an interval before and one after: [:-2], [1:-1] and [2:] are before, they and after.
     give = np.array(TENDON_GIVE) * [1.0, 1.0, muscle.tendon, muscle.toe_tendon] / scale
     work = interval_work(moment[:-2], moment[1:-1], moment[2:], delivered[1:-1], give)
     extends = moment > 0.0
+    # The moment over the largest one in its own direction: extension is the first strength, flexion the second.
     activation = moment / np.where(extends, strength[..., 0], strength[..., 1])
     change = activation[2:] - activation[:-2]
+    # The weight of the extensors where the moment extends, otherwise that of the flexors.
     weight = np.where(extends, *np.moveaxis(volume_weights(), -1, 0))[1:-1]
     return MuscleUse(
         work=np.stack([np.maximum(work, 0.0).sum(0), np.minimum(work, 0.0).sum(0)], -1),
@@ -177,6 +183,7 @@ class Effort:
 
 def mean_squared_acceleration(velocity: NDArray, tick: float) -> float:
     """Return `Effort.acceleration` of the joint velocities of L legs (S, L, 4) [rad/s] every `tick` [s]."""
+    # Without the toe, the last joint.
     change = np.diff(velocity[..., : JOINTS.index("toe")], axis=0) / tick
     return float(ACTIVATION_TIME**4 * (change**2).mean(0).sum())
 
@@ -198,7 +205,7 @@ def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
-    angle, rate = (_joints(turns) for turns in (motion.turn, motion.rate))
+    angle, rate = (_of_joints(turns) for turns in (motion.turn, motion.rate))
     return effort_of_stride(body, angle, rate, moment, plan.stride_time, 2 * plan.step_length, muscle)
 
 
@@ -234,23 +241,24 @@ def effort_of_stride(
     """
     tick = stride_time / len(angle)
     fibres = moment - muscle.tissue * passive_moments(body, angle)
-    moments, delivered = (_around(values)[:, None] for values in (fibres, -fibres * rate * tick))
+    # One leg, as an axis of length 1: its sums are doubled for both.
+    moments, delivered = (_with_neighbours(values)[:, None] for values in (fibres, -fibres * rate * tick))
     use = muscle_use(moments, delivered, tick, strengths(body), body.stiffness_scale, muscle)
     return Effort(
         work=float(2 * use.energy.sum() / (body.total_mass * GRAVITY * distance)),
         activation=float(2 * use.activation.sum() / stride_time),
         rate=float(2 * use.rate.sum() / stride_time),
-        acceleration=2 * mean_squared_acceleration(_around(rate)[:-1], tick),
+        acceleration=2 * mean_squared_acceleration(_with_neighbours(rate)[:-1], tick),
         beyond_range=beyond_range(angle),
     )
 
 
-def _around(values: NDArray) -> NDArray:
+def _with_neighbours(values: NDArray) -> NDArray:
     """Return values (S, ...) of a stride with the last one in front and the first one behind, as strides repeat."""
     return np.concatenate([values[-1:], values, values[:1]])
 
 
-def _joints(turns: NDArray) -> NDArray:
+def _of_joints(turns: NDArray) -> NDArray:
     """Return joint angles or rates (..., 4) of hip, knee, ankle, toe from those of segments (`LEG_SEGMENTS`).
 
     Flexion and dorsiflexion are positive; the hip's is the thigh to the vertical.

@@ -58,6 +58,7 @@ class Case:
         joints = [
             weight * np.degrees(getattr(legs, name) - self.people[name])[::6] for name, weight in JOINT_WEIGHTS.items()
         ]
+        # The depth of ball and of heel in the floor, without the ends of swing, where the foot is on it.
         floor = np.minimum(path.swing_heights((0.005, 0.995)).min(axis=1), 0.0)
         return np.concatenate([*joints, PER_METRE * np.append(floor, min(path.clearance - CLEARANCE, 0.0))])
 
@@ -72,6 +73,7 @@ def case(speed: float) -> Case:
     return Case(
         plan=plan,
         zmp_times=times,
+        # A hair before the step's end: phase 1 is phase 0 of the next step.
         zmp_points=plan.zmp(times / plan.step_time * [1, 1, 1 - 1e-15]),
         people={name: plan.human.mean(name, phase) for name in JOINT_WEIGHTS},
     )
@@ -106,7 +108,7 @@ def main() -> None:
 
     start = constants()
     least = np.full(start.shape, -np.inf)
-    least[:2] = 2.0  # below, the pitch's rate would jump where the rocker begins
+    least[:2] = 2.0  # of the two powers; below, the pitch's rate would jump where the rocker begins
     fit = least_squares(
         errors, start, bounds=(least, np.inf), diff_step=1e-4, x_scale=np.maximum(np.abs(start), 0.1), ftol=1e-3
     )

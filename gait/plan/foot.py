@@ -18,7 +18,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, require_within
 
 from ..body.body import Body
-from ..body.rockers import rising, rolling, turned, turning
+from ..body.rockers import ankle_about_pivot, pitch_rise, turned, turned_jet
 from .foot_style import FootStyle, peoples_style
 
 ROCKER_MARGIN = 0.005
@@ -59,24 +59,24 @@ class FootPath:
 
     def pitch(self, stride_phase: ArrayLike) -> NDArray:
         """Return the foot's pitch to the ground [rad], toes up positive, 0 from foot flat to heel-off."""
-        return self._jet(stride_phase)[2]
+        return self._pose(stride_phase)[2]
 
     def toe_pitch(self, stride_phase: ArrayLike) -> NDArray:
         """Return the toe's pitch to the ground [rad] from foot flat to toe-off: 0, then negative as the toe rolls
         over its tip."""
-        return self._roll(np.clip(np.mod(np.asarray(stride_phase, float), 1.0), self.tip_off, self.toe_off))[0]
+        return self._toe_roll(np.clip(np.mod(np.asarray(stride_phase, float), 1.0), self.tip_off, self.toe_off))[0]
 
     def ankle(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the ankle axis (x, z) [m]."""
-        x, z, _ = self._jet(stride_phase)
+        x, z, _ = self._pose(stride_phase)
         return x, z
 
     def toe_joint(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the toe joint (x, z) [m]; exactly at its standing place from foot flat until the toe rolls over its
         tip."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
-        x, z, pitch = self._jet(phase)
-        forward, up = turned(pitch, self.body.ankle_to_toe_joint, -self._drop)
+        x, z, pitch = self._pose(phase)
+        forward, up = turned(pitch, self.body.ankle_to_toe_joint, -self._ankle_above_toe_joint)
         planted = (phase >= self.foot_flat) & (phase <= self.tip_off)
         return (
             np.where(planted, self.body.ankle_to_toe_joint, x + forward),
@@ -86,7 +86,7 @@ class FootPath:
     def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the lowest point of the heel (x, z) [m]: the back of the sole, or a point of a round heel; on the
         floor until heel-off."""
-        x, z, pitch = self._jet(stride_phase)
+        x, z, pitch = self._pose(stride_phase)
         back, down = turned(pitch, self.flat_heel, self._heel_radius - self.body.ankle_height)
         return x + back, z + down - self._heel_radius
 
@@ -102,7 +102,8 @@ class FootPath:
 
     def ball_clearance(self, stride_phase: ArrayLike) -> NDArray:
         """Return the height of the ball of the foot above the floor [m]: the toe joint above its standing height."""
-        return self.toe_joint(stride_phase)[1] - self.body.toe_joint_height
+        _, z = self.toe_joint(stride_phase)
+        return z - self.body.toe_joint_height
 
     @property
     def heel_strike_pitch(self) -> float:
@@ -125,30 +126,36 @@ class FootPath:
         return float(self.swing_heights(MID_SWING).min())
 
     def on_ground(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Return the x [m] of the rear and of the front end of the foot's part on the ground in stance.
+        """Return x [m] of the rear and front ends of the part of the foot that touches the ground in stance.
 
-        The part is in turn the heel, the sole, the toe from joint to tip, and the tip.
+        This part is in turn a point of the heel, the sole, the toe from joint to tip, and the tip alone.
         """
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         joint = self.body.ankle_to_toe_joint
-        heel = self.flat_heel - self._heel_radius * self._heel_rocker(np.minimum(phase, self.foot_flat))[0, 2]
+        _, _, pitch = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]  # without its derivatives
+        # A round heel touches farther back by its radius times the pitch.
+        heel = self.flat_heel - self._heel_radius * pitch
         tip = joint + self.body.toe_length
         rear = np.select([phase <= self.heel_off, phase <= self.tip_off], [heel, joint], tip)
         return rear, np.where(phase >= self.foot_flat, tip, heel)
 
     def swing_heights(self, part: tuple[float, float]) -> NDArray:
-        """Return (2, 200) heights of ball and heel above the floor [m] over a part of the swing."""
+        """Return (2, 200) heights of ball and heel above the floor [m] over a part of the swing.
+
+        `part` is its first and last time as fractions of the swing.
+        """
         phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
         return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
 
     @property
-    def _drop(self) -> float:
+    def _ankle_above_toe_joint(self) -> float:
         """Return the height of the ankle over the toe joint in a flat foot [m]."""
         return self.body.ankle_height - self.body.toe_joint_height
 
-    def _jet(self, stride_phase: ArrayLike) -> NDArray:
+    def _pose(self, stride_phase: ArrayLike) -> NDArray:
         """Return x, z [m] of the ankle and pitch [rad] of the foot at any phases of the stride, (3, ...)."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
+        # Each part of the path at all phases, held at its ends, and without its derivatives.
         heel = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]
         toe = self._toe_rocker(np.clip(phase, self.heel_off, self.toe_off))[0]
         swing = np.moveaxis(self._swing(np.maximum(phase, self.toe_off)), -1, 0)
@@ -159,13 +166,13 @@ class FootPath:
 
         The result is (derivative, coordinate, ...), (3, 3, ...).
         """
-        left = 1 - np.asarray(phase) / self.foot_flat
+        remaining = 1 - np.asarray(phase) / self.foot_flat
         power = HEEL_ROCKER_POWER
-        pitch = self.heel_strike_pitch * left**power
-        rate = -self.heel_strike_pitch * power / self.foot_flat * left ** (power - 1)
-        curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * left ** (power - 2)
-        jet = rolling(np.stack([pitch, rate, curvature]), (self.flat_heel, self._heel_radius), self.body)
-        # A round heel rolls along the floor as the pitch falls.
+        pitch = self.heel_strike_pitch * remaining**power
+        rate = -self.heel_strike_pitch * power / self.foot_flat * remaining ** (power - 1)
+        curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * remaining ** (power - 2)
+        jet = ankle_about_pivot(np.stack([pitch, rate, curvature]), (self.flat_heel, self._heel_radius), self.body)
+        # A round heel rolls along the floor as the pitch falls: x of the ankle, by radius times pitch.
         jet[:, 0] -= self._heel_radius * jet[:, 2]
         return jet
 
@@ -175,21 +182,22 @@ class FootPath:
         The result is (derivative, coordinate, ...), (3, 3, ...).
         """
         body = self.body
-        shape = self.style.heel_rise or self.style.toe_rocker_power
-        pitch = rising(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)
-        jet = rolling(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
-        # The toe's roll over its tip moves the toe joint.
-        about_tip = turning(self._roll(phase), -body.toe_length, body.toe_joint_height)
+        shape = self.style.heel_rise or self.style.toe_rocker_power  # a polynomial's pair, or else a power
+        pitch = pitch_rise(-self.toe_off_pitch, phase, self.heel_off, self.toe_off, shape)
+        jet = ankle_about_pivot(pitch, (body.ankle_to_toe_joint, body.toe_joint_height), body)
+        # The toe's roll over its tip moves the toe joint, and with it the ankle: by the joint's turned place from the
+        # tip, less its place before the roll.
+        about_tip = turned_jet(self._toe_roll(phase), -body.toe_length, body.toe_joint_height)
         about_tip[0, 0] += body.toe_length
         about_tip[0, 1] -= body.toe_joint_height
         jet[:, :2] += about_tip
         return jet
 
-    def _roll(self, phase: ArrayLike) -> NDArray:
+    def _toe_roll(self, phase: ArrayLike) -> NDArray:
         """Return the pitch of the toe as it rolls over its tip [rad], negative, and two phase derivatives, (3, ...)."""
         if self.roll_pitch == 0:
             return np.zeros((3, *np.shape(phase)))
-        return rising(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
+        return pitch_rise(-self.roll_pitch, phase, self.tip_off, self.toe_off, self.style.roll_power)
 
     @cached_property
     def _swing(self) -> BSpline:
@@ -199,12 +207,12 @@ class FootPath:
         """
         start = self._toe_rocker(self.toe_off)
         end = self._heel_rocker(0.0)
-        end[0, 0] += 2 * self.step_length
+        end[0, 0] += 2 * self.step_length  # x of the next landing: a stride further on
         travelled, up, pitch = map(np.array, (self.style.via_forward, self.style.via_up, self.style.via_pitch))
         forward = start[0, 0] + travelled * (end[0, 0] - start[0, 0])
         via = np.stack([forward, up * self.body.length_scale + self.lift, pitch], -1)
         knots = self.toe_off + np.linspace(0.0, 1.0, len(travelled) + 2) * (1 - self.toe_off)
-        # Velocity and acceleration at both ends are those of the rockers.
+        # Velocity and acceleration, derivatives 1 and 2, at both ends are those of the rockers.
         ends = ([(1, start[1]), (2, start[2])], [(1, end[1]), (2, end[2])])
         return make_interp_spline(knots, np.stack([start[0], *via, end[0]]), k=5, bc_type=ends)
 
@@ -236,7 +244,7 @@ def feet_under_zmp(
     heel = -body.heel_to_ankle + (0.0 if style is None else style.heel_radius * body.length_scale)
     ball = body.ankle_to_toe_joint
     toe_tip = body.ankle_to_toe_joint + body.toe_length
-    first, zmp_from, *_, zmp_to = zmp_points
+    first, zmp_from, *_, zmp_to = zmp_points  # at heel strike, and at the start and end of single support
     for name, value, low, high in (("start", zmp_from, heel, ball), ("end", zmp_to, ball + margin, toe_tip)):
         beyond = max(low - value, value - high)
         if not beyond < 0:
@@ -249,7 +257,8 @@ def feet_under_zmp(
             f"step of {step_length:.3f} m must be longer than the ZMP travel, {zmp_to - zmp_from:.3f} m, "
             f"is {first - zmp_from:.3f} m too short"
         )
-    # Foot flat before the ZMP passes the heel, heel-off after the ZMP has passed the toe joint.
+    # Foot flat before the ZMP passes the heel, heel-off after the ZMP has passed the toe joint: stride phases at which
+    # the ascending ZMP is at these places.
     stride_time = 2 * zmp_times[-1]
     flat, heel_off = np.interp([heel - margin, ball + margin], zmp_points, zmp_times) / stride_time
     toe_off = float(0.5 + zmp_times[1] / stride_time)
@@ -259,6 +268,8 @@ def feet_under_zmp(
     if style is not None and style.flat is not None:
         flat = min(flat, style.flat * (toe_off - 0.5))
     flat = max(float(flat), QUICKEST_FOOT_FLAT)
+    # The ZMP leaves the tip of the rear foot in double support, more than half a stride after that foot's heel strike;
+    # from the front foot the tip is a step behind.
     zmp_leaves_tip = float(np.interp(toe_tip + margin - step_length, zmp_points, zmp_times))
     rolls = roll > 0 if style is None else style.roll_pitch > 0
     tip_off = min(float(0.5 + zmp_leaves_tip / stride_time), toe_off) if rolls else toe_off
@@ -278,7 +289,8 @@ def feet_under_zmp(
     )
     if clearance is not None:
         clearance = require_within("clearance", clearance, (0.0, body.leg_length), "m")
-        # Heights are linear in the lift of the via points, with the gain at a lift of 1 m as slope.
+        # Heights are linear in the lift of the via points, with the gain at a lift of 1 m as slope. The lift is the
+        # least with which all heights reach the clearance.
         without_lift = feet.swing_heights(MID_SWING)
         gain = replace(feet, lift=1.0).swing_heights(MID_SWING) - without_lift
         feet = replace(feet, lift=float(((clearance - without_lift) / gain).max()))
@@ -291,7 +303,7 @@ def refuse_swing_in_ground(feet: FootPath) -> None:
     The tip of the toe is not checked: early in swing the toe bends back to people's posture, which at 1.2 m/s would
     take its tip 20 mm into the floor; a sprung toe gives way.
     """
-    lowest = float(feet.swing_heights((0.005, 0.995)).min())
+    lowest = float(feet.swing_heights((0.005, 0.995)).min())  # at the very ends of swing the foot is on the floor
     if lowest < -FLOOR_TOLERANCE:
         raise SpringfootError(
             f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "

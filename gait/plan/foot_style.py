@@ -98,7 +98,7 @@ def peoples_style(step_ratio: float, roll: float, heel_rocker: float, tip_rocker
 
 
 def between(pair: tuple, roll: float) -> NDArray:
-    """Interpolate a constant between its values at a roll of 0 and of 1."""
+    """Interpolate a constant, or several, between the `pair` of its values at a `roll` of 0 and of 1."""
     return (1 - roll) * np.array(pair[0]) + roll * np.array(pair[1])
 
 
@@ -109,5 +109,6 @@ def pitch_at(pair: tuple, step_ratio: float, roll: float) -> float:
 
 
 def _pair(pair: tuple, roll: float) -> tuple[float, float]:
+    """Return a constant of two numbers, as `between`."""
     first, second = between(pair, roll)
     return float(first), float(second)

@@ -65,9 +65,11 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
     shorter than a foot p1 may lie ahead of p2. Raises `SpringfootError` if a foot would have to pull: for a ZMP that is
     not between p1 and p2, or a force that does not point up.
     """
-    if not np.all(force[..., 1] > 0):
+    forward, up = np.moveaxis(force, -1, 0)
+    com_x, com_z = np.moveaxis(com, -1, 0)
+    if not np.all(up > 0):
         raise SpringfootError("the ground can only push: the upward force must be > 0 N")
-    zmp = com[..., 0] - com[..., 1] * force[..., 0] / force[..., 1]
+    zmp = com_x - com_z * forward / up
     rear = np.asarray(rear_cop)
     front = np.asarray(front_cop)
     outside = float(np.max(np.maximum(np.minimum(rear, front) - zmp, zmp - np.maximum(rear, front)), initial=0.0))
@@ -75,13 +77,15 @@ def share_forces(force: NDArray, com: NDArray, rear_cop: ArrayLike, front_cop: A
         raise SpringfootError(
             f"ZMP must lie between the centres of pressure of the feet, is outside by {outside:.4f} m"
         )
+    # Where both centres coincide, a small distance avoids 0 / 0.
     cop_distance = np.where(front == rear, ZMP_TOLERANCE, front - rear)
-    on_front = np.clip((zmp - rear) / cop_distance, 0.0, 1.0) * force[..., 1]
+    on_front = np.clip((zmp - rear) / cop_distance, 0.0, 1.0) * up  # upward part [N]
 
-    def towards_com(up: NDArray, cop: NDArray) -> NDArray:
-        return np.stack([up * (com[..., 0] - cop) / com[..., 1], up], -1)
+    def towards_com(upward: NDArray, cop: NDArray) -> NDArray:
+        """Return the force with this upward part that points from `cop` to the CoM."""
+        return np.stack([upward * (com_x - cop) / com_z, upward], -1)
 
-    return towards_com(force[..., 1] - on_front, rear), towards_com(on_front, front)
+    return towards_com(up - on_front, rear), towards_com(on_front, front)
 
 
 def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -98,21 +102,22 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     foot bears the whole force until foot flat, and both CoPs stand still while the load passes over.
     """
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
-    second = phase >= 0.5
-    step_phase = 2 * (phase - 0.5 * second)
+    is_rear = phase >= 0.5  # in the second half of its stride this foot trails the other one
+    step_phase = 2 * (phase - 0.5 * is_rear)
     pivot = np.stack(plan.pivot(step_phase), -1)
     force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
     zmp = plan.zmp(step_phase)
     double_support = step_phase <= 2 * plan.feet.toe_off - 1
     rear, front = _double_support_cops(plan, step_phase)
-    # In single support the stance foot is the front foot and bears the whole force, at the ZMP.
-    on_rear, on_front = share_forces(
-        force, pivot, np.where(double_support, rear, zmp - 1.0), np.where(double_support, front, zmp)
-    )
-    on_this_foot = np.where(second[..., None], np.where(double_support[..., None], on_rear, 0.0), on_front)
+    # In single support the stance foot is the front foot and bears the whole force, at the ZMP; the rear foot, without
+    # force, may then be anywhere, 1 m behind.
+    front_cop = np.where(double_support, front, zmp)
+    on_rear, on_front = share_forces(force, pivot, np.where(double_support, rear, zmp - 1.0), front_cop)
+    # The rear foot swings after double support; its own frame is a step behind the front foot's.
+    on_rear = np.where(double_support[..., None], on_rear, 0.0)
     tip = plan.body.ankle_to_toe_joint + plan.body.toe_length
-    on_foot = np.where(double_support, front, zmp)
-    return on_this_foot, np.where(second, np.where(double_support, rear + plan.step_length, tip), on_foot)
+    rear_cop = np.where(double_support, rear + plan.step_length, tip)
+    return np.where(is_rear[..., None], on_rear, on_front), np.where(is_rear, rear_cop, front_cop)
 
 
 def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, NDArray]:
@@ -127,9 +132,9 @@ def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, 
     at_start, at_flat, at_end = (float(plan.zmp(event)) for event in (0.0, flat, end))
     if at_flat > heel or tip >= at_end:  # a step of about a foot's length: both centres stand still
         return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
-    rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)
+    rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)  # duration of the rear toe's roll, in step phases
     rear = np.interp(step_phase, [0.0, end - rolls], [at_start, tip])
-    landing = plan.feet.on_ground(0.5 * np.minimum(step_phase, flat))[0]
+    landing, _ = plan.feet.on_ground(0.5 * np.minimum(step_phase, flat))  # before foot flat: the heel
     return rear, np.where(step_phase < flat, landing, np.interp(step_phase, [flat, end], [heel, at_end]))
 
 
@@ -140,10 +145,12 @@ def planned_leg(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[LegMotion, Foo
     """
     phase = np.mod(np.asarray(stride_phase, float), 1.0)
     grid = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
-    progress = np.array([2 * plan.step_length, 0.0])
+    # The hip without its mean progress repeats every stride, so a Fourier series can differentiate it.
+    progress = np.array([2 * plan.step_length, 0.0])  # (x, z) [m] a stride
     turns = segment_turns(plan.joint_angles(grid), plan.slope)
     hip = np.stack(plan.hip_position(grid), -1) - grid[:, None] * progress
     jet = fourier_jet(np.concatenate([turns, hip], -1), PLAN_HARMONICS, phase, plan.stride_time)
+    # Columns 4 and 5 are the hip. The progress goes back into its place alone: `motion_of` takes no hip velocity.
     jet[0][..., 4:] += phase[..., None] * progress
     force, cop = foot_force(plan, phase)
     point = np.stack([cop, np.zeros(cop.shape)], -1)

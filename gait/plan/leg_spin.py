@@ -42,11 +42,13 @@ def spinning_legs(
     """
     reach = full_reach(body, knee)
     fixed_height = height
+    # A first guess, unless the height is fixed.
     height = 1.05 * body.leg_length if fixed_height is None else fixed_height
     ahead = still
     # Fixed point: the legs under a CoM and a pivot give the next pivot, and the next height.
     for _ in range(ROUNDS):
         motion, legs = legs_at(height, ahead)
+        # The CoM is too high by the length that the leg lacks with the knee's least flexion.
         lacking = float(legs.reach.max()) - reach if fixed_height is None else 0.0
         before = ahead
         ahead = pivot_ahead(body, motion, legs, step_length, lean)
@@ -73,7 +75,8 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     samples = np.concatenate([segment_turns(angles, motion.slope), hip], -1)
     leg = motion_of(*fourier_jet(samples, PLAN_HARMONICS, phase, stride_time))
     com = np.stack(motion.position(np.mod(2 * phase, 1.0) * motion.step_time), -1)
-    com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)  # without its mean progress too
+    # Over two steps and without its mean progress too: a step further in the second step, less the progress so far.
+    com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)
     # Rate of change of angular momentum about the CoM [N m]: both legs, half a stride apart, and then the trunk.
     one_leg = spin_rate(body, leg, com)
     upright = motion.slope + lean
@@ -83,6 +86,8 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     moment = mass * (leg.hip - com) + moment_about_hip  # first mass moment of trunk and load about the CoM [kg m]
     turning += moment[:, 0] * leg.hip_acceleration[:, 1] - moment[:, 1] * leg.hip_acceleration[:, 0]
     time = np.arange(half + 1) / half * motion.step_time
-    force = body.total_mass * (-gravity(motion.slope)[1] + motion.acceleration(time[:-1])[1])  # upward [N]
-    ahead = turning[:half] / force
+    _, com_acceleration = motion.acceleration(time[:-1])
+    _, g = gravity(motion.slope)
+    upward_force = body.total_mass * (-g + com_acceleration)  # [N]
+    ahead = turning[:half] / upward_force
     return CubicSpline(time, np.append(ahead, ahead[0]), bc_type="periodic")

@@ -85,7 +85,7 @@ class WalkPlan(ComPlan):
         """Return the rear and front end [m] of the base of support, the hull of all parts of the feet on the ground.
 
         x is forward of the leading (stance) foot's ankle when flat."""
-        phase = np.mod(np.asarray(step_phase, float), 1.0) / 2
+        phase = np.mod(np.asarray(step_phase, float), 1.0) / 2  # of the leading foot's stride; the other's is 0.5 later
         rear, front = self.feet.on_ground(phase)
         rear_of_trailing, front_of_trailing = self.feet.on_ground(phase + 0.5)
         two_feet = phase + 0.5 <= self.feet.toe_off
@@ -96,7 +96,7 @@ class WalkPlan(ComPlan):
 
     def joint_angles(self, stride_phase: ArrayLike) -> dict[str, NDArray]:
         """Return thigh (to the vertical), knee, ankle, toe [rad]; flexion, dorsiflexion, toe up positive."""
-        return _named(self.joint_table(np.mod(stride_phase, 1.0)))
+        return _by_angle(self.joint_table(np.mod(stride_phase, 1.0)))
 
     def hip_position(self, stride_phase: ArrayLike) -> Point:
         """Return the hip (x, z) [m] in the frame of the foot of this stride."""
@@ -186,7 +186,9 @@ def plan_walk(
     zmp_times = np.array([0.0, double_support, *times_between, step_time])
     points_between = zmp_from + np.array(covered) * (zmp_to - zmp_from)
     zmp_points = np.array([zmp_to - step_length, zmp_from, *points_between, zmp_to])
-    feet = feet_under_zmp(body, step_length, zmp_times, zmp_points, roll, clearance, style and style.foot)
+    feet = feet_under_zmp(
+        body, step_length, zmp_times, zmp_points, roll, clearance, None if style is None else style.foot
+    )
     lean = 0.0 if style is None else style.lean
 
     bob = Bob(
@@ -195,15 +197,14 @@ def plan_walk(
         lowest_at=double_support * (0.5 if style is None else style.lowest),
         second=(0.0, 0.0) if style is None else style.rise_again,
     )
-    # Each search with a pivot starts from the postures of the search before.
+    # Each search with a pivot starts from the postures of the search before, the only entry of the list.
     last_legs: list[LegPostures] = []
 
     def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
         """Plan CoM and legs at a mean CoM height [m], with a pivot `ahead` of the CoM [m] if given."""
         motion = periodic_com(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
-        legs = legs_under_com(
-            body, motion, feet, human, last_legs[0] if last_legs and ahead is not None else None, lean
-        )
+        near = last_legs[0] if last_legs and ahead is not None else None
+        legs = legs_under_com(body, motion, feet, human, near, lean)
         last_legs[:] = [legs]
         return motion, legs
 
@@ -224,8 +225,8 @@ def plan_walk(
         feet=feet,
         human=human,
         lean=lean,
-        joint_table=_periodic(table),
-        hip_table=_periodic(legs.hip, shift=np.array([2 * step_length, 0.0])),
+        joint_table=_periodic_table(table),
+        hip_table=_periodic_table(legs.hip, shift=np.array([2 * step_length, 0.0])),
     )
     refuse_swing_in_ground(feet)
     _refuse_zmp_outside(plan)
@@ -233,7 +234,10 @@ def plan_walk(
 
 
 def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
-    """Return step time [s] and step length [m] of a cadence at `speed` [m/s]."""
+    """Return step time [s] and step length [m] of a cadence ("people" or "thesis") at `speed` [m/s].
+
+    `human` gives those of people at the nearest speed of their data.
+    """
     if cadence == "thesis":
         step_time = THESIS_STEP_TIME * sqrt(body.length_scale)
         return step_time, speed * step_time
@@ -243,7 +247,11 @@ def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[flo
 
 
 def _roll(body: Body, human: HumanGait, double_support: float, step_time: float, step_length: float) -> float:
-    """Return the roll of the toe over its tip (`FootPath.roll`, 0 to 1) for a double support [s]."""
+    """Return the roll of the toe over its tip (`FootPath.roll`, 0 to 1) for a double support [s].
+
+    Longer double supports than `DOUBLE_SUPPORT` give more roll, steps below `ROLLING_STEP` less. The step has a time
+    [s] and a length [m].
+    """
     full_roll = max(PEOPLES_SHARE * (2 * human.toe_off - 1), LEAST_FULL_ROLL)
     roll = float(np.interp(double_support, [DOUBLE_SUPPORT * step_time, full_roll * step_time], [0.0, 1.0]))
     return roll * float(np.interp(step_length / body.foot_length, ROLLING_STEP, [0.0, 1.0]))
@@ -278,14 +286,14 @@ def _refuse_zmp_outside(plan: WalkPlan) -> None:
         )
 
 
-def _periodic(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolator:
+def _periodic_table(values: NDArray, shift: NDArray | float = 0.0) -> PchipInterpolator:
     """Return a table (POSTURE_SAMPLES, n) over phase 0..1 as a shape-keeping cubic, which does not overshoot."""
-    edge = 4
+    edge = 4  # samples beyond each end: the stride's other end, shifted
     padded = np.concatenate([values[-edge:] - shift, values, values[: edge + 1] + shift])
     with np.errstate(over="ignore"):  # a slope next to none has an infinite weight, which makes the knot's slope 0
         return PchipInterpolator(np.arange(-edge, POSTURE_SAMPLES + edge + 1) / POSTURE_SAMPLES, padded, axis=0)
 
 
-def _named(columns: NDArray) -> dict[str, NDArray]:
+def _by_angle(columns: NDArray) -> dict[str, NDArray]:
     """Return the columns (..., 4) by the names of `ANGLES`."""
     return dict(zip(ANGLES, np.moveaxis(columns, -1, 0), strict=True))

@@ -5,7 +5,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 
 from ..body.body import ANGLES, GRAVITY
-from ..body.leg import JOINTS, inverse_dynamics
+from ..body.leg import JOINTS, LEG_SEGMENTS, inverse_dynamics
 from ..people.human import HARMONICS, STANCE_TERMS, FootHabits, HumanGait
 from .kinetics import foot_force, planned_leg
 from .plan import WalkPlan
@@ -31,19 +31,21 @@ def gait_of(plan: WalkPlan) -> HumanGait:
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     angles = plan.joint_angles(phase)
-    turn = motion.turn
-    rate = motion.rate
-    rates = {"hip": rate[:, 0], "knee": rate[:, 0] - rate[:, 1], "ankle": rate[:, 2] - rate[:, 1]}
-    rates["toe"] = rate[:, 3] - rate[:, 2]
-    mean = {name: _series(angles[name]) for name in ANGLES} | {"hip": _series(turn[:, 0])}
-    unit = body.total_mass * body.length_scale
+    thigh, shank, foot, toe = np.moveaxis(motion.rate, -1, 0)
+    rates = {"hip": thigh, "knee": thigh - shank, "ankle": foot - shank, "toe": toe - foot}  # of the joints
+    mean = {name: _fourier_coefficients(angles[name]) for name in ANGLES} | {
+        "hip": _fourier_coefficients(motion.turn[:, LEG_SEGMENTS.index("thigh")])  # the pelvis does not turn
+    }
+    unit = body.total_mass * body.length_scale  # [N m] of 1 N m/kg at 1.70 m
     for joint in JOINTS:
-        mean[f"{joint}_moment"] = _series(dynamics.moment[joint] / unit)
-        mean[f"{joint}_power"] = _series(-dynamics.moment[joint] * rates[joint] / body.total_mass)
+        mean[f"{joint}_moment"] = _fourier_coefficients(dynamics.moment[joint] / unit)
+        mean[f"{joint}_power"] = _fourier_coefficients(-dynamics.moment[joint] * rates[joint] / body.total_mass)
     force, _ = foot_force(plan, phase)
     force = force / (body.total_mass * GRAVITY)
     toe_off = plan.feet.toe_off
-    mean["grf_forward"], mean["grf_vertical"] = (_stance(force[:, axis], phase, toe_off) for axis in range(2))
+    mean["grf_forward"], mean["grf_vertical"] = (
+        _stance_coefficients(force[:, axis], phase, toe_off) for axis in range(2)
+    )
     return HumanGait(
         speed=plan.speed,
         condition="plan",
@@ -53,11 +55,11 @@ def gait_of(plan: WalkPlan) -> HumanGait:
         toe_off=toe_off,
         mean_series=mean,
         sd_series={name: np.zeros_like(series) for name, series in mean.items()},
-        foot=_foot(plan),
+        foot=_foot_habits(plan),
     )
 
 
-def _foot(plan: WalkPlan) -> FootHabits:
+def _foot_habits(plan: WalkPlan) -> FootHabits:
     """Return the phases at which rest angles and scheduled K change, set by the plan's events of the foot.
 
     People's quasi-stiffness has no part in a plan (None).
@@ -67,6 +69,7 @@ def _foot(plan: WalkPlan) -> FootHabits:
     heel_off = feet.heel_off
     toe_off = feet.toe_off
     mid_stance = flat + FLAT_SHARE * (heel_off - flat)
+    # Late stance must not end before it starts, however early the heel rises.
     push_off = max(heel_off, mid_stance + 2 * RAMP)
     plateaus = (
         *(0.0, flat),  # start and end of loading
@@ -85,14 +88,14 @@ def _foot(plan: WalkPlan) -> FootHabits:
     )
 
 
-def _series(values: NDArray) -> NDArray:
+def _fourier_coefficients(values: NDArray) -> NDArray:
     """Return (HARMONICS + 1,) complex Fourier coefficients of evenly spaced samples of a stride."""
     series = np.fft.rfft(values)[: HARMONICS + 1] / len(values)
-    series[1:] *= 2
+    series[1:] *= 2  # each term stands for its negative frequency too, the mean for itself
     return series
 
 
-def _stance(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
+def _stance_coefficients(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
     """Fit a sine series over stance to samples over `phase` by least squares: return its (STANCE_TERMS,)
     coefficients."""
     inside = phase < toe_off

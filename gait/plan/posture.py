@@ -37,6 +37,7 @@ def leg_angles(
     The ankle is `forward` of and `down` from the hip [m]. An ankle out of reach gets a straight knee.
     """
     square = np.square(forward) + np.square(down)
+    # The knee by the law of cosines; the flexed knee puts the thigh ahead of the line from hip to ankle, by `lead`.
     cosine = (square - thigh_length**2 - shank_length**2) / (2 * thigh_length * shank_length)
     knee = np.arccos(np.clip(cosine, -1.0, 1.0))
     lead = np.arctan2(shank_length * np.sin(knee), thigh_length + shank_length * np.cos(knee))
@@ -86,9 +87,9 @@ def legs_under_com(
         ankle,
         pitch,
         toe,
-        lambda leg: leg + np.roll(leg, half, axis=-1),
+        lambda leg: leg + np.roll(leg, half, axis=-1),  # the other leg is half a stride later
         motion.slope,
-        near and near.hip.T,
+        None if near is None else near.hip.T,
         lean,
     )
 
@@ -130,8 +131,9 @@ def legs_under(
     The hip of the result is (..., 2).
     """
     foot_and_toe = _foot_moment(body, pitch, toe)
+    # First guess: the hip is a tenth of the leg's length below the CoM.
     hip = com - np.array([0.0, 0.1 * body.leg_length])[:, *[None] * (com.ndim - 1)] if near is None else near
-    trunk = hypot(*body.upper_moment) / body.total_mass
+    trunk = hypot(*body.upper_moment) / body.total_mass  # shift of the body's CoM from the hip by trunk and load [m]
     # Fixed point: place the legs below the hip, then move the hip so that the CoM is right. A shift of the hip moves
     # the legs' masses, which shift the hip by a third as much the next time: the search converges quickly.
     for _ in range(60):
@@ -212,7 +214,7 @@ def highest_legs(
     `legs_at` plans for a mean CoM height [m]. Raises `SpringfootError` for a CoM lower than `LOWEST_COM`.
     """
     reach = full_reach(body, STRAIGHTEST_KNEE)
-    height = 1.08 * body.leg_length
+    height = 1.08 * body.leg_length  # a first guess
     for _ in range(50):
         motion, legs = legs_at(height)
         lacking = float(legs.reach.max()) - reach

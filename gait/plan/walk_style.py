@@ -57,14 +57,14 @@ class WalkStyle:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON values; `style_from` is the inverse."""
-        return json.loads(json.dumps(asdict(self)))
+        return json.loads(json.dumps(asdict(self)))  # through text, so that tuples become lists
 
 
 def style_from(values: Mapping[str, Any]) -> WalkStyle:
     """Build a style from JSON values (lists for tuples); raise `ValueError`, `TypeError` or `KeyError` for other
     values."""
     fields = dict(values)
-    style = WalkStyle(**_tupled(fields | {"foot": FootStyle(**_tupled(fields["foot"]))}))
+    style = WalkStyle(**_with_tuples(fields | {"foot": FootStyle(**_with_tuples(fields["foot"]))}))
     for part in (style, style.foot):
         for name, hint in get_type_hints(type(part)).items():
             value = getattr(part, name)
@@ -96,30 +96,30 @@ def least_work(speed: float, file: Path | None = None) -> WalkStyle:
     Linear between the speeds of the searches; outside them the nearest style. Raises `SpringfootError` for a file
     without styles.
     """
-    table = _committed() if file is None else styles_of(file)
+    table = _package_styles() if file is None else styles_of(file)
     speeds = sorted(table)
     position = float(np.interp(speed, speeds, np.arange(len(speeds))))  # 1.25: a quarter from speed 1 to speed 2
     low = table[speeds[int(position)]]
     high = table[speeds[min(int(position) + 1, len(speeds) - 1)]]
-    return style_from(_mixed(low.to_json(), high.to_json(), position - int(position)))
+    return style_from(_interpolate(low.to_json(), high.to_json(), position - int(position)))
 
 
-def _mixed(low: Any, high: Any, weight: float) -> Any:
+def _interpolate(low: Any, high: Any, weight: float) -> Any:
     """Interpolate between the JSON values of two styles, number by number: `low` at weight 0, `high` at 1."""
-    if low is None:
+    if low is None:  # a choice that styles leave open, both of them
         return None
     if isinstance(low, dict):
-        return {name: _mixed(low[name], high[name], weight) for name in low}
+        return {name: _interpolate(low[name], high[name], weight) for name in low}
     return (np.array(low) + weight * (np.array(high) - np.array(low))).tolist()
 
 
-def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+def _with_tuples(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values with tuples for lists."""
     return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
 
 
 @cache
-def _committed() -> dict[float, WalkStyle]:
+def _package_styles() -> dict[float, WalkStyle]:
     """Return the styles of the package's own file."""
     return styles_of(STYLES)
 

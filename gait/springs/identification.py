@@ -98,7 +98,7 @@ def identify(
 def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
     """Identify the spring of one phase, from its bounds and its samples (n,), and collect reasons to doubt it."""
     count = len(torque)
-    estimates: Sequence[Estimate | None] = [None] * 3
+    estimates: Sequence[Estimate | None] = [None] * len(PARAMETERS)
     r2 = correlation = residual_correlation = None
     spread = 0.0
     condition = np.inf
@@ -109,6 +109,7 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
         fit = fit_spring(torque, angle, velocity)
         columns = np.stack([np.ones(count), angle, velocity], -1)
         lengths = np.sqrt((columns**2).sum(0))
+        # A column of zeros, say of a joint at rest, keeps its length of 0.
         condition = float(np.linalg.cond(columns / np.where(lengths > 0, lengths, 1.0)))
         angle_deviation = angle - angle.mean()
         velocity_deviation = velocity - velocity.mean()
@@ -118,6 +119,7 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
             if deviation_product > 0
             else None
         )
+        # What velocity does not explain; without a correlation it explains nothing.
         spread = float(np.sqrt(angle_deviation @ angle_deviation / count * (1 - (correlation or 0.0) ** 2)))
         if correlation is not None and abs(correlation) > COLLINEAR:
             reasons.append(f"angle and velocity are nearly collinear (r = {correlation:.3f})")
@@ -128,11 +130,12 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
         if not fit.solvable:
             reasons.append("K, beta and theta_eq cannot be told apart")
         else:
+            # K, beta, theta_eq: the order of `PARAMETERS`.
             estimates = fitted = [Estimate(*map(float, numbers)) for numbers in intervals(fit)]
             unexplained = fit.residual @ fit.residual
             total = np.sum((torque - torque.mean()) ** 2)
             r2 = float(1 - unexplained / total) if total > 0 else None
-            if unexplained > 1e-20 * (torque @ torque):
+            if unexplained > 1e-20 * (torque @ torque):  # otherwise the residuals are mere rounding
                 residual_correlation = float(fit.residual[1:] @ fit.residual[:-1] / unexplained)
             if fitted[0].low <= 0:
                 reasons.append(
@@ -175,8 +178,9 @@ def _windows(
     if len(edges) < 2 or edges != sorted(set(edges)):
         raise SpringfootError(f"bounds must be two or more ascending stride phases, got {edges}")
     require_number("margin", margin, 0.0, 0.5, "of a stride")
-    insides = [(arrays[3] >= low + margin) & (arrays[3] < high - margin) for low, high in pairwise(edges)]
+    torque, angle, velocity, phase = arrays
+    insides = [(phase >= low + margin) & (phase < high - margin) for low, high in pairwise(edges)]
     return [
-        (span, (arrays[0][inside], arrays[1][inside], arrays[2][inside]))
+        (span, (torque[inside], angle[inside], velocity[inside]))
         for span, inside in zip(pairwise(edges), insides, strict=True)
     ]

@@ -114,7 +114,7 @@ def identify_pushed(
     Returns:
         P results, in the order of `bounds`. Raises `SpringfootError` for bad arrays or bounds.
     """
-    data = _checked(torque, angle, velocity, phase, trial, states)
+    data = _samples(torque, angle, velocity, phase, trial, states)
     edges = [require_within("a bound", bound, (0.0, 1.0)) for bound in bounds]
     if len(edges) < 2 or edges != sorted(set(edges)):
         raise SpringfootError(f"bounds must be two or more ascending stride phases, got {edges}")
@@ -136,7 +136,7 @@ class _Data(NamedTuple):
     """(n, q)."""
 
 
-def _checked(
+def _samples(
     torque: ArrayLike,
     angle: ArrayLike,
     velocity: ArrayLike,
@@ -160,22 +160,28 @@ def _checked(
 
 
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
-    """Identify the spring of the phase from `low` to `high`, and tell whether it is one."""
+    """Identify the spring of the phase from `low` to `high` [stride], and tell whether it is one.
+
+    `margin` and `spacing` as of `identify_pushed`.
+    """
     # Samples of the phase, by bins of equal phase; bins with few samples are left out.
     first = low + margin
     last = high - margin
     inside = np.flatnonzero((data.phase >= first) & (data.phase < last))
+    # The bins that have samples, counted from 0; then again without those that have too few.
     bin_index = np.unique(((data.phase[inside] - first) / BIN).astype(int), return_inverse=True)[1]
     enough = np.bincount(bin_index)[bin_index] >= LEAST_IN_BIN if len(bin_index) else np.empty(0, bool)
     inside = inside[enough]
     bin_index = np.unique(bin_index[enough], return_inverse=True)[1]
     phase = data.phase[inside]
-    trial = np.unique(data.trial[inside], return_inverse=True)[1]  # counted anew from 0
+    # Trials are counted anew from 0, without those that have no sample here.
+    trial = np.unique(data.trial[inside], return_inverse=True)[1]
     trials = int(trial.max()) + 1 if len(trial) else 0
     common = {"start": low, "end": high, "samples": len(inside), "trials": trials}
+    # Further states: the given ones and two curvatures.
     needed = max(LEAST_TRIALS, 2 * (data.states.shape[1] + 2))
     if trials < needed:
-        return _unknown(common, f"{trials} trials are too few, {needed} are needed")
+        return _unknown_spring(common, f"{trials} trials are too few, {needed} are needed")
     # Deviations from the mean course; curvature of the spring counts as a further state.
     torque, angle, velocity, *states = (
         _deviation(column, phase, bin_index)
@@ -183,6 +189,7 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
     )
     curvatures = [_deviation(bend, phase, bin_index) for bend in (angle**2, angle * np.abs(angle))]
     knot_weights = _knot_weights(phase, first, last, spacing)
+    # The angle less what velocity explains; the tiny number is for a velocity of 0 throughout.
     unexplained = angle - velocity * (angle @ velocity) / max(velocity @ velocity, 1e-300)
     spread = float(np.sqrt(np.mean(unexplained**2)))
     # d torque = -K d angle - K beta d velocity, K and K beta linear between knots; then with further states besides.
@@ -193,7 +200,7 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
         np.column_stack([spring_columns, *states, *curvatures]), torque, trial, line_unknowns
     )
     if fit is None or fit_with_states is None:
-        return _unknown(common, "angle and velocity move too little, or as one, to tell K from beta")
+        return _unknown_spring(common, "angle and velocity move too little, or as one, to tell K from beta")
     # K and K beta as means over the samples, by all trials and without each trial; beta = (K beta) / K.
     mean_weights = knot_weights.mean(0)
     columns = len(mean_weights)
@@ -237,7 +244,7 @@ def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> t
     return SPRING, ""
 
 
-def _unknown(common: dict[str, float], reason: str) -> PushedSpring:
+def _unknown_spring(common: dict[str, float], reason: str) -> PushedSpring:
     """Return the result of a phase whose data determine no number, with the reason."""
     return PushedSpring(
         **common,  # type: ignore[arg-type]
@@ -259,9 +266,11 @@ def _deviation(values: NDArray, phase: NDArray, bin_index: NDArray) -> NDArray:
     """
 
     def centred(column: NDArray) -> NDArray:
+        """Return a column (n,) less its mean in each bin."""
         return column - (np.bincount(bin_index, column) / np.bincount(bin_index))[bin_index]
 
     phase_deviation = centred(phase)
+    # Least squares in each bin: the sum of products over the sum of squares. A bin of one phase has a slope of 0.
     values = centred(values)
     spread = np.bincount(bin_index, phase_deviation**2)
     slope = np.bincount(bin_index, phase_deviation * values) / np.where(spread > 1e-18, spread, np.inf)
@@ -269,10 +278,14 @@ def _deviation(values: NDArray, phase: NDArray, bin_index: NDArray) -> NDArray:
 
 
 def _knot_weights(phase: NDArray, low: float, high: float, spacing: float | None) -> NDArray:
-    """Return the weights (n, knots) with which a piecewise linear function's knots, evenly spaced, give its values at
-    `phase` (n,)."""
+    """Return the weights (n, knots) with which a function's values at knots give its values at `phase` (n,).
+
+    It is linear between knots, which are evenly spaced from `low` to `high` and at most `spacing` apart; with a
+    `spacing` of None it is constant, with a single knot.
+    """
     if spacing is None:
         return np.ones((len(phase), 1))
-    pieces = max(1, int(np.ceil((high - low) / spacing - 1e-9)))
+    pieces = max(1, int(np.ceil((high - low) / spacing - 1e-9)))  # less a hair: rounding must not add a piece
     position = np.clip((phase - low) / (high - low) * pieces, 0, pieces)
+    # Each knot's weight falls from 1 at the knot to 0 at its neighbours.
     return np.maximum(0.0, 1 - np.abs(position[:, None] - np.arange(pieces + 1)))

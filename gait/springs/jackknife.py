@@ -48,6 +48,7 @@ class TrialFit(NamedTuple):
         trials, count = without.shape
         if trials <= count:
             return 1.0
+        # The jackknife covariance, as the variance in `interval`.
         deviation = without - without.mean(0)
         covariance = self.inflation * (trials - 1) / trials * deviation.T @ deviation
         squared = values @ np.linalg.pinv(covariance, hermitian=True) @ values
@@ -62,6 +63,7 @@ def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) 
     coefficients: too few samples, a column that is 0, columns nearly collinear, or values all 0.
     """
     count, unknowns = columns.shape
+    # Columns of unit size lose no digits to units.
     scale = np.sqrt((columns**2).mean(0))
     total_square = values @ values
     freedom = count - spent - unknowns
@@ -69,7 +71,7 @@ def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) 
         return None
     scaled = columns / scale
     order = np.argsort(trial, kind="stable")
-    ends = np.cumsum(np.bincount(trial))[:-1]
+    ends = np.cumsum(np.bincount(trial))[:-1]  # of all trials but the last one, in that order
     trials = list(zip(np.split(scaled[order], ends), np.split(values[order], ends), strict=True))
     # Normal equations X'X b = X'y of each trial; leaving a trial out subtracts its part.
     grams = np.stack([part.T @ part for part, _ in trials])

@@ -53,6 +53,7 @@ def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
     angle = human.mean("ankle", phase)
     moment = human.mean("ankle_moment", phase)
     velocity = human.rate("ankle", phase) / human.stride_time
+    # `identify` takes torques positive as the angle, opposite to people's moments. Phases end where the next begin.
     bounds = (0.0, *(end for _, _, end, _, _ in FUKUCHI_OVERGROUND))
     rows = []
     for row, spring in zip(FUKUCHI_OVERGROUND, identify(-moment, angle, velocity, phase, bounds), strict=True):

@@ -46,6 +46,7 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
     solvable = bool(np.all(scale > 1e-9 * (1 + np.abs(mean))))
     scale = np.where(scale > 0, scale, 1.0)
     scaled = deviation / scale[..., None, :]
+    # The normal equations X'X (K, c) = -X' torque, with the columns angle and velocity.
     gram = np.einsum("...ni,...nj->...ij", scaled, scaled)
     solvable &= bool(np.all(np.linalg.det(gram) > 1e-10 * count**2))
     inverse = np.linalg.pinv(gram, hermitian=True) / scale[..., None, :] / scale[..., :, None]
@@ -77,11 +78,12 @@ def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
     0 a ratio has no bounds.
     """
     quantile = stdtrit(fit.freedom, (1 + CONFIDENCE) / 2)  # Student's t
+    # v are covariances of a, K, c times the squared quantile: squared half widths.
     a, K, c = np.moveaxis(fit.coefficients, -1, 0)
     v = np.moveaxis(fit.covariance, (-2, -1), (0, 1)) * quantile**2
     results = [(K, K - np.sqrt(v[1, 1]), K + np.sqrt(v[1, 1]))]
     with np.errstate(divide="ignore", invalid="ignore"):
-        for numerator, index in ((c, 2), (a, 0)):
+        for numerator, index in ((c, 2), (a, 0)):  # index: that of the numerator among a, K, c
             # The bounds are the roots of (numerator - r K)^2 = v_nn - 2 r v_nK + r^2 v_KK.
             square = K**2 - v[1, 1]
             centre = (numerator * K - v[index, 1]) / square

@@ -66,7 +66,7 @@ class StiffnessSchedule:
         phase = np.mod(np.asarray(phase, float), 1.0)
         stiffness, equilibrium = np.empty((2, *phase.shape, len(SPRINGS)))
         for column, joint in enumerate(SPRINGS):
-            starts, springs, rests = np.array(getattr(self, joint)).T
+            starts, springs, rests = np.array(getattr(self, joint)).T  # columns of `Segment`
             # Before the first start the index is -1: the last segment of the previous stride.
             index = np.searchsorted(starts, phase, side="right") - 1
             stiffness[..., column] = springs[index]
@@ -99,10 +99,12 @@ def line_spring(start: tuple[float, float], end: tuple[float, float], lowest: fl
     last_angle, last_torque = end
     angle_change = last_angle - first_angle
     torque_drop = first_torque - last_torque
+    # An angle that stands has no slope.
     stiffness = torque_drop / angle_change if abs(angle_change) > 1e-6 else 0.0
     stiffness = max(stiffness, lowest)
-    if stiffness == 0.0:
+    if stiffness == 0.0:  # only with a `lowest` of 0: no torque at any angle
         return 0.0, (first_angle + last_angle) / 2
+    # The angle at which the line through the mid-point has no torque.
     return stiffness, (first_angle + last_angle) / 2 + (first_torque + last_torque) / 2 / stiffness
 
 
@@ -115,7 +117,7 @@ def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str
     strike; one that only plantarflexes has its maximum there too. Raises `SpringfootError` for curves of another form.
     """
     phase, angle = _stance(phase, angle, toe_off)
-    top = int(angle.argmax())
+    top = int(angle.argmax())  # sample of maximum dorsiflexion
     dip = int(angle[: top + 1].argmin())
     return {
         "heel_strike": float(phase[0]),
@@ -213,12 +215,16 @@ def thesis_schedule(
         lowest=(LOWEST_STIFFNESS[0] * scale, LOWEST_STIFFNESS[1] * scale),
         toe_stiffness=TOE_STIFFNESS * scale,
     )
+    # The swing segment, the last one of each joint, is replaced.
     ankle, toe = (Segment(human.toe_off, k * scale, radians(rest_deg)) for k, rest_deg in swing)
     return StiffnessSchedule((*stance.ankle[:-1], ankle), (*stance.toe[:-1], toe))
 
 
 def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
-    """Return phases and angles from heel strike to `toe_off`, with a sample at `toe_off` itself."""
+    """Return phases and angles from heel strike to `toe_off`, with a sample at `toe_off` itself.
+
+    Arguments as of `ankle_events`. Raises `SpringfootError` for curves of another form.
+    """
     require_within("toe_off", toe_off, (0.0, 1.0))
     phase, angle = _curves(phase, angle)
     if not (len(phase) > 1 and phase[0] == 0.0 and np.all(np.diff(phase) > 0) and 0 < toe_off <= phase[-1]):
@@ -228,7 +234,7 @@ def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray
 
 
 def _curves(*curves: ArrayLike) -> list[NDArray]:
-    """Return the curves as float arrays (n,), all finite and of the same length."""
+    """Return the curves as float arrays (n,); raise `SpringfootError` unless all are finite and of one length."""
     arrays = [np.asarray(curve, float) for curve in curves]
     shapes = [array.shape for array in arrays]
     if len(shapes[0]) != 1 or len(set(shapes)) > 1 or not all(np.isfinite(array).all() for array in arrays):

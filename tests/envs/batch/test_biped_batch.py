@@ -10,7 +10,7 @@ from springfoot.envs.physics.model import DAMPING_TIME, SIDES, torque_limits
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.errors import SpringfootError
 from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, find_contacts
+from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW, find_contacts
 
 
 def scheduled(biped: Biped) -> np.ndarray:

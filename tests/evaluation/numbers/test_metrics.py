@@ -16,7 +16,7 @@ from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
 from springfoot.gait import GRAVITY, Body, human_gait
 from springfoot.gait.body.tissue import passive_moments
-from springfoot.gait.people.contacts import CONTACT_THRESHOLD_BW, PERCENT
+from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW, PERCENT
 from springfoot.gait.plan.effort import effort_of_people
 
 BODY = Body()

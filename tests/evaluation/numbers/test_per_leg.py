@@ -19,7 +19,7 @@ from springfoot.evaluation.report.animation import FAR, NEAR, save_animation
 from springfoot.evaluation.report.gait_figure import save_gait_figure
 from springfoot.evaluation.report.gait_table import print_table
 from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 
 def walked(**feet):

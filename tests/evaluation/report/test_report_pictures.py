@@ -11,7 +11,7 @@ from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.animation import save_animation
 from springfoot.evaluation.report.gait_figure import save_gait_figure
 from springfoot.gait import human_gait
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.gait import GRAVITY, human_gait
 from springfoot.gait.people import scores as score
-from springfoot.gait.people.contacts import PERCENT
+from springfoot.gait.people.gait_events import PERCENT
 
 PHASE = PERCENT / 100
 WAVE = np.sin(2 * np.pi * PHASE)

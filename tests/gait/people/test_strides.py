@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.gait.people.contacts import Contacts
+from springfoot.gait.people.gait_events import Contacts
 from springfoot.gait.people.motion_files import Trial
 from springfoot.gait.people.strides import MeasuredWalk, cut_strides, merge_trials
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.gait.people.contacts import PERCENT, find_contacts, find_steps, next_after, on_percent, sample
+from springfoot.gait.people.gait_events import PERCENT, find_contacts, find_steps, next_after, on_percent, sample
 
 TICK = 0.01
 

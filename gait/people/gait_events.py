@@ -36,6 +36,7 @@ class Contacts:
         begin = self.heel_strikes[:-1]
         end = self.heel_strikes[1:]
         toe_off = next_after(self.toe_offs, begin)
+        # A stride without a toe-off before its end is not complete.
         keep = (begin >= after) & (toe_off < end)
         return np.stack([begin, toe_off, end], -1)[keep]
 
@@ -48,12 +49,14 @@ def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first:
     shorter than `SHORTEST_CONTACT` dropped. Times lie between samples, where the force crosses the threshold linearly.
     """
     force = np.asarray(vertical_force, float)
+    # Close the gaps of bounces within stance, and only then drop the contacts of scuffs.
     loaded = _without_short_runs(force > threshold, False, SHORTEST_FLIGHT / tick)
     loaded = _without_short_runs(loaded, True, SHORTEST_CONTACT / tick)
     rises = np.flatnonzero(~loaded[:-1] & loaded[1:])
     falls = np.flatnonzero(loaded[:-1] & ~loaded[1:])
 
     def crossing(before: NDArray) -> NDArray:
+        """Return the times [s] of crossings between the samples `before` and the next ones."""
         fraction = (threshold - force[before]) / (force[before + 1] - force[before])
         return first + tick * (before + fraction)
 
@@ -86,24 +89,27 @@ def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> 
     Sample k of the series belongs to time first + k * tick; times outside it take the value of its end.
     """
     position = np.clip((np.asarray(times) - first) / tick, 0, len(series) - 1)
-    before = np.minimum(position.astype(int), max(len(series) - 2, 0))
+    before = np.minimum(position.astype(int), max(len(series) - 2, 0))  # 0 for a series of a single sample
+    # One fraction a time, for all columns of the series.
     fraction = (position - before).reshape(position.shape + (1,) * (series.ndim - 1))
     after = np.minimum(before + 1, len(series) - 1)
     return series[before] * (1 - fraction) + series[after] * fraction
 
 
 def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0) -> NDArray:
-    """Return curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals from `begin` to `end` [s]."""
+    """Return curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals.
+
+    They last from `begin` (S,) to `end` (S,) [s]; `tick` and `first` as of `sample`.
+    """
     times = begin[:, None] + (end - begin)[:, None] * (PERCENT / 100)
     return sample(series, times, tick, first)
 
 
 def _without_short_runs(flags: NDArray, value: bool, shortest: float) -> NDArray:
     """Return `flags` with inner runs of `value` shorter than `shortest` samples inverted; runs at the ends stay."""
-    edges = np.flatnonzero(flags[:-1] != flags[1:]) + 1
-    bounds = np.concatenate([[0], edges, [len(flags)]])
+    changes = np.flatnonzero(flags[:-1] != flags[1:]) + 1  # the first samples of all runs but the first one
     result = flags.copy()
-    for start, stop in pairwise(bounds[1:-1]):
+    for start, stop in pairwise(changes):
         if flags[start] == value and stop - start < shortest:
             result[start:stop] = not value
     return result
