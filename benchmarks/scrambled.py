@@ -80,14 +80,14 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
         threads=1,
         constants=constants,
         people_file=people_file,
-        log=folder / "paid.json",
+        log=folder / "costs.json",
     )
     search.ask(lambda progress: None)
     walking = folder / "walking.json"
     known = {"predicted": asdict(leg_constants("planned", "people", follows_plan=True))}
     write_constants(walking, {"constants": known, "found_by": {}})
     replace(search, start="", pays="effort", constants=walking, log=folder / "effort.json").ask(lambda progress: None)
-    paid = [json.loads((folder / name).read_text(encoding="utf-8"))["paid"] for name in ("paid.json", "effort.json")]
+    costs = [json.loads((folder / name).read_text(encoding="utf-8"))["costs"] for name in ("costs.json", "effort.json")]
     preset = PRESETS["predict"]
     settings = replace(preset.environment, people_file=file)
     train(replace(preset, timesteps=how.timesteps, threads=1, environment=settings), folder / "run")
@@ -95,7 +95,7 @@ def done(how: Scrambled, folder: Path, people_file: Path | None) -> dict[str, by
     given: dict[str, Any] = {"people_file": file} if file else {}
     walked = record(*policy_and_settings("predicted", given), name="predicted", episodes=how.episodes, threads=1)
     return {
-        "what candidates pay": json.dumps(paid).encode(),
+        "what candidates pay": json.dumps(costs).encode(),
         "constants": json.dumps([read_constants(each)["constants"] for each in (constants, walking)]).encode(),
         "weights": b"".join(np.ascontiguousarray(each).tobytes() for each in (*policy.weights, *policy.biases)),
         "series": b"".join(np.ascontiguousarray(values).tobytes() for values in walked.series.values()),

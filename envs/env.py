@@ -303,7 +303,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
 
 
 def _info(values: NDArray, termination: np.integer) -> dict[str, Any]:
-    """NumPy numbers by name."""
+    """Return the info of one environment: NumPy numbers by name, from `StepResult.values` (len(INFO),) and the code of
+    the termination."""
     info: dict[str, Any] = dict(zip(INFO, values, strict=False))  # in every step: strict would take half as long again
     info["termination"] = termination
     return info

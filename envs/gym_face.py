@@ -38,7 +38,7 @@ class Face:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        """Return the spec of `gym.make` or `make_vec`; its `max_episode_steps` are those of the settings."""
+        """Keep a copy of the spec, with the settings' `max_episode_steps`."""
         self._spec = copy(spec)
         if self._spec is not None:
             self._spec.max_episode_steps = self.settings.max_episode_steps
@@ -71,10 +71,13 @@ def spaces_of(biped: Biped) -> tuple[Box, Box]:
     return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
 
 
-def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the options of a reset; raise `SpringfootError` for an unknown one or a bad start."""
+def check_options(options: dict[str, Any] | None, further: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the options of a reset, none for None; raise `SpringfootError` for an unknown one or a bad start.
+
+    `further` are names of options beside `start` and those of `DRAWN`, which this interface allows.
+    """
     options = {} if options is None else options
-    allowed = ("start", *DRAWN, *more)
+    allowed = ("start", *DRAWN, *further)
     if not isinstance(options, Mapping):
         raise SpringfootError(f"reset options must be a dictionary, got {quoted(options)}")
     for name in options:
@@ -86,7 +89,10 @@ def check_options(options: dict[str, Any] | None, more: tuple[str, ...] = ()) ->
 
 
 def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
-    """Return the bodies and speeds of N environments in the options of a reset: (N,) by the names of `DRAWN`."""
+    """Return the heights, masses and speeds in the options of a reset, by the names of `DRAWN`: (N,), N being `num`.
+
+    Raises `SpringfootError` for a value that is neither a number nor one for each environment.
+    """
     given = {}
     for name in DRAWN:
         if name in options:

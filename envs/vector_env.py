@@ -17,7 +17,7 @@ from .batch.biped_batch import Biped
 from .batch.step_result import INFO, StepResult, report_start
 from .gym_face import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
 from .settings.checks import MOST_ENVIRONMENTS, check_seed
-from .settings.feet import each_foot
+from .settings.feet import foot_pairs
 from .settings.settings import BipedSettings, settings_from
 
 _NAMES = (*INFO, "termination")
@@ -58,8 +58,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
     ) -> None:
         require_count("num_envs", num_envs, most=MOST_ENVIRONMENTS)
         require_count("num_threads", num_threads, most=MOST_THREADS)
-        own, feet = each_foot(settings, num_envs)
-        self.settings = _limit_steps(settings_from(**own), max_episode_steps)
+        settings_of_all, feet = foot_pairs(settings, num_envs)
+        self.settings = _limit_steps(settings_from(**settings_of_all), max_episode_steps)
         self.num_envs = num_envs
         self.render_mode = check_render_mode(render_mode)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
@@ -94,7 +94,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         given = bodies_and_speeds(chosen, self.num_envs)
         mask = self._reset_mask(chosen.get("reset_mask"))
         ids = np.flatnonzero(mask)
-        seeds = self._spread(seed)
+        seeds = self._seeds_of_all(seed)
         generators = self.biped.generators
         for index in ids.tolist():
             if seeds[index] is not None or generators[index] is None:
@@ -106,7 +106,11 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         return self.biped.observe(), _infos(self._start_values(), np.zeros(self.num_envs, int), mask)
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        """Hold the stiffnesses of `actions` (N, 4) during a step, 20 ms by default."""
+        """Hold the stiffnesses of `actions` (N, 4) during a step, 20 ms by default.
+
+        Environments whose episode is over are reset as `autoreset_mode` says: in this step in place of a step of their
+        own, or with "SameStep" at the end of the step in which it ends.
+        """
         self._check_running()
         resetting = self._over
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
@@ -117,7 +121,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         else:
             self._over = ended
         if np.count_nonzero(resetting):
-            final = _final(result, ended) if same_step else {}
+            final = _final_infos(result, ended) if same_step else {}
             self._restart(np.flatnonzero(resetting))
             observation = self.biped.observe()
             values = np.where(resetting[:, None], self._start_values(), result.values)
@@ -147,6 +151,8 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
     def _restart(
         self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
     ) -> None:
+        """Begin episodes in environments `ids` (K,); `start` as in the options, `given` (N,) by the names of
+        `DRAWN`."""
         given = {name: values[ids] for name, values in (given or {}).items()}
         self.biped.reset(ids, [None] * len(ids), start, given)  # each goes on with its generator
 
@@ -162,16 +168,17 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
             raise SpringfootError(f"no episode is running in environments {which}: call reset() before step()")
         self._started = True
 
-    def _spread(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        """Return one seed for each environment."""
+    def _seeds_of_all(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """Return N seeds from the argument `seed` of a reset: None for all, s + i for an integer s, or those of a
+        list."""
         if seed is None:
             return [None] * self.num_envs
         if not isinstance(seed, (Sequence, np.ndarray)) or isinstance(seed, str):
-            first = check_seed(seed) or 0
+            first = check_seed(seed) or 0  # `or 0` is for the type alone: it is not None here
             return [first + index for index in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise SpringfootError(f"seed must be an integer or a list of {self.num_envs}, got {len(seed)} seeds")
-        return [check_seed(each) for each in seed]
+        return [check_seed(one_seed) for one_seed in seed]
 
     def _reset_mask(self, mask: Any) -> NDArray:
         """Return the mask (N,) of a reset, checked; True everywhere for None."""
@@ -204,8 +211,11 @@ def _infos(values: NDArray, termination: NDArray, mask: NDArray | None = None) -
     return infos
 
 
-def _final(result: StepResult, ended: NDArray) -> dict[str, Any]:
-    """Return the last observation and info of the episodes that ended in this step."""
+def _final_infos(result: StepResult, ended: NDArray) -> dict[str, Any]:
+    """Return the last observation and info of the episodes that ended in this step, in Gymnasium's form.
+
+    `ended` (N,) is their mask; environments that go on have None for an observation.
+    """
     last = np.full(len(ended), None, dtype=object)
     for index in np.flatnonzero(ended):
         last[index] = result.observation[index].copy()
@@ -218,6 +228,7 @@ def _final(result: StepResult, ended: NDArray) -> dict[str, Any]:
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    """Return the autoreset mode of this value; raise `SpringfootError` for an unknown one."""
     try:
         return AutoresetMode(mode)
     except ValueError:
@@ -226,7 +237,10 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def _limit_steps(settings: BipedSettings, max_episode_steps: int | None) -> BipedSettings:
-    """Return settings with the limit in them, as Gymnasium puts no TimeLimit around a vector entry point."""
+    """Return settings with episodes of `max_episode_steps` at most, None for no such limit.
+
+    Gymnasium puts no TimeLimit around a vector entry point, so the limit becomes one of `episode_seconds`.
+    """
     if max_episode_steps is None:
         return settings
     limit = require_count("max_episode_steps", max_episode_steps) * settings.step_seconds

@@ -37,7 +37,7 @@ from ..task.pushes import Pushes
 from ..task.reward import Task
 from .exact_state import ExactState
 from .step_kernels import EnvironmentRows, Tables, begin_step, begin_window, end_step, end_window, next_window
-from .step_result import StepResult, Tick, empty_outcome, held_control
+from .step_result import StepResult, Tick, empty_outcome, stiffness_and_rest
 
 
 class Biped(ExactState):
@@ -72,6 +72,7 @@ class Biped(ExactState):
         feet: Sequence[Feet] | None = None,
         right_legs: Sequence[LegConstants] | None = None,
     ):
+        # A copy of the batch is made of these arguments (`ExactState`).
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
         self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
         self._arguments["right_legs"] = right_legs
@@ -83,11 +84,13 @@ class Biped(ExactState):
         """Control windows in one step."""
         self.on_tick: Callable[[Tick], None] | None = None
         self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
-        own = next(walk for walk in self.walks if walk.speed == settings.speed)
-        self.body = own.body
-        self.target = own.target
-        self.plan = own.plan
-        self.constants = own.constants
+        """Reference walks of the left legs at each tabulated speed; those of the right legs, none if they are the
+        same."""
+        walk_at_speed = next(walk for walk in self.walks if walk.speed == settings.speed)
+        self.body = walk_at_speed.body
+        self.target = walk_at_speed.target
+        self.plan = walk_at_speed.plan
+        self.constants = walk_at_speed.constants
         table = list(rows(self.walks))
         right = list(rows(self.right_walks))
         speeds = np.array([walk.speed for walk in self.walks])
@@ -96,6 +99,7 @@ class Biped(ExactState):
         incline = slope_table(slope or slope_constants())
         self._legs = LegController(table, self.subjects, right)
         planned, stiffness = foot_tables(settings, (*table, *right))
+        # Tables have a row for each variant and speed, and as many again for right legs of their own.
         rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
         self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
         self._decisions = DecisionTimes(settings, self.target, self.subjects.rows)
@@ -184,7 +188,8 @@ class Biped(ExactState):
         start: float | str | None = None,
         given: Mapping[str, NDArray] | None = None,
     ) -> None:
-        """Begin a new episode in environments `ids`, walking in single support as people do, or standing.
+        """Begin a new episode in environments `ids`: walking, at a random phase of single support or at a given phase,
+        or standing.
 
         Args:
             ids: (K,) indices.
@@ -197,7 +202,7 @@ class Biped(ExactState):
         if len(ids) == 0:
             return
         start = self.settings.start if start is None else start
-        if start == "standing" != self.settings.start:
+        if start == "standing" and self.settings.start != "standing":
             raise SpringfootError(
                 f"a reset can start 'standing' where the setting start is 'standing' too, got {self.settings.start!r}"
             )
@@ -208,8 +213,13 @@ class Biped(ExactState):
             random = self._random[index]
             if seed is not None or random is None:
                 random = self._random[index] = np.random.default_rng(seed)
-            drawn = random_phase(random)
-            phase[row] = drawn if start == "random" else off_phase(drawn) if start == "standing" else start
+            drawn = random_phase(random)  # in every case, so that the generator is used alike
+            if start == "random":
+                phase[row] = drawn
+            elif start == "standing":
+                phase[row] = off_phase(drawn)  # at which the body will set off
+            else:
+                phase[row] = start
             if self.settings.start_noise:
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
             self._pushes.reset(index, random)
@@ -224,7 +234,8 @@ class Biped(ExactState):
         self._task.rows["force"][ids] = 0.0
         posture = walking_posture(self._start, self.subjects, ids, phase)
         if self._standing is not None:
-            posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing") or posture
+            standing_posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing")
+            posture = standing_posture or posture  # None for bodies that walk
         place(self._simulation, self.subjects, ids, posture, noise)
         self._simulation.measure(ids)
 
@@ -258,7 +269,9 @@ class Biped(ExactState):
         return self._judge(step)
 
     def _decode(self, actions: NDArray, active: NDArray | None) -> "_Step":
-        """Begin a step: return the environments that run, and the factors of their actions on the stiffness."""
+        """Return the step that is to be taken: the environments that run, and the factors of their actions on the
+        stiffness. Raises `SpringfootError` for bad actions, as `step`.
+        """
         running = self._everyone
         ids = None
         if active is not None and not active.all():
@@ -270,7 +283,9 @@ class Biped(ExactState):
         taken = self._decisions.take(action, running)
         if taken is None:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
-        return _Step(running, ids, self._springs.factor(taken), running, self._nobody)
+        factor = self._springs.factor(taken)
+        # Without `Standing` all bodies that run walk, and none with the fixed stiffness.
+        return _Step(running=running, ids=ids, factor=factor, walking=running, fixed=self._nobody)
 
     def _before_step(self, step: "_Step") -> None:
         """Let bodies set off or stop, change speeds, push, set the stiffness and begin the first window."""
@@ -286,7 +301,7 @@ class Biped(ExactState):
 
     def _simulate(self, step: "_Step") -> None:
         """Run the physics of one control window with the control that the springs, the legs and the stance set."""
-        if self._standing is not None:
+        if self._standing is not None:  # the springs of standing bodies replace the control of their legs and feet
             standing = step.running & ~step.walking
             bodies = self._simulation.arrays.bodies
             self._standing.drive(bodies, self._control, standing)
@@ -294,7 +309,7 @@ class Biped(ExactState):
         watched = self.on_tick is not None
         if watched:
             step.window_start = {"phase": self._legs.phase.copy(), "active": step.running.copy()}
-            step.window_start |= held_control(self._control)
+            step.window_start |= stiffness_and_rest(self._control)
         self._simulation.advance(self._control, step.ids, watched=watched)
 
     def _next_window(self, step: "_Step", window: int) -> None:
@@ -317,7 +332,7 @@ class Biped(ExactState):
                 Tick(
                     measurement=self.measurement,
                     work=self._simulation.work,
-                    fibre_moment=bodies["muscles"]["moment"][:, 0].copy(),
+                    fibre_moment=bodies["muscles"]["moment"][:, 0].copy(),  # [:, 0]: of the last window
                     muscle_work=bodies["muscles"]["delivered"][:, 0].copy(),
                     com_reference=self._task.planned_com(bodies),
                     **step.window_start,
@@ -325,22 +340,22 @@ class Biped(ExactState):
             )
 
     def _judge(self, step: "_Step") -> StepResult:
-        """End the last window: reward, observation, termination."""
+        """End the last window of the step, and return its result: reward, observation, termination."""
         outcome = empty_outcome(self.num_envs)
-        filled = tuple(outcome)
+        to_fill = tuple(outcome)
         task = self._task.options
-        ended = end_step(self._rows, self._physics, self._tables, task, step.walking, step.running, filled)
+        terminated = end_step(self._rows, self._physics, self._tables, task, step.walking, step.running, to_fill)
         self._after_window(step)
         if self.settings.sensor_noise:
-            seen = np.flatnonzero(step.running)
-            self._noise.draw(seen, [self._random[index] for index in seen])
+            running = np.flatnonzero(step.running)
+            self._noise.draw(running, [self._random[index] for index in running])
         return StepResult(
             observation=self._noise.on(outcome.observation),
             reward=outcome.reward,
             terminated=outcome.terminated,
             truncated=outcome.truncated,
             values=outcome.values,
-            termination=self._task.reasons(self._simulation.now, outcome.terminated) if ended else self._no_reason,
+            termination=self._task.reasons(self._simulation.now, outcome.terminated) if terminated else self._no_reason,
         )
 
 

@@ -39,7 +39,7 @@ class ExactState(ABC):
         Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values.
         """
         chosen = np.arange(len(self._random)) if ids is None else ids
-        generators = [None if each is None else each.bit_generator.state for each in self._random]
+        generators = [None if random is None else random.bit_generator.state for random in self._random]
         state: dict[str, Any] = {name: values[chosen] for name, values in self._numbers()}
         return state | {"generators": [generators[index] for index in chosen.tolist()]}
 
@@ -53,7 +53,7 @@ class ExactState(ABC):
         chosen = np.arange(len(self._random)) if ids is None else ids
         numbers = dict(self._numbers())
         expected = {name: (len(chosen), *values.shape[1:]) for name, values in numbers.items()}
-        for name in {*expected, "generators"} ^ set(state):
+        for name in {*expected, "generators"} ^ set(state):  # names that only one of the two has
             raise SpringfootError(f"the state does not fit these settings: {name!r} is in one of them only")
         for name, shape in expected.items():
             if np.shape(state[name]) != shape:
@@ -61,36 +61,39 @@ class ExactState(ABC):
         if len(state["generators"]) != len(chosen):
             raise SpringfootError(f"the state does not fit: {len(chosen)} generators, got {len(state['generators'])}")
         try:
-            given = {name: np.asarray(state[name]).astype(values.dtype) for name, values in numbers.items()}
-            for own in state["generators"]:
-                _generator(None, own)
+            restored = {name: np.asarray(state[name]).astype(values.dtype) for name, values in numbers.items()}
+            for generator_state in state["generators"]:
+                _generator(None, generator_state)  # raises for a bad one
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise SpringfootError(f"the state does not fit: {' '.join(str(error).split())}") from None
-        self._embody(chosen, given["control.subject.height"], given["control.subject.mass"])
+        self._embody(chosen, restored["control.subject.height"], restored["control.subject.mass"])
         for name, values in numbers.items():
-            values[chosen] = given[name]
-        for index, own in zip(chosen.tolist(), state["generators"], strict=True):
-            self._random[index] = _generator(self._random[index], own)
+            values[chosen] = restored[name]
+        for index, generator_state in zip(chosen.tolist(), state["generators"], strict=True):
+            self._random[index] = _generator(self._random[index], generator_state)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _made_anew, (type(self), self._arguments, self.state())
 
     def _numbers(self) -> Iterator[tuple[str, NDArray]]:
-        """Return names and views of all numbers that change."""
+        """Yield name and view (N, ...) of every array of numbers that changes."""
         for name, rows in self._kept.items():
             yield from _fields(name, rows)
 
 
 def _fields(name: str, rows: NDArray) -> Iterator[tuple[str, NDArray]]:
-    """Yield the numbers in an array of records, to the last level, by names that begin with `name`."""
-    if rows.dtype.names is None:
+    """Yield name and view of every field of numbers in an array of records, at all levels: `name.field.field`."""
+    if rows.dtype.names is None:  # numbers, no records
         yield name, rows
     for field in rows.dtype.names or ():
         yield from _fields(f"{name}.{field}", rows[field])
 
 
 def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
-    """Return a generator in this state: the present one if it is of that kind, else a new one."""
+    """Return a generator in `state`, that of a bit generator of NumPy's in JSON values; None for None.
+
+    It is the `present` generator, put into that state, if that is of the same kind; else a new one.
+    """
     if state is None:
         return None
     kind = getattr(np.random, state["bit_generator"])
@@ -103,6 +106,7 @@ def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | N
 
 
 def _made_anew(kind: type[ExactState], arguments: dict[str, Any], state: dict[str, Any]) -> ExactState:
-    made = kind(**arguments)
-    made.restore(state)
-    return made
+    """Return a new batch of the class `kind` with these arguments, in this state."""
+    batch = kind(**arguments)
+    batch.restore(state)
+    return batch

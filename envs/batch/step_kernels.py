@@ -59,7 +59,8 @@ class Tables(NamedTuple):
 
 @kernel
 def begin_window(rows, physics, tables, springs, walking) -> None:
-    """Begin a control window; arguments as of `begin_step`."""
+    """Begin a control window: put stiffness and rest angles of all joints into the control; arguments as of
+    `begin_step`."""
     rows = EnvironmentRows(*rows)
     physics = Physics(*physics)
     tables = Tables(*tables)
@@ -70,7 +71,10 @@ def begin_window(rows, physics, tables, springs, walking) -> None:
 
 @kernel
 def end_window(rows, physics, window, walking) -> None:
-    """End control window number `window` of the step; else as of `begin_step`."""
+    """End control window number `window` of the step: measure it, advance the phase, and keep its contact forces.
+
+    The other arguments are as of `begin_step`.
+    """
     rows = EnvironmentRows(*rows)
     physics = Physics(*physics)
     bodies = physics.bodies
@@ -144,7 +148,7 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
         outcome.truncated[i] = running[i] and not outcome.terminated[i] and tasks[i].steps >= task[0].most_steps
         any_terminated = any_terminated or outcome.terminated[i]
         if running[i]:
-            bodies[i].muscles.judged = 1
+            bodies[i].muscles.judged = 1  # the sums of the muscles' work begin anew in the next window
         else:
             outcome.reward[i] = 0.0
         decision = controls[i].decision

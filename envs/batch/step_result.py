@@ -65,7 +65,7 @@ def report(rows, controls, bodies, terms, options, values) -> None:
     """
     reports = values.view(REPORT)
     for i in range(len(rows)):
-        row = reports[i, 0]
+        row = reports[i, 0]  # the record in place of the numbers of row i
         springs = controls[i].springs
         feet = controls[i].feet
         m = bodies[i].measured
@@ -135,10 +135,10 @@ class Tick:
     """(N,) True for the environments that ran in this window."""
 
 
-def held_control(control: NDArray) -> dict[str, NDArray]:
-    """Return `stiffness` and `equilibrium` of a `Tick` from `control` (N, side, joint, 2), K and K theta_eq.
+def stiffness_and_rest(control: NDArray) -> dict[str, NDArray]:
+    """Return the fields `stiffness` and `equilibrium` of a `Tick`, K [N m/rad] and theta_eq [rad] of each joint.
 
-    The rest angle is 0 if K is 0.
+    `control` is (N, side, joint, 2), K [N m/rad] and K theta_eq [N m]. Where K is 0, theta_eq is 0.
     """
     stiffness, drive = np.moveaxis(control, -1, 0)
     rest = np.divide(drive, stiffness, out=np.zeros_like(drive), where=stiffness > 0.0)
@@ -146,7 +146,7 @@ def held_control(control: NDArray) -> dict[str, NDArray]:
 
 
 class Outcome(NamedTuple):
-    """The arrays of a `StepResult` that a kernel fills."""
+    """The arrays of a `StepResult` that the kernel `end_step` fills; shapes as there."""
 
     observation: NDArray
     reward: NDArray
@@ -175,7 +175,7 @@ def report_start(m: Measurement, leg_phase: NDArray, controlled: NDArray) -> NDA
         controlled: (N, side, 2) True where actions set the stiffness of ankle and toe.
     """
     values = np.zeros((len(leg_phase), len(INFO)))
-    rows = values.view(REPORT)[:, 0]
+    rows = values.view(REPORT)[:, 0]  # one record in place of the numbers of each row
     rows["phase"] = leg_phase
     rows["speed"] = m.com_velocity[:, 0]
     rows["controlled"] = controlled

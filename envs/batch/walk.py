@@ -35,7 +35,8 @@ def walked_steps(biped: Biped, act: Callable[[NDArray], NDArray], steps: int | N
     while active.any() and (steps is None or taken < steps):
         result = biped.step(act(observation), active)
         yield Walked(active, result)
-        ended = result.terminated if steps is not None else result.terminated | result.truncated
+        truncates = steps is None  # else `steps` replaces the length at which the settings truncate
+        ended = result.terminated | result.truncated if truncates else result.terminated
         active = active & ~ended
         observation = result.observation
         taken += 1

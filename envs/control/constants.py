@@ -101,12 +101,19 @@ def constants_name(
 
     The equilibria "angle" and "phase" share those of "planned"; a body that follows the plan has one set for all.
     """
-    name = "predicted" if follows_plan else "neutral" if equilibrium == "neutral" else "planned"
-    name = name if cadence == "people" else f"{name}, {cadence} cadence"
     if follows_plan:
-        feedforward = "people"  # not part of the name: the plan's moments are fed forward in any case
-    name = name if feedforward == "people" else f"{name}, {feedforward}'s moments"
-    return name if speed == TUNED_SPEED else f"{name}, {speed:g} m/s"
+        name = "predicted"
+    elif equilibrium == "neutral":
+        name = "neutral"
+    else:
+        name = "planned"
+    if cadence != "people":
+        name += f", {cadence} cadence"
+    if feedforward != "people" and not follows_plan:  # the plan's moments are fed forward in any case
+        name += f", {feedforward}'s moments"
+    if speed != TUNED_SPEED:
+        name += f", {speed:g} m/s"
+    return name
 
 
 def leg_constants(
@@ -137,11 +144,11 @@ def leg_constants(
 
 
 def _sets(table: Mapping[str, Any], name: str) -> dict[float, LegConstants]:
-    """Return speed [m/s] -> constants of the sets `name` and `name, SPEED m/s` in a table."""
+    """Return speed [m/s] -> constants of every set in `table` with the name "`name`" or "`name`, SPEED m/s"."""
     prefix = f"{name}, "
     unit = " m/s"
-    others = [other for other in table if other.startswith(prefix) and other.endswith(unit)]
-    names = {TUNED_SPEED: name} | {float(other.removeprefix(prefix).removesuffix(unit)): other for other in others}
+    with_speed = [key for key in table if key.startswith(prefix) and key.endswith(unit)]
+    names = {TUNED_SPEED: name} | {float(key.removeprefix(prefix).removesuffix(unit)): key for key in with_speed}
     return {
         require_within("speed", speed, PLAN_SPEED_RANGE, "m/s"): constants_from(table[name_at_speed])
         for speed, name_at_speed in names.items()
@@ -151,7 +158,7 @@ def _sets(table: Mapping[str, Any], name: str) -> dict[float, LegConstants]:
 def constants_at(sets: Mapping[float, LegConstants], speed: float) -> LegConstants:
     """Return the constants at `speed` [m/s], linear between the `sets` by speed; outside, those of the nearest set."""
     speeds = sorted(sets)
-    position = float(np.interp(speed, speeds, np.arange(len(speeds))))
+    position = float(np.interp(speed, speeds, np.arange(len(speeds))))  # among the speeds, such as 1.5
     lower = sets[speeds[int(position)]]
     weight = position - int(position)
     if weight == 0.0:
@@ -193,11 +200,11 @@ def _from_json(kind: type[Constants], values: Any) -> Constants:
         if name not in values:
             continue
         value = values[name]
-        if hint is float:
+        if hint is float:  # one number; all other fields are tuples
             checked[name] = _within(name, value)
             continue
         item_hints = get_args(hint)
-        count = len(KNOTS) if Ellipsis in item_hints else len(item_hints)
+        count = len(KNOTS) if Ellipsis in item_hints else len(item_hints)  # `tuple[float, ...]` has one for each knot
         if not isinstance(value, (list, tuple)) or len(value) != count:
             raise SpringfootError(f"{name} must be {count} numbers")
         checked[name] = tuple(_within(name, number) for number in value)
@@ -205,7 +212,10 @@ def _from_json(kind: type[Constants], values: Any) -> Constants:
 
 
 def _within(name: str, value: Any) -> float:
-    """Return the value of the constant `name` as a float; raise `SpringfootError` unless it is within its bounds."""
+    """Return the value of the constant `name` as a float.
+
+    Raises `SpringfootError` below `LEAST_STIFFNESS`, and beyond `LARGEST_CONSTANT` in either direction.
+    """
     return require_within(name, value, (LEAST_STIFFNESS.get(name, -LARGEST_CONSTANT), LARGEST_CONSTANT))
 
 

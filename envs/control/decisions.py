@@ -43,12 +43,13 @@ def _take(actions, running, events, rows):
             passed = 0  # events since the leg's heel strike
             for event in events:
                 passed += phase[side] >= event
-            held = not running[i] or (len(events) > 0 and passed == decision.stage[side])
+            no_new_event = len(events) > 0 and passed == decision.stage[side]
+            keeps_action = not running[i] or no_new_event
             if running[i]:
                 decision.stage[side] = passed
             for joint in range(2):
-                k = 2 * side + joint
-                if held:
+                k = 2 * side + joint  # of the four actions: ankle and toe of the left leg, then of the right one
+                if keeps_action:
                     decision.action[k] = decision.last_action[k]
                 elif not rows[i].feet.controlled[side, joint]:
                     decision.action[k] = 0.0

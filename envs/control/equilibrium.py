@@ -35,14 +35,16 @@ def plateau_curve(values: tuple[float, ...], plateaus: tuple[float, ...] = PLATE
 def foot_curves(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> tuple[NDArray, NDArray]:
     """Return rest angles [rad] and scheduled stiffness [N m/rad] of ankle and toe, (SAMPLES, 2) each, on `GRID`.
 
-    `settings` say which; `constants` and `walk` are a row of the tables (`reference_walk.rows`).
+    The setting `equilibrium` says which rest angles: `planned`, `angle`, `neutral`, or those of `schedule`. The
+    stiffness is that of the setting `schedule`, or `fixed_stiffness` without one. `constants` and `walk` are a row of
+    the tables (`reference_walk.rows`).
     """
     if settings.schedule is None:
         stiffness = fixed_stiffness(constants, walk.body, walk.target.foot.plateaus)
         rest = neutral(constants)
     else:
         stiffness, rest = settings.schedule.at(GRID)
-    match settings.equilibrium:
+    match settings.equilibrium:  # "phase" keeps the schedule's rest angles
         case "planned":
             rest = planned(constants, walk)
         case "angle":
@@ -64,28 +66,31 @@ def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, Refe
         rest, stiffness = foot_curves(settings, constants, walk)
         feed = foot_feed(settings, constants, walk)
         if settings.ankle_tendon is not None:
-            _bound(rest, stiffness, settings.ankle_tendon, walk, feeds=feed is not None)
+            _bound_by_tendon(rest, stiffness, settings.ankle_tendon, walk, feeds=feed is not None)
         rests.append(rest if feed is None else np.concatenate([rest, feed], axis=-1))
         stiffnesses.append(stiffness)
     return np.stack(rests), np.stack(stiffnesses)
 
 
-def _bound(rest: NDArray, stiffness: NDArray, tendon: float, walk: ReferenceWalk, *, feeds: bool) -> None:
-    """Bound the ankle's scheduled stiffness (SAMPLES, 2) [N m/rad] by its `tendon` [N m/rad] and tissue, in place.
+def _bound_by_tendon(rest: NDArray, stiffness: NDArray, tendon: float, walk: ReferenceWalk, *, feeds: bool) -> None:
+    """Bound the ankle's scheduled stiffness by that of its `tendon` [N m/rad] and tissue, in place.
 
-    Unless torques are fed beside the springs, the rest angles (SAMPLES, 2) [rad] move so that the ankle has the same
-    torque at the target's angle.
+    Unless the torques are fed beside the springs (`feeds`), the ankle's rest angles move so that its torque at the
+    target's angle stays. `rest` [rad] and `stiffness` [N m/rad] are (SAMPLES, 2), the ankle in column 0.
     """
     ankle = walk.target.mean("ankle", GRID)
     tissue = ankle_tissue_stiffness(walk.target.mean("knee", GRID), ankle)
     bounded = np.minimum(stiffness[:, 0], walk.body.stiffness_scale * (TENDON_SHARE * tendon + tissue))
     if not feeds:
+        # K' (theta_eq' - theta) = K (theta_eq - theta), theta the target's angle.
         rest[:, 0] = ankle + stiffness[:, 0] / bounded * (rest[:, 0] - ankle)
     stiffness[:, 0] = bounded
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
-    """Return ankle and toe stiffness (SAMPLES, 2) [N m/rad] of the fixed schedule, part of the tuned `constants`."""
+    """Return ankle and toe stiffness (SAMPLES, 2) [N m/rad] of the fixed schedule, part of the tuned `constants`, for
+    `body`; the ankle's five values hold on the `plateaus`.
+    """
     toe = np.full(len(GRID), constants.toe_schedule)
     return np.stack([plateau_curve(constants.ankle_schedule, plateaus), toe], axis=-1) * body.stiffness_scale
 
@@ -106,16 +111,17 @@ def planned(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     foot = target.foot
     beta = damping_times(body)
     period = constants.period_factor * walk.plan.stride_time
-    if foot.ankle_quasi_stiffness is None:
+    if foot.ankle_quasi_stiffness is None:  # a plan is the target
         flat = np.interp(GRID, [*foot.toe_flat, *foot.toe_off], [0.0, 1.0, 1.0, 0.0])  # 1 from foot flat to toe-off
         corrections = knot_curve(constants.ankle_knots_deg), flat * np.deg2rad(constants.toe_flat_deg)
         joints = zip(("ankle", "toe"), (beta[ANKLE], beta[TOE]), corrections, strict=True)
         angles = [target.mean(name, GRID) + b * target.rate(name, GRID) / period + shift for name, b, shift in joints]
         return np.stack(angles, axis=-1)
     k_ref = plateau_curve(foot.ankle_quasi_stiffness or (), foot.plateaus) * body.stiffness_scale
+    # `walk.moments` are positive in plantarflexion, the rest angle in dorsiflexion.
     lead = beta[ANKLE] * target.rate("ankle", GRID) / period - walk.moments[:, ANKLE] / k_ref
     ankle = target.mean("ankle", GRID) + constants.feedforward[ANKLE] * lead + knot_curve(constants.ankle_knots_deg)
-    return np.stack([ankle, _toe(foot, constants.toe_flat_deg)], axis=-1)
+    return np.stack([ankle, _toe_rest(foot, constants.toe_flat_deg)], axis=-1)
 
 
 def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceWalk) -> NDArray | None:
@@ -126,24 +132,25 @@ def foot_feed(settings: BipedSettings, constants: LegConstants, walk: ReferenceW
     """
     if settings.equilibrium != "planned" or walk.target.foot.ankle_quasi_stiffness is not None:
         return None
-    unit = walk.body.total_mass * walk.body.length_scale
+    unit = walk.body.total_mass * walk.body.length_scale  # of the target's moments, plantarflexion positive
     moments = [walk.target.mean(f"{joint}_moment", GRID) for joint in ("ankle", "toe")]
     return -constants.feedforward[ANKLE] * unit * np.stack(moments, axis=-1)
 
 
 def angle(target: HumanGait) -> NDArray:
-    """Return rest angles (SAMPLES, 2) [rad]: the target's ankle angle alone, and the planned toe."""
-    return np.stack([target.mean("ankle", GRID), _toe(target.foot, 0.0)], axis=-1)
+    """Return the rest angles (SAMPLES, 2) [rad] of the equilibrium "angle": the target's ankle angle alone, and a toe
+    that is straight from foot flat to toe-off."""
+    return np.stack([target.mean("ankle", GRID), _toe_rest(target.foot, 0.0)], axis=-1)
 
 
 def neutral(constants: LegConstants) -> NDArray:
-    """Return constant rest angles (SAMPLES, 2) [rad]."""
+    """Return the rest angles (SAMPLES, 2) [rad] of the equilibrium "neutral", constant over the stride."""
     return np.tile(np.deg2rad(constants.neutral_deg), (len(GRID), 1))
 
 
-def _toe(foot: FootHabits, flat_deg: float) -> NDArray:
-    """Return the rest angle of the toe over the stride (SAMPLES,) [rad]: `flat_deg` from foot flat to toe-off, else as
-    in swing."""
-    corners = [*foot.toe_flat, *foot.toe_off]
+def _toe_rest(foot: FootHabits, flat_deg: float) -> NDArray:
+    """Return the rest angle of the toe over the stride (SAMPLES,) [rad]: `flat_deg` [deg] from foot flat to toe-off,
+    else that of swing, and linear in the times of change of `foot`."""
+    corners = [*foot.toe_flat, *foot.toe_off]  # stride phases: the toe goes to `flat_deg`, and back to swing
     swing = foot.toe_swing_deg
     return np.deg2rad(np.interp(GRID, corners, [swing, flat_deg, flat_deg, swing]))

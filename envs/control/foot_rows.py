@@ -29,10 +29,18 @@ class FootLines(NamedTuple):
 def device(row, feet, theta, side, joint) -> Any:
     """Return K [N m/rad] and K theta_eq [N m] of the device at one joint; zeros without a device.
 
-    They come from the device's torque-angle line at the angle `theta` [rad], from its schedule, or from its numbers. A
-    line continues straight beyond its ends. `row` is of `CONTROL_ROW`, `feet` are `FootLines` as a plain tuple.
+    They come from the device's torque-angle line at the angle `theta` [rad], from its schedule at the leg's phase, or
+    from its numbers. A line continues straight beyond its ends.
+
+    Args:
+        row: of `CONTROL_ROW`.
+        feet: `FootLines`, as a plain tuple.
+        theta: angle of the joint [rad].
+        side: 0 for the left leg, 1 for the right one.
+        joint: 0 for the ankle, 1 for the toe.
     """
-    (lines, curves), foot = feet, row.feet
+    lines, curves = feet
+    foot = row.feet
     if foot.line[side, joint] >= 0:
         line = lines[foot.line[side, joint]]
         piece = 0
@@ -42,7 +50,7 @@ def device(row, feet, theta, side, joint) -> Any:
         return line[piece, 2], line[piece, 1] + line[piece, 2] * line[piece, 0]
     if foot.curve[side] >= 0:
         place = np.zeros(1, PLACE)[0]
-        values = np.empty(4)
+        values = np.empty(4)  # K of ankle and toe, theta_eq of ankle and toe
         place.row = foot.curve[side]
         read(curves, place, row.legs.phase[side], values)
         return values[joint], values[joint] * values[2 + joint]
@@ -50,20 +58,24 @@ def device(row, feet, theta, side, joint) -> Any:
 
 
 def foot_lines(feet: Sequence[Feet]) -> FootLines:
-    """Return the tables of N pairs of feet."""
+    """Return the tables of the devices of N pairs of feet, each line and each schedule once.
+
+    Without devices of a kind its table has one row, which no foot names: kernels take no empty tables.
+    """
     tables = _tables(feet)
     schedules = _schedules(feet)
-    lines = np.full((max(len(tables), 1), max([2, *map(len, tables)]), 3), np.inf)
+    most_points = max([2, *map(len, tables)])
+    lines = np.full((max(len(tables), 1), most_points, 3), np.inf)
     for line, table in zip(lines, tables, strict=False):
         angle, torque = np.array(table).T
-        slope = -np.diff(torque) / np.diff(angle)
-        line[: len(table)] = np.stack([angle, torque, np.append(slope, slope[-1])], -1)
+        fall = -np.diff(torque) / np.diff(angle)
+        line[: len(table)] = np.stack([angle, torque, np.append(fall, fall[-1])], -1)  # beyond its end, as before it
     curves = [np.concatenate(schedule.at(GRID), -1) for schedule in schedules] or [np.zeros((SAMPLES, 4))]
     return FootLines(lines, PhaseTable(np.stack(curves)).table)
 
 
 def _tables(feet: Sequence[Feet]) -> list[tuple[tuple[float, float], ...]]:
-    """Return the torque-angle lines of the devices of all feet, each once."""
+    """Return the torque-angle lines (angle [rad], torque [N m]) of the devices of all feet, each once."""
     joints = [joint for pair in feet for foot in pair for joint in foot.joints]
     return list(dict.fromkeys(joint.device.table for joint in joints if joint.device and joint.device.table))
 
@@ -78,20 +90,20 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
     rows = np.zeros(len(feet), FOOT)
     tables = _tables(feet)
     schedules = _schedules(feet)
-    rows["line"] = -1
+    rows["line"] = -1  # no line, no schedule
     rows["curve"] = -1
-    decided = [settings.stiffness_joints in ("both", name) for name in ("ankle", "toe")]
+    set_by_actions = [settings.stiffness_joints in ("both", name) for name in ("ankle", "toe")]
     for row, pair in zip(rows, feet, strict=True):
         for side, foot in enumerate(pair):
             if foot.schedule:
                 row["curve"][side] = schedules.index(foot.schedule)
             for index, joint in enumerate(foot.joints):
                 row["muscles"][side, index] = joint.device is None
-                row["controlled"][side, index] = decided[index] and joint.device is None
+                row["controlled"][side, index] = set_by_actions[index] and joint.device is None
                 row["in_swing"][side, index] = joint.acts_in_swing
                 rest = joint.device.rest if joint.device else joint.rest
                 row["rests"][side, index] = rest is not None
-                row["rest"][side, index] = rest or 0.0
+                row["rest"][side, index] = rest or 0.0  # 0 is not read where the plan has the rest angle
                 row["stiffness"][side, index] = joint.device.stiffness if joint.device else 0.0
                 if joint.device and joint.device.table:
                     row["line"][side, index] = tables.index(joint.device.table)

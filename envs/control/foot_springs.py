@@ -42,7 +42,8 @@ def stiffness_of(action: NDArray, settings: BipedSettings, body: Body) -> NDArra
 
 
 def _log_scale(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
-    """Return stiffness at action 0 [N m/rad], and the factor from there to the stiffness at action 1."""
+    """Return stiffness at action 0 [N m/rad], and the factor from there to the stiffness at action 1 [-], each (2,) for
+    ankle and toe."""
     low, high = stiffness_ranges(settings, body)
     return np.sqrt(low * high), np.sqrt(high / low)
 
@@ -78,9 +79,10 @@ SPRING_OPTIONS = np.dtype(
 
 @part
 def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
-    """Request new stiffness, to act after the delay.
+    """Request new stiffness of the muscles at ankles and toes, to act after the delay.
 
-    Changing K to K' under a deflection x puts 1/2 (K' - K) x^2 into the spring.
+    A body's first stiffness in an episode (`springs.fresh`) acts at once and does no work. Changing K to K' under a
+    deflection x puts 1/2 (K' - K) x^2 into the spring.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
@@ -98,6 +100,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
         subject = rows[i].subject
         angle = bodies[i].measured.angle
         for side in range(2):
+            # The rows of the right leg lie `legs.right` rows behind those of the left one.
             read(schedule[side * rows[i].legs.right :], subject.place, rows[i].legs.phase[side], scheduled)
             springs.rest_phase[side] = rows[i].legs.phase[side]
             for joint in range(2):
@@ -107,13 +110,13 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                 base = scheduled[joint] if fixed[i] or option.scheduled[joint] else option.middle[joint]
                 ratio = 1.0 if fixed[i] else factor[i, 2 * side + joint]
                 if not rows[i].feet.muscles[side, joint]:
-                    ratio = 0.0
+                    ratio = 0.0  # a device is in their place
                 before = springs.stiffness[side, joint]
                 after = base * subject.scale.torque * ratio
                 deflection = springs.equilibrium[side, joint] - angle[side, ANKLE + joint]
-                springs.requests[0, side, joint] = after
+                springs.requests[0, side, joint] = after  # [0]: of the present window
                 if springs.fresh:
-                    springs.requests[:, side, joint] = after
+                    springs.requests[:, side, joint] = after  # as if requested long before
                 if springs.fresh or springs.delay == 0:
                     springs.stiffness[side, joint] = after
                 if not springs.fresh and springs.delay == 0:
@@ -122,10 +125,10 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
 
 
 @part
-def _arrive(springs, angle):
-    """Let the request of `delay` windows ago act, count its work, and shift the past requests by one window.
+def _act_on_request(springs, angle):
+    """Set the muscles' stiffness to the one that was requested `delay` windows ago, and count the work of the change.
 
-    `springs` is of `SPRING_STATE`, `angle` (side, joint) [rad].
+    The requests then shift by one window. `springs` is of `SPRING_STATE`, `angle` (side, joint) [rad].
     """
     for side in range(2):
         for joint in range(2):
@@ -140,7 +143,11 @@ def _arrive(springs, angle):
 
 @part
 def _bound_by_tendon(row, option, angle):
-    """Lower the K of ankles to that of tendon and tissue at the joint angles `angle` (side, joint) [rad]."""
+    """Lower the K of ankles to that of tendon and tissue at the joint angles `angle` (side, joint) [rad], and count the
+    work of the change.
+
+    `row` is of `CONTROL_ROW`, `option` of `SPRING_OPTIONS`. Index 0 of the springs' arrays is the ankle.
+    """
     springs = row.springs
     for side in range(2):
         tissue = option.tissue * tissue_stiffness(angle[side, KNEE], angle[side, ANKLE])
@@ -155,8 +162,11 @@ def _bound_by_tendon(row, option, angle):
 
 @part
 def _swings(row, force, side):
-    """Return True if a leg swings: past mid-stride and unloaded. `force` is (side, contact, 2) [N]."""
-    load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]
+    """Return True if the leg of `side` swings: past mid-stride and unloaded.
+
+    `row` is of `CONTROL_ROW`; `force` (side, contact, 2) the contact forces, forward and up [N].
+    """
+    load = force[side, 0, 1] + force[side, 1, 1] + force[side, 2, 1]  # upward, on heel, ball and toe
     return row.legs.phase[side] > 0.5 and load < row.legs.gains.touchdown
 
 
@@ -171,10 +181,10 @@ def muscle_stiffness(springs, side, joint) -> float:
 
 
 @part
-def _control(row, control, feet, theta, side, joint):
-    """Put K and K theta_eq of one joint at the angle `theta` [rad], muscles and device together, into the control.
+def _put_into_control(row, control, feet, theta, side, joint):
+    """Put K and K theta_eq of one joint, muscles and device together, into `control` (side, joint, 2) of one body.
 
-    Arguments are as for `move`, `row` and `control` (side, joint, 2) of one body.
+    The other arguments are as for `envs.control.foot_rows.device`.
     """
     springs = row.springs
     muscles = muscle_stiffness(springs, side, joint)
@@ -209,7 +219,7 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
     planned = np.empty(rest.shape[-1])
     inclined = np.empty(4)
     option = options[0]
-    feeds = rest.shape[-1] > 2
+    feeds = rest.shape[-1] > 2  # torques beside the springs
     first_row = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
         springs = rows[i].springs
@@ -217,7 +227,7 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         subject = rows[i].subject
         angle = bodies[i].measured.angle
         if walking[i] and springs.delay > 0:
-            _arrive(springs, angle)
+            _act_on_request(springs, angle)
         if walking[i] and option.tendon < np.inf:
             _bound_by_tendon(rows[i], option, angle)
         for side in range(2):
@@ -231,34 +241,41 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
                 k = springs.stiffness[side, joint]
                 theta = angle[side, ANKLE + joint]
                 if walking[i]:
-                    acted = acts = springs.acts[side, joint]
+                    acted = acts = springs.acts[side, joint]  # 1 where muscles act, 0 where they are slack: before, now
                     if not foot.in_swing[side, joint]:
                         acts = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
                         springs.acts[side, joint] = acts
                     new_rest = foot.rest[side, joint] if foot.rests[side, joint] else planned[joint]
+                    # A torque beside the spring of muscles shifts their rest angle by torque / K.
                     if feeds and foot.muscles[side, joint] and not foot.rests[side, joint]:
                         new_rest += subject.scale.torque * planned[2 + joint] / k
-                    before = springs.equilibrium[side, joint] - theta
+                    before = springs.equilibrium[side, joint] - theta  # deflections
                     after = new_rest - theta
                     springs.equilibrium[side, joint] = new_rest
                     if not springs.fresh:
                         springs.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
                         springs.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
-                _control(rows[i], control[i], feet, theta, side, joint)
+                _put_into_control(rows[i], control[i], feet, theta, side, joint)
         if walking[i]:
             springs.fresh = 0
 
 
 @kernel
-def _hold(rows, bodies, control, feet, held):
-    """Let the muscles of the bodies `held` (N,) take over the K and K theta_eq in `control` (N, side, joint, 2).
+def _hold(rows, bodies, control, feet, standing):
+    """Let the muscles of standing bodies take over the K and K theta_eq that `envs.control.standing` has set.
 
     They act without delay, and the work of both changes is counted as in `stiffen` and `move`. A device, and a rest
-    angle that the foot's setting gives, stay. `rows` (N,) of `CONTROL_ROW`, `bodies` (N,) of `BODY_ROW`, `feet` a
-    `FootLines`.
+    angle that the foot's setting gives, stay.
+
+    Args:
+        rows: (N,) of `CONTROL_ROW`; `springs` is changed.
+        bodies: (N,) of `BODY_ROW`, as measured now.
+        control: (N, side, joint, 2), which is read, and then has the devices as well.
+        feet: `FootLines`, as a plain tuple.
+        standing: (N,) bool.
     """
     for i in range(len(rows)):
-        if not held[i]:
+        if not standing[i]:
             continue
         springs = rows[i].springs
         foot = rows[i].feet
@@ -280,7 +297,7 @@ def _hold(rows, bodies, control, feet, held):
                 if not springs.fresh:
                     springs.work_stiffness[side, joint] += 0.5 * (k - k_before) * before * before
                     springs.work_equilibrium[side, joint] += 0.5 * k * (after * after - before * before)
-                _control(rows[i], control[i], feet, theta, side, joint)
+                _put_into_control(rows[i], control[i], feet, theta, side, joint)
         springs.fresh = 0
 
 
@@ -309,9 +326,10 @@ class FootSprings:
         feet = feet or [settings.feet] * len(subjects.rows)
         subjects.rows["feet"] = foot_rows(settings, feet)
         self.feet = tuple(foot_lines(feet))
+        """`FootLines`, as a plain tuple for kernels."""
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)
-        self._factor = np.tile(factor, 2)
+        self._factor = np.tile(factor, 2)  # of the four actions, two for each leg
         scheduled = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
         follows = settings.equilibrium in ("planned", "angle")
         held = settings.equilibrium == "phase"
@@ -337,9 +355,9 @@ class FootSprings:
         self._springs["acts"][ids] = 1.0
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
-        """Return (N, side, 2) fixed stiffness at the legs' phases [N m/rad]."""
+        """Return the fixed stiffness of ankle and toe (N, side, 2) [N m/rad] at the phases `leg_phase` (N, side)."""
         right = self._subjects.place.copy()
-        right["row"] += self._subjects.rows["legs"]["right"]
+        right["row"] += self._subjects.rows["legs"]["right"]  # the right leg's rows lie behind the left one's
         places = zip(np.moveaxis(leg_phase, -1, 0), (self._subjects.place, right), strict=True)
         curves = [self.schedule.at(np.ascontiguousarray(phase), place) for phase, place in places]
         return np.stack(curves, 1) * self._subjects.scale["torque"][:, None, None]
@@ -351,9 +369,9 @@ class FootSprings:
         """
         return np.exp(action) if self._residual else self._factor**action
 
-    def hold(self, bodies: NDArray, control: NDArray, held: NDArray) -> None:
-        """Take over the K and K theta_eq in `control` (N, side, joint, 2) for the bodies `held` (N,).
+    def hold(self, bodies: NDArray, control: NDArray, standing: NDArray) -> None:
+        """Let the springs of the bodies `standing` (N,) take over the K and K theta_eq in `control`.
 
-        `bodies` is (N,) of `BODY_ROW`.
+        `bodies` is (N,) of `BODY_ROW`, `control` (N, side, joint, 2).
         """
-        _hold(self._subjects.rows, bodies, control, self.feet, held)
+        _hold(self._subjects.rows, bodies, control, self.feet, standing)

@@ -36,8 +36,10 @@ slow, is far slower than the plan for many steps, and its full error would make 
 FARTHEST = 0.1
 """Error of the CoM's position over the stance foot [m at 1.70 m] at which the gains' input is clipped; chosen, as
 `SLOWEST`."""
-PLANNED_SPEED, PLANNED_PLACE = 5, 6
-"""Columns of `leg_curves`: the planned CoM's speed, and its place."""
+STANCE, HIP_STIFFNESS, KNEE_STIFFNESS, HIP_DRIVE, KNEE_DRIVE, PLANNED_SPEED, PLANNED_PLACE = range(7)
+"""Columns of `leg_curves`, which explains them."""
+INCLINE_TRUNK = 3
+"""Column of `slope_table` with the held trunk pitch; columns `HIP`, `KNEE` and `ANKLE` have those joints."""
 HOLD = 0.001
 """Distance below 1 at which a leg's phase waits until its foot touches down; chosen, small against a window's 0.009."""
 
@@ -48,8 +50,8 @@ def knot_curve(knots_deg: Sequence[float]) -> NDArray:
 
 
 def slope_table(constants: SlopeConstants) -> PhaseTable:
-    """Return the change of hip, knee, ankle and held trunk pitch on a slope, over the stride, per radian: (SAMPLES,
-    4)."""
+    """Return the change of hip, knee, ankle and held trunk pitch on a slope, per radian of slope, as a table over the
+    stride with one row of four curves."""
     cosine = np.cos(2 * np.pi * GRID)
     sine = np.sin(2 * np.pi * GRID)
     joints = [a + b * cosine + c * sine for a, b, c in (constants.hip, constants.knee, constants.ankle)]
@@ -64,7 +66,12 @@ def _between(low, high, weight):
 
 @kernel
 def _follow(constants, rows):
-    """Scale the constants of the tables' rows, (R,) of `GAINS`, to the bodies of `rows`, (N,) of `CONTROL_ROW`."""
+    """Compute the gains of N bodies from the `constants` (R,) of `GAINS` of the settings' body, one for each row of the
+    tables.
+
+    The gains are linear between the two rows nearest to the commanded speed, and scale with the body. `rows` is (N,) of
+    `CONTROL_ROW`; `legs.gains` is filled.
+    """
     for i in range(len(rows)):
         subject = rows[i].subject
         gain = rows[i].legs.gains
@@ -72,7 +79,7 @@ def _follow(constants, rows):
         weight = subject.place.weight
         scale = subject.scale
         low = constants[row]
-        high = constants[row + 1 if weight > 0.0 else row]
+        high = constants[row + 1 if weight > 0.0 else row]  # the last row has no next one
         gain.touchdown = scale.mass * _between(low.touchdown, high.touchdown, weight)
         gain.rate = _between(low.rate, high.rate, weight) / scale.time
         gain.rate_gain = _between(low.rate_gain, high.rate_gain, weight) / scale.time
@@ -122,26 +129,27 @@ def drive(rows, bodies, control, table, incline) -> None:
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
         stance_torque = trunk + gain.speed_torque * too_fast
         for side in range(2):
-            stance = curves[side, 0]
-            hip = torque * curves[side, 1]
-            knee = torque * curves[side, 2]
+            stance = curves[side, STANCE]
+            hip = torque * curves[side, HIP_STIFFNESS]
+            knee = torque * curves[side, KNEE_STIFFNESS]
+            # By how much the CoM is farther ahead of the other leg's ankle than planned.
             ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
             shift = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
             feedback = stance * stance_torque + (1.0 - stance) * hip * shift
             control[i, side, HIP, 0] = hip
-            control[i, side, HIP, 1] = torque * curves[side, 3] + feedback
+            control[i, side, HIP, 1] = torque * curves[side, HIP_DRIVE] + feedback
             control[i, side, KNEE, 0] = knee
-            control[i, side, KNEE, 1] = torque * curves[side, 4]
+            control[i, side, KNEE, 1] = torque * curves[side, KNEE_DRIVE]
             if subject.slope != 0.0:  # a slope moves the targets of hips, knees and trunk
                 read(incline, first_row, legs.phase[side], inclined)
-                lean = stance * gain.trunk_stiffness * inclined[3]
+                lean = stance * gain.trunk_stiffness * inclined[INCLINE_TRUNK]
                 control[i, side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
                 control[i, side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
 
 
 @part
 def _load(force):
-    """Return the vertical force [N] on a foot from its contacts' forces (3, 2), forward and up."""
+    """Return the upward force [N] on a foot, the sum over heel, ball and toe of `force` (3, 2), forward and up [N]."""
     return force[0, 1] + force[1, 1] + force[2, 1]
 
 
@@ -166,7 +174,7 @@ def advance(rows, bodies, walking) -> None:
         left = legs.phase[LEFT]
         rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(m, rows[i]))
         end = (0.5 if left < 0.5 else 1.0) - HOLD  # of the right leg's stride, or of the left leg's
-        left = min(left + max(rate, 0.0), max(end, left))
+        left = min(left + max(rate, 0.0), max(end, left))  # never backwards, and not beyond `end`
         right = (left + 0.5) % 1.0
         if left > TOUCHDOWN_PHASE and _load(m.force[LEFT]) > gain.touchdown:
             left = 0.0
@@ -195,7 +203,7 @@ class LegController:
         self._subjects = subjects
         self._constants = np.array([_gains(c, walk) for c, walk in rows], GAINS)
         self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in (*rows, *right)]))
-        subjects.rows["legs"]["right"] = len(rows) if right else 0
+        subjects.rows["legs"]["right"] = len(rows) if right else 0  # rows from a left leg's curves to the right one's
         self.phase = subjects.rows["legs"]["phase"]
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
         self.phase[:] = leg_phases(np.zeros(len(self.phase)))
@@ -233,9 +241,10 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     """Return the curves over the stride by which the controller moves one leg's hip and knee, (SAMPLES, 7).
 
-    Columns: fraction of the stance leg's gains in effect, from 0 in swing to 1 in stance; hip and knee stiffness K
-    [N m/rad]; hip and knee drive torque [N m], K times the rest angle plus the fed-forward moment; the planned CoM's
-    forward speed over its mean; the planned distance of the CoM ahead of the other leg's ankle [m].
+    Columns, from `STANCE` to `PLANNED_PLACE`: fraction of the stance leg's gains in effect, from 0 in swing to 1 in
+    stance; hip and knee stiffness K [N m/rad]; hip and knee drive torque [N m], K times the rest angle plus the fed-
+    forward moment; the planned CoM's forward speed over its mean; the planned distance of the CoM ahead of the other
+    leg's ankle [m].
     """
     body = walk.body
     target = walk.target
@@ -257,6 +266,8 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         fed_forward = -constants.feedforward[joint] * walk.moments[:, joint]  # moments are positive in extension
         columns.append(stiffness)
         drives.append(stiffness * rest + fed_forward)
+    # The plan's phase is that of its step, of which a stride has two.
     planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
+    # The plan's x is from the stance ankle: in this leg's stance the other ankle is left a step length behind it.
     planned_place = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
     return np.stack([*columns, *drives, planned_speed, planned_place], axis=-1)

@@ -17,6 +17,7 @@ from ..settings.feet import FOOT_SETTINGS
 from ..settings.settings import BipedSettings, plan_file_of
 from .constants import LEAST_STIFFNESS, TUNED_SPEED, LegConstants, constants_from, constants_name, leg_constants
 
+SOUND, OTHER = LEGS
 HELD_BY_SOUND = (
     *("period_factor", "period_speed_gain", "trunk_pitch_deg", "trunk_stiffness", "trunk_damping", "speed_torque"),
     *("swing_speed_gain", "swing_place_gain"),
@@ -25,7 +26,8 @@ HELD_BY_SOUND = (
 
 
 def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
-    """Return the side of the foot to which the person has adapted, and the foot's `adapted`; None without such a foot.
+    """Return the side (0 left, 1 right) of the foot to which the person has adapted, and the foot's `adapted`; None
+    without such a foot.
 
     Raises `SpringfootError` if both feet have one, and for settings other than those of the search.
     """
@@ -35,26 +37,26 @@ def adapted_foot(settings: BipedSettings) -> tuple[int, Any] | None:
         return None
     if len(adapted) > 1:
         raise SpringfootError("left_foot and right_foot: a person adapts to one foot, the other one sound; got both")
-    wanted = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.follows_plan
-    if (name := constants_name(*wanted)) != "planned":
+    named_by = settings.equilibrium, settings.cadence, TUNED_SPEED, settings.feedforward, settings.follows_plan
+    if (name := constants_name(*named_by)) != "planned":
         raise SpringfootError(f"{FOOT_SETTINGS[adapted[0][0]]}: adapted legs are of 'planned' constants, got {name!r}")
     return adapted[0]
 
 
 def person_constants(settings: BipedSettings, speed: float, side: int) -> LegConstants:
     """Return the constants of the leg of `side` at `speed` [m/s at 1.70 m]: the tuned ones, or an adapted person's."""
-    wanted = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
-    tuned = leg_constants(*wanted, plan_file_of(settings))
+    named_by = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
+    tuned = leg_constants(*named_by, plan_file_of(settings))
     adapted = adapted_foot(settings)
     if adapted is None:
         return tuned
     adapted_side, person = adapted
     sets = committed_feet()[person][ADAPTED] if isinstance(person, str) else person
-    leg = LEGS[side == adapted_side]
-    return _moved(tuned, {float(at): _checked(legs) for at, legs in sets.items()}, leg, speed)
+    leg = OTHER if side == adapted_side else SOUND
+    return _adapted_constants(tuned, {float(at): _both_legs(legs) for at, legs in sets.items()}, leg, speed)
 
 
-def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
+def _both_legs(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
     """Return the constants of both `LEGS` from their JSON form; raise `SpringfootError` for bad ones."""
     try:
         return {leg: constants_from(legs[leg]) for leg in LEGS}
@@ -62,26 +64,32 @@ def _checked(legs: Mapping[str, Any]) -> dict[str, LegConstants]:
         raise SpringfootError(f"adapted: {error}") from None
 
 
-def _moved(
+def _adapted_constants(
     tuned: LegConstants, sets: Mapping[float, Mapping[str, LegConstants]], leg: str, speed: float
 ) -> LegConstants:
-    """Return the adapted constants of a leg at `speed` [m/s].
+    """Return the constants of a leg of an adapted person at `speed` [m/s at 1.70 m].
 
     At a speed of the `sets` they are the set's. Elsewhere they are the `tuned` ones of that speed, moved by the
     difference of adapted from tuned constants, which is linear between the speeds of the sets and constant outside.
+
+    Args:
+        tuned: constants of the leg before it adapted, at `speed`.
+        sets: speed [m/s at 1.70 m] -> constants of each of `LEGS`.
+        leg: one of `LEGS`. Both legs take the constants `HELD_BY_SOUND` of the sound leg.
+        speed: see above.
     """
     speeds = sorted(sets)
     if speed in sets:
         of_leg = asdict(sets[speed][leg])
-        return constants_from(of_leg | {name: getattr(sets[speed][LEGS[0]], name) for name in HELD_BY_SOUND})
+        return constants_from(of_leg | {name: getattr(sets[speed][SOUND], name) for name in HELD_BY_SOUND})
     values = {}
     for name, tuned_value in asdict(tuned).items():
-        source = LEGS[0] if name in HELD_BY_SOUND else leg
+        taken_from = SOUND if name in HELD_BY_SOUND else leg
         differences = [
-            np.subtract(getattr(sets[at][source], name), getattr(leg_constants("planned", "people", at), name))
+            np.subtract(getattr(sets[at][taken_from], name), getattr(leg_constants("planned", "people", at), name))
             for at in speeds
         ]
-        position = float(np.interp(speed, speeds, np.arange(len(speeds))))
+        position = float(np.interp(speed, speeds, np.arange(len(speeds))))  # among the speeds, such as 1.5
         low = int(position)
         high = min(low + 1, len(speeds) - 1)
         moved = tuned_value + differences[low] + (position - low) * (differences[high] - differences[low])

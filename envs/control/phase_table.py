@@ -27,13 +27,13 @@ def read(table, place, phase, curves) -> None:
     """Read the curves of a table at one phase, linear between samples and between two rows.
 
     Args:
-        table: (R, SAMPLES, value and rise, C) of a `PhaseTable`.
-        place: one `PLACE`, the row and the weight of the next row.
+        table: (R, SAMPLES, 2, C) of a `PhaseTable`: value at each sample, and rise to the next sample.
+        place: one `PLACE`, the row and the weight of the next row [-].
         phase: stride phase in [0, 1).
         curves: (C,), which is filled.
     """
     position = phase * SAMPLES
-    index = 0
+    index = 0  # of the sample before; also for NaN
     if position >= SAMPLES - 1:
         index = SAMPLES - 1
     elif position > 0.0:
@@ -50,11 +50,12 @@ def read(table, place, phase, curves) -> None:
 
 @kernel
 def _read_all(table, place, phase, curves):
-    """Read the curves at `phase` (M,) in [0, 1) into `curves` (M, C), the same number of phases at each place in turn.
+    """Fill `curves` (M, C) with the curves at `phase` (M,) in [0, 1).
 
-    `table` is (R, SAMPLES, value and rise, C); `place` (P,) of `PLACE`.
+    Each of the P places has M / P consecutive phases: the first M / P belong to `place[0]`, and so on. `table` is (R,
+    SAMPLES, 2, C) of a `PhaseTable`; `place` (P,) of `PLACE`.
     """
-    phases_per_place = max(len(phase) // len(place), 1)
+    phases_per_place = max(len(phase) // len(place), 1)  # without phases 0, which is no divisor
     for i in range(len(phase)):
         read(table, place[i // phases_per_place], phase[i], curves[i])
 
@@ -70,10 +71,13 @@ class PhaseTable:
         curves = curves.reshape(-1, SAMPLES, curves.shape[-1])
         rise = np.roll(curves, -1, axis=1) - curves
         self.table = np.stack([curves, rise], axis=2).astype(float)
-        """(R, SAMPLES, value and rise, C); do not write to it."""
+        """(R, SAMPLES, 2, C): value at each sample, and rise to the next sample; do not write to it."""
 
     def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
-        """Return curves (..., C) at phases (...) in [0, 1); with `place` (N,) of dtype `PLACE`, phases are (N, ...)."""
+        """Return the curves (..., C) at phases (...) in [0, 1).
+
+        `place` (N,) of dtype `PLACE` says the rows to read for phases (N, ...); by default all are of the first row.
+        """
         phase = np.asarray(phase, float, order="C")
         curves = np.empty((*phase.shape, self.table.shape[-1]))
         _read_all(self.table, place, phase.reshape(-1), curves.reshape(-1, curves.shape[-1]))

@@ -61,9 +61,11 @@ class ReferenceWalk:
 def walks_of_legs(
     settings: BipedSettings, left: Sequence[LegConstants] | None = None, right: Sequence[LegConstants] | None = None
 ) -> tuple[tuple[ReferenceWalk, ...], tuple[ReferenceWalk, ...]]:
-    """Return the walks of the left leg, and those of the right leg; the latter are none if the legs do not differ.
+    """Return the reference walks of the left leg and of the right leg, each as `reference_walks`.
 
-    `left` and `right` are leg constants in place of the committed ones, as in `reference_walks`.
+    Those of the right leg are none if the legs do not differ.
+
+    `left` and `right` are leg constants in place of the committed ones.
     """
     legs_differ = right or (left is None and adapted_foot(settings))
     return reference_walks(settings, left), reference_walks(settings, right, RIGHT) if legs_differ else ()
@@ -119,13 +121,14 @@ def _plans_moments(plan: WalkPlan) -> NDArray:
     """Return (SAMPLES, 3) the moments of the joints in `FED` by inverse dynamics of the plan [N m], without harmonics
     above `FED_HARMONICS`, as they jump where feet land and leave."""
     by_joint = planned_moments(plan, GRID)
-    waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)
+    waves = np.fft.rfft(np.stack([by_joint[joint] for joint in FED], -1), axis=0)  # over the stride, [0] the mean
     waves[FED_HARMONICS + 1 :] = 0.0
     return np.fft.irfft(waves, len(GRID), axis=0)
 
 
 def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, ReferenceWalk]]:
-    """Yield constants and walk of each row of a table: all speeds of the first variant, then of the next."""
+    """Yield leg constants and walk of each row of a table: all speeds of the constants' first variant, then of the
+    next."""
     for variant, walk in product(range(len(walks[0].constants) if walks else 0), walks):
         yield walk.constants[variant], walk
 
@@ -151,11 +154,12 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
         slow = min(slow, SLOW_SPEED * unit)
     if slow == fast:
         return np.array([speed])
-    first = floor(slow / unit / SPACING + 1e-9)
+    first = floor(slow / unit / SPACING + 1e-9)  # 1e-9: a speed that is a multiple but for rounding needs no other one
     last = ceil(fast / unit / SPACING - 1e-9)
     multiples = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
     least, most = PLAN_SPEED_RANGE
-    return np.array(sorted({*(min(max(at, min(slow, least)), max(fast, most)) for at in multiples), speed}))
+    within = {min(max(at, min(slow, least)), max(fast, most)) for at in multiples}
+    return np.array(sorted(within | {speed}))
 
 
 @lru_cache(maxsize=256)

@@ -112,8 +112,9 @@ def _switch(rows, bodies, running, time, stop_at):
 
 
 @part
-def _draw(held, m):
-    """Move the rest angles of the hips until their torque takes over the push of the feet against each other.
+def _take_over_push(held, m):
+    """Move the rest angles of the hips (`held.draw`) by a window's part, until the hips' torque takes over the push of
+    the feet against each other.
 
     `held` is of `HELD`, `m` the measurement of one body.
     """
@@ -127,7 +128,7 @@ def _draw(held, m):
 
 @kernel
 def _drive(rows, bodies, control, standing):
-    """Put stiffness [N m/rad] and drive torque [N m] of bodies `standing` (N,) into the control.
+    """Put stiffness [N m/rad] and drive torque [N m] of all joints of bodies `standing` (N,) into the control.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `held` is changed.
@@ -138,10 +139,10 @@ def _drive(rows, bodies, control, standing):
     for i in range(len(rows)):
         if not standing[i]:
             continue
-        held = rows[i].held
+        held = rows[i].held  # the springs that hold the body
         m = bodies[i].measured
         if held.mode == STOPPED:
-            _draw(held, m)
+            _take_over_push(held, m)
         ahead = m.com[0] - 0.5 * (m.ankle[0, 0] + m.ankle[1, 0]) - held.place
         trunk_torque = TRUNK_STIFFNESS * (m.base[2] - held.pitch) + TRUNK_DAMPING * held.time * m.base_velocity[2]
         for side in range(2):
@@ -199,9 +200,11 @@ class Standing:
         held["place"][ids] = STAND_COM * held["length"][ids]
         if not standing:
             return None
-        held["rest"][ids, :, ANKLE] += slope[:, None]
+        held["rest"][ids, :, ANKLE] += slope[:, None]  # feet on the slope below upright legs
         angle = held["rest"][ids]
         pitch = held["pitch"][ids]
+        # `_drive` adds TRUNK_FREE x pitch: the hips' rest angle is then that of the thigh to the vertical plus the
+        # pitch.
         held["rest"][ids, :, HIP] += (1.0 - TRUNK_FREE) * pitch[:, None]
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
@@ -230,7 +233,7 @@ class Standing:
             command(ids, np.minimum(subjects.speed[ids], SLOW_SPEED * held["time"][ids]))
         ids = new[STOPPED]
         held["rest"][ids] = m.angle[ids]
-        held["rest"][ids, :, HIP] -= TRUNK_FREE * m.base[ids, 2, None]
+        held["rest"][ids, :, HIP] -= TRUNK_FREE * m.base[ids, 2, None]  # which `_drive` adds: base[2] is the pitch
         held["draw"][ids] = 0.0
         held["rest"][ids, :, KNEE] += STOP_KNEE
         held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]

@@ -53,13 +53,13 @@ def _locate(ids, speeds, first, subjects):
     last = len(speeds) - 1
     for i in ids:
         equal_speed = subjects[i].speed / subjects[i].scale.time  # of the settings' body
-        lower = 0
+        lower = 0  # index of the tabulated speed below, so that a next one follows if there are two
         while lower < last - 1 and equal_speed >= speeds[lower + 1]:
             lower += 1
         weight = 0.0
         if last > 0:
             weight = min(max((equal_speed - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
-        if weight == 1.0:
+        if weight == 1.0:  # at the next speed itself, whose row alone is then read
             lower = lower + 1
             weight = 0.0
         subjects[i].place.row = first[i] + lower
@@ -135,7 +135,7 @@ class Subjects:
         return self._embody(ids, [replace(self._home, height=h, mass=m) for h, m in sizes])
 
     def _embody(self, ids: NDArray, bodies: Sequence[Body]) -> list[int]:
-        """Give environments `ids` these bodies; return the indices with a changed body."""
+        """Give environments `ids` (K,) these K bodies; return the indices of those with a changed body."""
         changed = []
         for index, body in zip(ids.tolist(), bodies, strict=True):
             if body != self.bodies[index]:
@@ -143,7 +143,7 @@ class Subjects:
                 self.bodies[index] = body
                 length = body.height / self._home.height
                 mass = body.mass / self._home.mass
-                self.scale[index] = length, sqrt(length), mass, mass * length
+                self.scale[index] = length, sqrt(length), mass, mass * length  # the fields of `SCALE`
                 self.rows["subject"][["height", "mass"]][index] = body.height, body.mass
         return changed
 
@@ -191,14 +191,14 @@ class Subjects:
         if ranges["speed"]:
             values["speed"] = random.uniform(*ranges["speed"])
         values |= given
-        for last in range(MOST_DRAWS, 0, -1):
+        for draws_left in range(MOST_DRAWS, 0, -1):
             drawn = {name: random.uniform(*ranges[name]) for name in ("height", "mass") if ranges[name]}
             chosen = values | drawn | given
             try:
                 body = replace(self._home, height=chosen["height"], mass=chosen["mass"])
                 break
             except SpringfootError:
-                if last == 1 or not drawn.keys() - given.keys():
+                if draws_left == 1 or not drawn.keys() - given.keys():  # another draw would give the same body
                     raise
         self._check(body, values["speed"])
         return body, values["speed"]

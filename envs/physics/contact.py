@@ -31,17 +31,17 @@ SOLE_CONTACT = {"solref": (0.015, 1.0), "solimp": (0.9, 0.95, 0.003)}
 
 
 def geom_name(contact: str, side: str) -> str:
-    """Return name of a foot's contact sphere."""
+    """Return the name of a foot's contact sphere, `contact` being one of `CONTACTS`."""
     return f"{contact}_{side}"
 
 
 def ground_name(side: str) -> str:
-    """Return name of the ground below a foot: a plane, moved from outside (mocap)."""
+    """Return the name of the ground below a foot: a plane, moved from outside (mocap)."""
     return f"ground_{side}"
 
 
 def contact_offsets(body: Body) -> dict[str, tuple[float, float, float]]:
-    """Centre (forward, up) [m] in its segment's frame, and radius [m], of each contact sphere.
+    """Return, for each of `CONTACTS`, its sphere's centre (forward, up) in the segment's frame, and radius [m].
 
     The heel is in the foot's frame (origin: ankle), ball and toe tip in the toe's frame (origin: toe joint).
     """
@@ -70,9 +70,10 @@ def add_sphere(segment: "mujoco.MjsBody", name: str, offset: tuple[float, float,
 
 
 def add_touch(spec: "mujoco.MjSpec", contact: str, side: str, body: Body, friction: float) -> None:
-    """Let a sphere touch the ground of its foot; softness scales with the body (time ~ sqrt(l), depth ~ l).
+    """Let the sphere `contact` of the foot of `side` touch the ground of that foot.
 
-    It is an explicit pair because only a pair has a time constant of its own for friction.
+    The contact's softness scales with the body (time ~ sqrt(l), depth ~ l). It is an explicit pair because only a pair
+    has a time constant of its own for friction.
     """
     kind = HEEL_CONTACT if contact == "heel" else SOLE_CONTACT
     time, ratio = kind["solref"]
@@ -81,9 +82,9 @@ def add_touch(spec: "mujoco.MjSpec", contact: str, side: str, body: Body, fricti
     spec.add_pair(
         geomname1=ground_name(side),
         geomname2=geom_name(contact, side),
-        condim=3,
+        condim=3,  # friction against sliding alone: the other three coefficients, MuJoCo's defaults, do not act
         friction=(friction, friction, 0.005, 0.0001, 0.0001),
         solref=(time * time_scale, ratio),
         solreffriction=(max(FRICTION_TIME * time_scale, 2.0 * PHYSICS_STEP), 1.0),
-        solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),
+        solimp=(soft, hard, depth * body.length_scale, 0.5, 2.0),  # the last two are MuJoCo's defaults
     )

@@ -108,7 +108,7 @@ PARTS = np.dtype(
 
 
 def parts_of(body: Body, feet: Feet = SOUND) -> NDArray:
-    """Return (1,) of `PARTS`."""
+    """Return the numbers that the energy of a body with these feet needs, (1,) of `PARTS`."""
     parts = np.zeros(1, PARTS)
     parts["upper"]["mass"] = body.trunk_mass, body.carried_mass
     parts["upper"]["inertia"] = body.trunk_inertia, body.carried_inertia
@@ -133,10 +133,10 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
         parts: (N,) of `PARTS`.
         steps: `StepRecord`.
         control: (N, 2, 4, 2), K and K theta_eq held in the window [N m/rad, N m].
-        push: (N,) [N].
-        timestep: of the physics [s].
-        torque: (N, 2, 4).
-        work: (N, 2, 4, 2), positive and negative.
+        push: (N,) horizontal force on the trunk's CoM [N].
+        timestep: time of a physics step [s].
+        torque: (N, 2, 4), of actuators and joint damping together.
+        work: (N, 2, 4, 2), positive and negative work of that torque.
         energy: (N,) of `LEDGER`.
     """
     count = steps.velocity.shape[1]
@@ -148,7 +148,7 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
             before = steps.before[i] if step == 0 else steps.velocity[i, step - 1]
             after = steps.velocity[i, step]
             for dof in range(len(after)):
-                way = 0.5 * (before[dof] + after[dof]) * timestep
+                way = 0.5 * (before[dof] + after[dof]) * timestep  # [m, rad]
                 entry.actuators += steps.actuator[i, step, dof] * way
                 entry.passive_damping += steps.passive[i, step, dof] * way
                 entry.contact += steps.constraint[i, step, dof] * way
@@ -157,7 +157,7 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
             pitch += timestep * after[2]
             for side in range(2):
                 for joint in range(4):
-                    dof = 3 + 4 * side + joint
+                    dof = 3 + 4 * side + joint  # behind the trunk's x, z and pitch
                     way = 0.5 * (before[dof] + after[dof]) * timestep
                     net = steps.actuator[i, step, dof] + steps.passive[i, step, dof]
                     torque[i, side, joint] += net / count
@@ -168,21 +168,24 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
 
 
 @kernel
-def _sum_changes(parts, control, held, angle, energy):
-    """Add to `energy` (N,) the energy that springs gain by changes of K and theta_eq under load [J].
+def _sum_changes(parts, control, control_before, angle, energy):
+    """Add to `energy` [J] what the springs gain by changes of K and theta_eq under load, as a window begins.
 
-    `parts` (N,) of `PARTS`; `control` and `held` (N, 2, 4, 2), K and K theta_eq now and before [N m/rad, N m]; `angle`
-    (N, 2, 4) [rad].
+    Args:
+        parts: (N,) of `PARTS`.
+        control: (N, 2, 4, 2), K and K theta_eq held in the window [N m/rad, N m].
+        control_before: the same of the window before; NaN where there was none.
+        angle: (N, 2, 4) at the beginning of the window [rad].
+        energy: (N,) of `LEDGER`.
     """
     for i in range(len(energy)):
         for side in range(2):
             for joint in range(4):
                 k = control[i, side, joint, 0]
-                k_before = held[i, side, joint, 0]
-                if (
-                    k + k_before > 0.0 and not parts[i].table[side, joint]
-                ):  # neither at the start of an episode (NaN) nor without a spring
-                    old = held[i, side, joint, 1] / k_before
+                k_before = control_before[i, side, joint, 0]
+                # Neither at the start of an episode (NaN is not > 0), nor without a spring, nor for a device by a line.
+                if k + k_before > 0.0 and not parts[i].table[side, joint]:
+                    old = control_before[i, side, joint, 1] / k_before  # rest angles
                     new = control[i, side, joint, 1] / k
                     old, new = old if k_before > 0.0 else new, new if k > 0.0 else old  # a slack spring has no rest
                     before = old - angle[i, side, joint]
@@ -193,9 +196,14 @@ def _sum_changes(parts, control, held, angle, energy):
 
 @part
 def _part_energy(part, x, z, x_rate, z_rate, turn, spin):
-    """Return kinetic and potential energy [J] of a part with its joint at (x, z), turned up-forward by `turn` [rad]."""
+    """Return kinetic plus potential energy [J] of one `part`, of `PART`.
+
+    Its joint is at (x, z) [m] and moves at (x_rate, z_rate) [m/s]; it is turned up-forward by `turn` [rad], at the rate
+    `spin` [rad/s].
+    """
     forward = part.com[0]
     up = part.com[1]
+    # From the joint to the CoM, in the world.
     along = forward * cos(turn) - up * sin(turn)
     above = forward * sin(turn) + up * cos(turn)
     speed = (x_rate - above * spin) ** 2 + (z_rate + along * spin) ** 2
@@ -203,17 +211,18 @@ def _part_energy(part, x, z, x_rate, z_rate, turn, spin):
 
 
 @kernel
-def _add_mechanical(parts, position, rate, energy):
-    """Set the kinetic and potential energy [J] of `energy` (N,), by kinematics as in `envs.physics.measurement`.
+def _set_mechanical(parts, position, rate, energy):
+    """Set `mechanical`, kinetic and potential energy [J], of `energy` (N,) of `LEDGER`, from positions and rates.
 
-    `parts` (N,) of `PARTS`; `position` and `rate` (N, 11), MuJoCo's coordinates [m, rad] and their rates.
+    The kinematics are those of `envs.physics.measurement`. `parts` (N,) of `PARTS`; `position` and `rate` (N, 11),
+    MuJoCo's coordinates [m, rad] and their rates: x, z and pitch of the trunk, then the joints of both legs.
     """
     for i in range(len(energy)):
         own = parts[i]
         total = 0.0
         q = position[i]
         v = rate[i]
-        for piece in range(2):
+        for piece in range(2):  # trunk, load
             total += _part_energy(own.upper[piece], q[0], q[1], v[0], v[1], -q[2], -v[2])
         for side in range(2):
             x = q[0]
@@ -223,13 +232,14 @@ def _add_mechanical(parts, position, rate, energy):
             turn = -q[2]
             spin = -v[2]
             for joint in range(4):
-                sign = -1.0 if joint == KNEE else 1.0
+                sign = -1.0 if joint == KNEE else 1.0  # a bent knee turns the shank back
                 dof = 3 + 4 * side + joint
                 turn = turn + sign * q[dof]
                 spin = spin + sign * v[dof]
                 total += _part_energy(own.leg[side, joint], x, z, x_rate, z_rate, turn, spin)
                 total += 0.5 * own.armature[side, joint] * v[dof] ** 2
                 forward, up = own.end[joint]
+                # On to the next joint.
                 along = forward * cos(turn) - up * sin(turn)
                 above = forward * sin(turn) + up * cos(turn)
                 x = x + along
@@ -243,29 +253,29 @@ def window_work(
     parts: NDArray,
     steps: StepRecord,
     control: NDArray,
-    held: NDArray,
+    control_before: NDArray,
     angle: NDArray,
     push: NDArray,
     state: tuple[NDArray, NDArray],
     timestep: float,
 ) -> WindowWork:
-    """Compute torque, work and energy of one window.
+    """Return torque, work and energy of one control window.
 
     Args:
         parts: (N,) of `PARTS`.
-        steps: MuJoCo's record.
+        steps: MuJoCo's record of the window's physics steps.
         control: (N, side, joint, 2) K [N m/rad] and K theta_eq [N m] held in the window.
-        held: as `control`, in the window before; NaN where there was none.
+        control_before: the same of the window before; NaN where there was none.
         angle: (N, side, joint) at the beginning of the window [rad].
         push: (N,) horizontal force on the trunk's CoM [N].
         state: MuJoCo's qpos and qvel at the window's end, (N, D) each.
-        timestep: of the physics [s].
+        timestep: time of a physics step [s].
     """
     num = len(parts)
     torque = np.zeros((num, len(SIDES), len(JOINTS)))
     work = np.zeros((num, len(SIDES), len(JOINTS), 2))
     energy = np.zeros(num, LEDGER)
     _sum_work(parts, steps, control, push, timestep, torque, work, energy)
-    _sum_changes(parts, control, held, angle, energy)
-    _add_mechanical(parts, *state, energy)
+    _sum_changes(parts, control, control_before, angle, energy)
+    _set_mechanical(parts, *state, energy)
     return WindowWork(torque=torque, work=work, energy=energy)

@@ -34,8 +34,13 @@ class Spring:
 
     @property
     def slack(self) -> tuple[float, float]:
-        """Return the lowest and the highest angle without torque [rad]; no joint reaches pi."""
-        return -pi if self.engages == WAYS[0] else self.rest, pi if self.engages == WAYS[1] else self.rest
+        """Return the lowest and the highest angle without torque [rad]; no joint reaches -pi or pi.
+
+        Both are `rest` for a spring that acts both ways; one that engages in dorsiflexion has no torque below it.
+        """
+        lowest = -pi if self.engages == WAYS[0] else self.rest  # dorsiflexion
+        highest = pi if self.engages == WAYS[1] else self.rest  # plantarflexion
+        return lowest, highest
 
 
 LOCK = Spring(stiffness=50_000.0, damping_time=0.01, armature=0.2)
@@ -123,7 +128,7 @@ class LegSegments:
 
 
 def leg_segments(body: Body, foot: Foot) -> LegSegments:
-    """Return the segments of the leg of `body` that ends in `foot`."""
+    """Return the segments of the leg of `body` that ends in `foot`: the body's own, times the ratios of the foot."""
     forward, below = body.foot_com
     return LegSegments(
         mass=(
@@ -154,6 +159,9 @@ def total_mass(body: Body, feet: Feet) -> float:
 
 
 def torque_range(limit: float, joint: FootJoint) -> tuple[float, float]:
-    """Return lowest and highest torque [N m] of a joint's muscles or device; `limit` is that of a sound joint's
-    muscles."""
+    """Return lowest and highest torque [N m] of a joint's muscles, or of its device, which has no limits.
+
+    `limit` is the largest torque of a sound joint's muscles [N m]. Weak muscles are weak downwards alone, which is
+    plantarflexion.
+    """
     return (-inf, inf) if joint.device else (-joint.strength * limit, limit)

@@ -98,7 +98,7 @@ class _DigestedFile:
 
 @cache
 def _warn_of_compiling(reason: str) -> None:
-    """Say, once for each reason, that the next start compiles again."""
+    """Warn, once for each `reason`, that compiled kernels cannot be kept, so that every start compiles them."""
     warnings.warn(
         f"compiled kernels cannot be kept, so that every start compiles them for half a minute: {reason}; "
         "NUMBA_CACHE_DIR names another folder for them",
@@ -113,16 +113,20 @@ def _named(function: Function) -> Function:
 
 
 def _fingerprint(function: Callable[..., Any]) -> str:
-    """Return a text that tells a function from all others: its code, and the values of all known names in it."""
+    """Return the digest of a function's code and of the values of all names in it that its module knows.
+
+    Functions that behave differently have different digests.
+    """
     code: Any = function.__code__  # type: ignore[attr-defined]
     known: dict[str, Any] = function.__globals__  # type: ignore[attr-defined]
     found = [code.co_code.hex(), repr(code.co_consts), repr(code.co_varnames), repr(code.co_names)]
-    found += [f"{name} = {_meaning(known[name])}" for name in code.co_names if name in known]
+    found += [f"{name} = {_text_of(known[name])}" for name in code.co_names if name in known]
     return sha256("\n".join(found).encode()).hexdigest()[:12]
 
 
-def _meaning(value: Any) -> str:
-    """Return a text for the value of a name in a kernel's code: equal texts for equal behaviour."""
+def _text_of(value: Any) -> str:
+    """Return a text for the value of a name in a kernel's code, equal for values with which the kernel does the
+    same."""
     if isinstance(value, Dispatcher):
         return value.py_func.__qualname__  # with its own fingerprint
     if isinstance(value, np.ndarray):

@@ -127,6 +127,7 @@ def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
     for side, own in enumerate(feet):
         leg = leg_segments(body, own)
         thigh, shank, foot, toe = leg.mass
+        # Thigh and shank point down from their joints; so their CoMs lie at negative heights.
         (_, thigh_com), (_, shank_com), (forward, up), (toe_com, _) = leg.com
         segments["part"][:, side] = (
             np.array(
@@ -155,11 +156,12 @@ def _turned(offset, c, s):
 
 @part
 def _locate(segments, position, rate, m):
-    """Compute planar forward kinematics: fill positions and rates [m, m/s, rad, rad/s] of `m`, of `MEASURED`.
+    """Fill CoM, ankles and contact points of `m`, of `MEASURED`, and the CoM's velocity, by planar kinematics [m, m/s].
 
-    `segments` of `SEGMENTS`; `position` and `rate` (11,), MuJoCo's coordinates [m, rad] and their rates. A segment is
-    turned by s, positive up-forward: a thigh's flexion, a foot's toes-up pitch. An offset (u, w) in its frame is then
-    (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world, and moves at ds/dt (-z, x).
+    Heights are above the origin of the world. `segments` of `SEGMENTS`; `position` and `rate` (11,), MuJoCo's
+    coordinates [m, rad] and their rates. A segment is turned by s, positive up-forward: a thigh's flexion, a foot's
+    toes-up pitch. An offset (u, w) in its frame is then (x, z) = (u cos s - w sin s, u sin s + w cos s) in the world,
+    and moves at ds/dt (-z, x).
     """
     hip_x = position[0]
     hip_z = position[1]
@@ -180,7 +182,7 @@ def _locate(segments, position, rate, m):
             spin += sign * rate[3 + 4 * side + joint]
             c = cos(turn)
             s = sin(turn)
-            x, z = _turned(segments.part[side, joint], c, s)
+            x, z = _turned(segments.part[side, joint], c, s)  # this segment's part in hip -> CoM
             com_x = com_x + x
             com_z = com_z + z
             com_rate_x = com_rate_x - z * spin
@@ -188,11 +190,11 @@ def _locate(segments, position, rate, m):
             if joint == ANKLE:
                 m.ankle[side, 0] = joint_x
                 m.ankle[side, 1] = joint_z
-            for k in range(3):
-                if joint == (ANKLE if k == 0 else TOE):  # the heel is on the foot
+            for k in range(3):  # heel, ball, toe
+                if joint == (ANKLE if k == 0 else TOE):  # the heel is on the foot, which turns about the ankle
                     x, z = _turned(segments.contact[k], c, s)
                     m.contact[side, k, 0], m.contact[side, k, 1] = joint_x + x, joint_z + z - segments.radius[k]
-            x, z = _turned(segments.end[joint], c, s)
+            x, z = _turned(segments.end[joint], c, s)  # on to the next joint
             joint_x = joint_x + x
             joint_z = joint_z + z
     m.com[0] = com_x
@@ -202,8 +204,11 @@ def _locate(segments, position, rate, m):
 
 
 @part
-def _above(ground, m):
-    """Make heights and upward velocities in the world relative to the ground, in place."""
+def _make_relative_to_ground(ground, m):
+    """Change heights and upward velocities of `m`, of `MEASURED`, from those in the world to those above the ground.
+
+    `ground` (3,) is the tangent of the slope [-] and the height of the ground below each foot [m].
+    """
     slope = ground[0]
     m.base[1] -= slope * m.base[0]
     m.base_velocity[1] -= slope * m.base_velocity[0]
@@ -237,7 +242,10 @@ def _read_joints(segments, plant, m):
 
 @part
 def _average(sensors, force):
-    """Average `sensors` (steps, 2, 3, 3) [N], each contact's force, into `force` (2, 3, 2), forward and up."""
+    """Fill `force` (side, contact, 2), forward and up, with the mean over physics steps of each contact's force [N].
+
+    `sensors` is (steps, side, contact, 3): forward, lateral, up [N].
+    """
     steps = len(sensors)
     for side in range(2):
         for contact in range(3):
@@ -276,10 +284,10 @@ def measure_bodies(bodies, state, sensors, actuator, velocity, warnings) -> None
             m.base[k], m.base_velocity[k] = plant.qpos[k], plant.qvel[k]
         _read_joints(segments, plant, m)
         _locate(segments, plant.qpos, plant.qvel, m)
-        _above(bodies[i].ground, m)
+        _make_relative_to_ground(bodies[i].ground, m)
         _average(sensors[i], m.force)
         work_muscles(bodies[i].muscles, m, actuator[i], velocity[i], plant.control)
         m.diverged = -1
-        for kind in range(warnings.shape[1] - 1, -1, -1):
+        for kind in range(warnings.shape[1] - 1, -1, -1):  # backwards, so that the lowest kind stays
             if warnings[i, kind] > 0:
                 m.diverged = kind

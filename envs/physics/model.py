@@ -69,25 +69,27 @@ def torque_limits(body: Body) -> np.ndarray:
 
 
 def joints_of(foot: Foot) -> tuple[FootJoint, ...]:
-    """Return the four joints of the leg that ends in `foot`, in the order of `JOINTS`; hip and knee are sound."""
+    """Return the four joints of the leg that ends in `foot`, in the order of `JOINTS`; hip and knee have muscles as a
+    sound ankle has."""
     return INTACT.ankle, INTACT.ankle, *foot.joints
 
 
 def damping_times_of(body: Body, feet: Feet) -> NDArray:
     """Return beta [s] of the actuators of both legs, (side, joint)."""
-    sound = damping_times(body)
+    of_muscles = damping_times(body)
     times = []
     for foot in feet:
-        own = [joint.device and joint.device.damping_time for joint in joints_of(foot)]
-        times.append([usual if time is None else time for usual, time in zip(sound, own, strict=True)])
+        of_devices = [joint.device and joint.device.damping_time for joint in joints_of(foot)]  # None for muscles
+        times.append([usual if time is None else time for usual, time in zip(of_muscles, of_devices, strict=True)])
     return np.array(times, float)
 
 
 def torque_ranges(body: Body, feet: Feet) -> NDArray:
     """Return the lowest and highest torque [N m] of the actuators of both legs, (side, joint, 2)."""
     limits = torque_limits(body).tolist()
-    pairs = [(torque_range(*each) for each in zip(limits, joints_of(foot), strict=True)) for foot in feet]
-    return np.array([list(leg) for leg in pairs])
+    return np.array(
+        [[torque_range(limit, joint) for limit, joint in zip(limits, joints_of(foot), strict=True)] for foot in feet]
+    )
 
 
 def armatures_of(body: Body, feet: Feet) -> NDArray:
@@ -106,11 +108,19 @@ def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray
     """Return the forward coordinate [m] of the sole's material at the contact points, up to a constant: (T, side,
     contact).
 
-    The coordinate changes when a foot slides and stays when its spheres roll. From lowest points `contact` (T, side,
-    contact, 2) [m], `base` (T, 3) and joint angles (T, side, joint) as in `envs.physics.simulation.Measurement`.
+    The coordinate changes when a foot slides and stays when its spheres roll: it is the contact point's own plus radius
+    times the angle by which the sphere has turned back.
+
+    Args:
+        body: the body, for the radii of the spheres.
+        contact: (T, side, contact, 2) lowest points of the spheres (x, z) [m].
+        base: (T, 3) hip x, z [m] and trunk pitch [rad].
+        angle: (T, side, joint) joint angles [rad].
     """
-    foot = angle[..., HIP] - base[..., None, 2] - angle[..., KNEE] + angle[..., ANKLE]  # toes up
-    turn = np.stack([foot, foot + angle[..., TOE], foot + angle[..., TOE]], axis=-1)
+    foot = angle[..., HIP] - base[..., None, 2] - angle[..., KNEE] + angle[..., ANKLE]  # toes up; base[2] is the pitch
+    turn = np.stack(
+        [foot, foot + angle[..., TOE], foot + angle[..., TOE]], axis=-1
+    )  # heel on the foot, others on the toe
     return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
@@ -195,15 +205,16 @@ def build_model(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, o
 
 
 def _load(trunk, body: Body) -> None:
-    """Add a box on the back, fixed to the trunk."""
+    """Add the body's load: a box on the back, fixed to the trunk."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
     box(load, np.array([0.075, 0.15, 0.25]) * body.length_scale)
 
 
 def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
-    """Add one leg below the trunk; its lateral offset is for the eye alone (the body is planar)."""
-    rgb = 0.15 if side == "left" else 0.0
+    """Add the leg of `side` below the trunk; its lateral offset `hip_y` [m] is for the eye alone (the body is
+    planar)."""
+    shade = 0.15 if side == "left" else 0.0
     thin = 0.035 * body.length_scale
     drop = body.ankle_height - body.toe_joint_height
     places = (
@@ -222,19 +233,22 @@ def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
         _hinge(parent, side, index, body, feet)
         segments.append(parent)
     thigh, shank, foot, toe = segments
-    bone(thigh, (0, 0), (0, -body.thigh_length), 1.4 * thin, rgb)
-    bone(shank, (0, 0), (0, -body.shank_length), thin, rgb)
+    bone(thigh, (0, 0), (0, -body.thigh_length), 1.4 * thin, shade)
+    bone(shank, (0, 0), (0, -body.shank_length), thin, shade)
     offsets = contact_offsets(body)
     add_sphere(foot, geom_name("heel", side), offsets["heel"])
     add_sphere(toe, geom_name("ball", side), offsets["ball"])
     add_sphere(toe, geom_name("toe", side), offsets["toe"])
-    bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb, colour)
-    bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, rgb, colour)
-    bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, rgb, colour)
+    bone(foot, offsets["heel"][:2], (body.ankle_to_toe_joint, -drop), 0.6 * thin, shade, colour)
+    bone(foot, (0, 0), (body.ankle_to_toe_joint, -drop), 0.6 * thin, shade, colour)
+    bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, shade, colour)
 
 
 def _segment(parent, name, pos, mass, com, inertia):
-    """Add a rigid segment with an explicit inertia."""
+    """Add a rigid segment to `parent` at `pos` (3,) [m], and return it.
+
+    `mass` [kg]; `com` forward and up in its own frame [m]; `inertia` about the CoM [kg m^2].
+    """
     segment = parent.add_body(name=name, pos=pos)
     segment.explicitinertial = True
     segment.mass = mass
@@ -244,7 +258,10 @@ def _segment(parent, name, pos, mass, com, inertia):
 
 
 def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
-    """Hang a segment of a leg on its joint, number `index` of `JOINTS`, with an orthosis that acts both ways."""
+    """Hang a segment of a leg on its joint, number `index` of `JOINTS`.
+
+    The joint has the torque limits, damping, armature and stops of that leg, and its orthosis, if that acts both ways.
+    """
     which = SIDES.index(side)
     low, high = torque_ranges(body, feet)[which, index].tolist()
     joint = JOINTS[index]
@@ -269,7 +286,10 @@ def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
 
 
 def _add_tendon(spec: mujoco.MjSpec, joint: str, orthosis: Spring | None) -> None:
-    """Add a tendon as long as the joint's angle, taut where an orthosis that acts one way engages."""
+    """Add a tendon whose length is the joint's angle [rad], taut where an orthosis that acts one way engages.
+
+    Without such an orthosis it is slack at any angle.
+    """
     tendon = spec.add_tendon(name=f"orthosis_{joint}")
     tendon.wrap_joint(joint, 1.0)
     if orthosis and orthosis.engages:

@@ -63,7 +63,7 @@ def model_text(spec: mujoco.MjSpec) -> str:
 
 
 def _in_order(body: ElementTree.Element) -> list[ElementTree.Element]:
-    """Return geoms as the compiled model numbers them: a body's own before those of its children."""
+    """Return the geoms of a body element as the compiled model numbers them: its own, then those of its children."""
     return body.findall("geom") + [geom for child in body.findall("body") for geom in _in_order(child)]
 
 
@@ -71,9 +71,12 @@ def _found(root: ElementTree.Element, tag: str) -> ElementTree.Element:
     return next(root.iter(tag))
 
 
-def _write(element: ElementTree.Element, model: MjModel, index: int, more: Mapping[str, str] = {}) -> None:
-    """Give an element its attributes of `ARRAY_OF` and `more` in full; it is element `index` of its kind."""
-    for attribute, array in {**ARRAY_OF[element.tag], **more}.items():
+def _write(element: ElementTree.Element, model: MjModel, index: int, limits: Mapping[str, str] = {}) -> None:
+    """Write all digits of the numbers of an element, which is number `index` of its kind in the compiled `model`.
+
+    Its attributes are those of `ARRAY_OF` and of `limits`, `LIMITS` for a joint that has limits.
+    """
+    for attribute, array in {**ARRAY_OF[element.tag], **limits}.items():
         value: Any = getattr(model, array)[index]
         element.set(attribute, " ".join(repr(float(number)) for number in _sequence(value)))
 

@@ -52,7 +52,7 @@ class Camera:
         """Open a renderer or a window for a model."""
         self._model = model
         if self._mode == "human":
-            other = Camera._with_window and Camera._with_window()
+            other = Camera._with_window and Camera._with_window()  # None once that camera is gone
             if other and other._window is not None and other._window.is_running():
                 raise SpringfootError(ONE_WINDOW)
             Camera._with_window = weakref.ref(self)
@@ -109,7 +109,10 @@ def _renderer(model: mujoco.MjModel) -> Any:
 
 
 def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Any, list[threading.Thread]]:
-    """Return a window, and the thread that draws it, if it has one of its own."""
+    """Return a window that shows `data`, and the thread that draws it, if it has one of its own.
+
+    Raises `SpringfootError` without a screen or OpenGL.
+    """
     others = threading.enumerate()
     try:
         import glfw

@@ -34,7 +34,10 @@ def add_scene(spec: mujoco.MjSpec) -> None:
 
 
 def bone(segment, start, end, radius: float, shade: float, colour: tuple[float, float, float] = FLESH) -> None:
-    """Add a capsule to a segment, lighter by `shade`."""
+    """Add a capsule to a segment, from `start` to `end` (forward, up) in its frame [m]; `radius` [m].
+
+    Its colour is lighter than `colour` by `shade` [0..1].
+    """
     segment.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
         fromto=(start[0], 0, start[1], end[0], 0, end[1]),

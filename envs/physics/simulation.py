@@ -85,9 +85,11 @@ class Simulation:
         self.model = built[self.feet[0]]
         self.models = [built[pair] for pair in self.feet]
         """The compiled model of each simulation."""
+        # Coordinates, their rates, no states of actuators, and two actuators for each joint, the trunk's three left
+        # out.
         if (self.model.nq, self.model.nv, self.model.na, self.model.nu) != (DEGREES, DEGREES, 0, 2 * (DEGREES - 3)):
             raise SpringfootError("a custom model must have the joints and the actuators of the default one")
-        self._own_options = model is not None
+        self._custom_model = model is not None
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
         self._built = built
         self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
@@ -116,8 +118,8 @@ class Simulation:
             "qfrc_actuator": actuator,
             "qvel": velocity,
         }
-        self._held = np.full(self._control.shape, np.nan)  # in the last window that was watched
-        self.kept = {"body": bodies, "mujoco": state, "warnings": self._batch.warning, "held": self._held}
+        self._control_before = np.full(self._control.shape, np.nan)  # in the last window that was watched; NaN for none
+        self.kept = {"body": bodies, "mujoco": state, "warnings": self._batch.warning, "held": self._control_before}
         """Name -> array with N rows, of everything that changes."""
         self.work: WindowWork
         """Torque, work and energy in the last window that was watched."""
@@ -127,7 +129,7 @@ class Simulation:
 
         Compiling a model takes about 1.5 ms. Raises `SpringfootError` for a simulation built from a custom model.
         """
-        if self._own_options:
+        if self._custom_model:
             raise SpringfootError(
                 "cannot change bodies in a simulation built from a custom model; omit `model`, "
                 "or drop height_range and mass_range"
@@ -155,13 +157,14 @@ class Simulation:
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         self._position[ids] = position
         self._turn[ids] = turn
-        self._held[ids] = np.nan
+        self._control_before[ids] = np.nan
         self._qpos[ids, :3] = base
         self._qpos[ids, 3:] = angle.reshape(len(ids), -1)
         self._qvel[ids, :3] = base_velocity
         self._qvel[ids, 3:] = velocity.reshape(len(ids), -1)
-        for state, given in ((self._qpos, base), (self._qvel, base_velocity)):
-            state[ids, 1] += self._ground[ids, 0] * given[:, 0]
+        # z above the ground -> z in the world, and its rate: + tangent of the slope x x.
+        for state, above_ground in ((self._qpos, base), (self._qvel, base_velocity)):
+            state[ids, 1] += self._ground[ids, 0] * above_ground[:, 0]
 
     def lay(self, ids: NDArray, slope: NDArray, height: NDArray) -> None:
         """Give simulations `ids` (K,) sloping ground.
@@ -174,7 +177,7 @@ class Simulation:
         for index, angle, heights in zip(ids.tolist(), slope.tolist(), height, strict=True):
             self._ground[index] = tan(angle), *heights
             self._position[index, :, 2] = heights  # mocap bodies are the grounds, in the order of SIDES
-            self._turn[index] = cos(angle / 2), 0.0, -sin(angle / 2), 0.0
+            self._turn[index] = cos(angle / 2), 0.0, -sin(angle / 2), 0.0  # quaternion of a turn about y, uphill
 
     def push(self, force: NDArray) -> None:
         """Let a horizontal force (N,), forward positive [N], act on the CoM of the trunk until the next call."""
@@ -195,29 +198,33 @@ class Simulation:
             self._roll(ids, self._record)
 
     def _roll_watched(self, ids: NDArray | None) -> None:
-        """Run the physics steps of a window and sum their work."""
+        """Run the physics steps of a window in simulations `ids` (K,), all if None, and fill `work` from their
+        record."""
         actuator = self.arrays.actuator
         velocity = self.arrays.velocity
         passive = np.zeros_like(velocity)
         constraint = np.zeros_like(velocity)
         steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), velocity, actuator, passive, constraint)
         angle = self._qpos[:, 3:].reshape(self._control.shape[:3]).copy()
-        self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))
+        self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))  # behind `before` and `pitch`
         state = self._qpos, self._qvel
         push = self._push[:, 0].copy()
         timestep = self.model.opt.timestep
-        held = self._held.copy()
-        if ids is not None:
+        control_before = self._control_before.copy()
+        if ids is not None:  # simulations that rest do no work
             still = np.setdiff1d(np.arange(self.num), ids)
-            held[still] = np.nan
+            control_before[still] = np.nan
             steps.before[still] = 0.0
             push[still] = 0.0
-        self.work = window_work(self._parts, steps, self._control, held, angle, push, state, timestep)
-        self._held[:] = self._control
+        self.work = window_work(self._parts, steps, self._control, control_before, angle, push, state, timestep)
+        self._control_before[:] = self._control
 
     def _roll(self, ids: NDArray | None, out: dict[str, NDArray]) -> None:
-        """Run the physics steps of a window and record the fields of `out`; simulations that rest keep their sensors,
-        else 0."""
+        """Run the physics steps of a window in simulations `ids` (K,), all if None.
+
+        `out` maps names of MuJoCo's fields to the arrays (N, S, numbers) that record them. For the simulations that
+        rest, the sensors stay and all other records are 0.
+        """
         if ids is None:
             self._batch.rollout(self._substeps, record=list(out), out=out)
             return
@@ -225,9 +232,9 @@ class Simulation:
             if name != SENSORS:
                 values[:] = 0.0
         if len(ids):
-            found = self._batch.rollout(self._substeps, record=list(out), ids=ids)
+            recorded = self._batch.rollout(self._substeps, record=list(out), ids=ids)
             for name, values in out.items():
-                values[ids] = found[name]
+                values[ids] = recorded[name]
 
     def measure(self, ids: NDArray | slice = slice(None)) -> Measurement:
         """Return the measurement after a reset of `ids`: their present state, no torques or contact forces."""

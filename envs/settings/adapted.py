@@ -21,16 +21,21 @@ LEGS = ("sound", "other")
 
 
 def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[str, dict[str, Any]]]:
-    """Return `adapted` of a foot of this kind in its plain form; raise `SpringfootError` for any other value.
+    """Return the checked `adapted` of a foot in plain JSON values: a name, or leg constants by speed (see above).
 
-    A named person has adapted to a foot of that kind; the foot's numbers may be others.
+    Args:
+        name: the setting, for the error.
+        kind: kind of the foot. A named person must have adapted to a foot of that kind; its numbers may be others.
+        value: the given `adapted`.
+
+    Raises `SpringfootError` for any other value.
     """
     if isinstance(value, str):
         if value not in (known := committed_feet()):
             raise SpringfootError(f"{name}: adapted must be one of {', '.join(map(repr, known))}, got {quoted(value)}")
-        if (known_kind := known[value]["kind"]) != kind:
+        if (persons_kind := known[value]["kind"]) != kind:
             raise SpringfootError(
-                f"{name}: adapted {value!r} is a person on a foot of kind {known_kind!r}, got kind {kind!r}"
+                f"{name}: adapted {value!r} is a person on a foot of kind {persons_kind!r}, got kind {kind!r}"
             )
         return value
     if not isinstance(value, Mapping) or not value:
@@ -39,11 +44,11 @@ def adapted_setting(name: str, kind: str, value: Any) -> str | dict[str, dict[st
         )
     plain = {}
     for key, legs in value.items():
-        speed = as_float(key) if not isinstance(key, str) else _number(key)
+        speed = _number(key) if isinstance(key, str) else as_float(key)
         require_within(f"{name}: adapted: speed", speed, PLAN_SPEED_RANGE, "m/s")
-        if not isinstance(legs, Mapping) or set(legs) != set(LEGS) or not all(map(_is_set, legs.values())):
+        if not isinstance(legs, Mapping) or set(legs) != set(LEGS) or not all(map(_are_leg_constants, legs.values())):
             raise SpringfootError(f"{name}: adapted at {speed:g} m/s must be {' and '.join(LEGS)}, leg constants both")
-        plain[f"{speed:g}"] = {leg: _plain(legs[leg]) for leg in LEGS}
+        plain[f"{speed:g}"] = {leg: _constants_to_json(legs[leg]) for leg in LEGS}
     return plain
 
 
@@ -71,8 +76,12 @@ def _number(text: str) -> float:
         return float("nan")
 
 
-def _is_set(values: Any) -> bool:
-    """Return True if a value maps names to numbers or to lists of numbers, all with magnitudes below 1e6."""
+def _are_leg_constants(values: Any) -> bool:
+    """Return True if a value has the form of leg constants: names -> numbers or lists of numbers, below 1e6 in size.
+
+    Names and bounds are checked by `envs.control.constants`, which stands above the settings and is not imported here;
+    1e6 is its `LARGEST_CONSTANT`.
+    """
     return isinstance(values, Mapping) and all(
         abs(as_float(number)) < 1e6
         for value in values.values()
@@ -80,8 +89,8 @@ def _is_set(values: Any) -> bool:
     )
 
 
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return leg constants with floats for numbers and lists for tuples."""
+def _constants_to_json(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return leg constants by name with floats for numbers and lists for tuples."""
     return {
         key: [float(number) for number in value] if isinstance(value, (list, tuple)) else float(value)
         for key, value in values.items()

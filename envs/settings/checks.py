@@ -32,7 +32,8 @@ MOST_PUSH = 1e5
 """Hardest push [N]; chosen."""
 SHORTEST_PUSH_INTERVAL = 0.01
 """Shortest interval of pushes [s]: a control window, in which the force is held."""
-_NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}  # NumPy's kinds
+_NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}
+"""NumPy's kinds of arrays that are no real numbers, and their names for errors."""
 MOST_ENVIRONMENTS = 1_000_000
 """Largest batch; chosen."""
 CONSTRUCTOR_ARGUMENTS = ("render_mode", "num_envs", "num_threads", "autoreset_mode")
@@ -44,15 +45,15 @@ class UnknownSettingError(SpringfootError, TypeError):
 
 
 def check_people_file(name: object) -> None:
-    """Refuse a value that is not the name of a file of people's data."""
+    """Refuse a value that is neither None nor the name of a file of people's data."""
     if name is not None:
         if not isinstance(name, str):
             raise SpringfootError(f"people_file must be the name of a file, got {quoted(name)}")
-        harmonics(Path(name))
+        harmonics(Path(name))  # raises for another kind of file
 
 
 def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
-    """Refuse human data with guide `plan`, and a file of plans with guide `people`."""
+    """Refuse the setting `human` with guide `plan` (`follows_plan`), and `plan_file` with guide `people`."""
     if follows_plan and human is not None:
         raise SpringfootError("human must be None with guide 'plan': the plan replaces human data")
     if plan_file is not None:
@@ -76,7 +77,7 @@ def check_names(given: Iterable[str], names: Sequence[str]) -> None:
 
 
 def refusing_unknown(settings: type[Settings]) -> type[Settings]:
-    """Make a dataclass of settings refuse unknown names, as `check_names` does."""
+    """Return the dataclass `settings`, changed so that it refuses unknown names, as `check_names` does."""
     init = settings.__init__
     names = [item.name for item in fields(settings)]  # type: ignore[arg-type]
 
@@ -91,8 +92,9 @@ def refusing_unknown(settings: type[Settings]) -> type[Settings]:
 
 def check_start(start: Any) -> None:
     """Refuse other values than "random", "standing" and a stride phase in [0, 1)."""
-    allowed = start in ("random", "standing") if isinstance(start, str) else is_number(start) and 0 <= start < 1
-    if not allowed:
+    named = isinstance(start, str) and start in ("random", "standing")
+    is_phase = not isinstance(start, str) and is_number(start) and 0 <= start < 1
+    if not (named or is_phase):
         raise SpringfootError(f"start must be 'random', 'standing' or a stride phase in [0, 1), got {quoted(start)}")
 
 
@@ -147,14 +149,17 @@ def check_span(name: str, value: Any, allowed: tuple[float, float], unit: str) -
 
 def check_windows(name: str, delay: float | tuple[float, ...] | None) -> None:
     """Refuse a delay, or ends of a range of delays [s], that is not a multiple of the control window."""
-    ends = delay if isinstance(delay, tuple) else () if delay is None else (delay,)
+    delays = delay if isinstance(delay, tuple) else (delay,)
+    ends = [end for end in delays if end is not None]
     if any(abs(end / CONTROL_WINDOW - round(end / CONTROL_WINDOW)) > 1e-9 for end in ends):
         raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {delay!r}")
 
 
 def check_weights(weights: Any, defaults: dict[str, float]) -> None:
-    """Refuse unknown reward terms, and weights whose sign is not that in `defaults`; a term with default 0 is a
-    cost."""
+    """Refuse unknown reward terms, and weights that make a cost of a reward or a reward of a cost.
+
+    `defaults` has the default weight of each term: positive for a reward, negative or 0 for a cost.
+    """
     if not isinstance(weights, dict):
         raise SpringfootError(f"reward_weights must map names of reward terms to numbers, got {quoted(weights)}")
     for name, weight in weights.items():
@@ -167,29 +172,31 @@ def check_weights(weights: Any, defaults: dict[str, float]) -> None:
 
 
 def real_numbers(name: str, value: Any) -> NDArray:
-    """Return `value` as a new array of float64; refuse text, dates, complex numbers, records and rows of unequal
-    length."""
+    """Return `value` as a new array of float64.
+
+    Refuses text, dates, complex numbers, records and rows of unequal length; `name` is that of the value in the error.
+    """
     try:
         array = np.asarray(value)
         if array.dtype.kind in _NO_NUMBERS or array.dtype.names is not None:
             raise SpringfootError(f"{name} must be real numbers, got {_NO_NUMBERS.get(array.dtype.kind, 'records')}")
         if array.dtype == object and any(isinstance(item, (str, bytes, complex)) for item in array.flat):
-            raise TypeError
+            raise TypeError  # NumPy would read numbers out of text
         return np.array(array, float, order="C")
     except (TypeError, OverflowError):
         refused = quoted(value)
     except SpringfootError:
-        raise
+        raise  # it is a ValueError too
     except ValueError:
         refused = "rows of unequal length"
     raise SpringfootError(f"{name} must be real numbers, got {refused}")
 
 
-def plain(value: Any) -> Any:
+def with_python_types(value: Any) -> Any:
     """Return a setting's value with Python floats for numbers (also NumPy's), tuples for lists, and copies of all
     else."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return as_float(value)
     if isinstance(value, (list, tuple)):
-        return tuple(plain(item) for item in value)
+        return tuple(with_python_types(item) for item in value)
     return deepcopy(value)

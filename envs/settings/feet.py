@@ -128,7 +128,7 @@ class FootSetting:
     @cached_property
     def foot(self) -> Foot:
         """Return the foot for the physics."""
-        return _physical(self.kind, self.numbers)
+        return _foot_of(self.kind, self.numbers)
 
 
 INTACT_FOOT = FootSetting("intact")
@@ -140,11 +140,14 @@ def foot_setting(name: str, value: Any) -> FootSetting:
 
     Raises `SpringfootError` for any other value; `name` is that of the setting.
     """
-    return value if isinstance(value, FootSetting) else FootSetting(_plain(name, value))
+    return value if isinstance(value, FootSetting) else FootSetting(_checked_foot(name, value))
 
 
-def _plain(name: str, value: Any) -> str | dict[str, Any]:
-    """Check a foot and return its plain JSON values: its kind alone, or a dictionary of kind and given numbers."""
+def _checked_foot(name: str, value: Any) -> str | dict[str, Any]:
+    """Return a checked foot in plain JSON values: its kind alone, or a dictionary of kind and given numbers.
+
+    Raises `SpringfootError`, in which `name` is the setting, for a `value` that is no foot.
+    """
     if isinstance(value, Mapping) and "kind" not in value:
         raise SpringfootError(f"{name}: a dictionary needs a 'kind', one of {', '.join(map(repr, KINDS))}")
     kind = value.get("kind") if isinstance(value, Mapping) else value
@@ -158,29 +161,35 @@ def _plain(name: str, value: Any) -> str | dict[str, Any]:
     replacements = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
     further = *replacements, "orthosis", ADAPTED
     given = {key: number for key, number in value.items() if key not in ("kind", *further)}
-    plain |= _numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, further)
+    plain |= _checked_numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, further)
     for key in replacements:
         if value.get(key) is not None:
-            joint = key.partition("_")[0]
+            joint = key.partition("_")[0]  # of "ankle_table"; a schedule is of both joints
             replaced = [other for other in plain if key == "schedule" or other.startswith(joint)]
             if both := [other for other in replaced if other in KINDS[kind]]:
                 raise SpringfootError(f"{name}: give {key} or {both[0]}, not both")
-            plain[key] = _schedule(name, value[key]) if key == "schedule" else _table(f"{name}: {key}", value[key])
+            if key == "schedule":
+                plain[key] = _checked_schedule(name, value[key])
+            else:
+                plain[key] = _checked_table(f"{name}: {key}", value[key])
     if (orthosis := value.get("orthosis")) is not None:
-        plain["orthosis"] = _orthosis(f"{name}: orthosis", orthosis)
+        plain["orthosis"] = _checked_orthosis(f"{name}: orthosis", orthosis)
     if value.get(ADAPTED) is not None:
         plain[ADAPTED] = adapted_setting(name, kind, value[ADAPTED])
-    return kind if len(plain) == 1 else plain
+    return kind if len(plain) == 1 else plain  # a word where the kind says all
 
 
-def _orthosis(name: str, value: Any) -> dict[str, Any]:
-    """Return an orthosis's plain form, checked: its numbers, and the way in which it engages, if it acts one way."""
+def _checked_orthosis(name: str, value: Any) -> dict[str, Any]:
+    """Return a checked orthosis in plain JSON values: the given numbers, and `engages` if it acts one way.
+
+    Raises `SpringfootError`, in which `name` is the setting, for a `value` that is no orthosis.
+    """
     if not isinstance(value, Mapping):
         raise SpringfootError(
             f"{name} must be a dictionary of {', '.join([*ORTHOSIS_NUMBERS, ENGAGES])}, got {value!r:.60}"
         )
     given = {key: number for key, number in value.items() if key != ENGAGES}
-    plain: dict[str, Any] = _numbers(name, "an orthosis", given, ORTHOSIS_NUMBERS, (ENGAGES,))
+    plain: dict[str, Any] = _checked_numbers(name, "an orthosis", given, ORTHOSIS_NUMBERS, (ENGAGES,))
     if (way := value.get(ENGAGES)) is not None:
         if not isinstance(way, str) or way not in WAYS:
             raise SpringfootError(f"{name}: {ENGAGES} must be one of {', '.join(map(repr, WAYS))}, got {way!r:.60}")
@@ -190,8 +199,11 @@ def _orthosis(name: str, value: Any) -> dict[str, Any]:
     return plain
 
 
-def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
-    """Check a foot's stiffness schedule and return its plain form."""
+def _checked_schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
+    """Return a foot's checked stiffness schedule in plain JSON values.
+
+    Raises `SpringfootError`, in which `name` is the setting, for other values and for stiffness out of range.
+    """
     try:
         schedule = StiffnessSchedule.from_json(value)
     except SpringfootError as error:
@@ -203,10 +215,12 @@ def _schedule(name: str, value: Any) -> dict[str, list[list[float]]]:
     return schedule.to_json()
 
 
-def _table(name: str, value: Any) -> list[list[float]]:
-    """Check a torque-angle line and return its points [deg, N m]: two or more, of ascending angle and falling
-    torque."""
-    points = [list(point) if isinstance(point, (list, tuple)) else [] for point in _listed(value)]
+def _checked_table(name: str, value: Any) -> list[list[float]]:
+    """Return the checked points [deg, N m] of a torque-angle line: two or more, of ascending angle and falling torque.
+
+    Raises `SpringfootError`, in which `name` is the setting, for any other value.
+    """
+    points = [list(_sequence_or_empty(point)) for point in _sequence_or_empty(value)]
     if not 2 <= len(points) <= MOST_POINTS or any(len(point) != 2 for point in points):
         raise SpringfootError(f"{name} must be a list of 2 to {MOST_POINTS} pairs [deg, N m], got {value!r:.60}")
     plain = [
@@ -228,18 +242,24 @@ def _table(name: str, value: Any) -> list[list[float]]:
     return plain
 
 
-def _listed(value: Any) -> Sequence[Any]:
-    """Return a list or tuple as it is, any other value as an empty tuple."""
+def _sequence_or_empty(value: Any) -> Sequence[Any]:
+    """Return a list or tuple as it is, and for any other value an empty tuple."""
     return value if isinstance(value, (list, tuple)) else ()
 
 
-def _numbers(
+def _checked_numbers(
     name: str, owner: str, given: Mapping[Any, Any], known: Mapping[str, Number], further: tuple[str, ...] = ()
 ) -> dict[str, float]:
-    """Check the given numbers and return them as floats, in the order of `known`.
+    """Return the given numbers, checked, as floats in the order of `known`.
 
-    Raises `SpringfootError`, in which `name` is the setting and `owner` the thing with the numbers, for a number out of
-    its range and for an unknown key; `further` are other keys that the error lists as valid.
+    Args:
+        name: the setting, for errors.
+        owner: the thing with the numbers in words, for errors, such as "an orthosis".
+        given: name -> number.
+        known: name -> allowed range of all numbers of that thing.
+        further: other keys that an error lists as valid.
+
+    Raises `SpringfootError` for a number out of its range and for an unknown key.
     """
     for key in given:
         if key not in known:
@@ -251,11 +271,16 @@ def _numbers(
     }
 
 
-def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
-    """Return the foot of a kind for the physics; numbers that are not given have their defaults."""
-    orthosis = given.get("orthosis")
-    value: dict[str, Any] = {**_usual(KINDS[kind]), **given}
-    of_ankle, of_toe = (None, None) if orthosis is None else _springs(_usual(ORTHOSIS_NUMBERS) | orthosis)
+def _foot_of(kind: str, given: Mapping[str, Any]) -> Foot:
+    """Return the foot of a kind for the physics, from its `given` numbers, lines, schedule and orthosis, all checked.
+
+    Numbers that are not given have their defaults.
+    """
+    value: dict[str, Any] = {**_defaults(KINDS[kind]), **given}
+    of_ankle: Spring | None = None  # springs of the orthosis
+    of_toe: Spring | None = None
+    if "orthosis" in given:
+        of_ankle, of_toe = _springs(_defaults(ORTHOSIS_NUMBERS) | given["orthosis"])
     ankle = FootJoint(orthosis=of_ankle)
     toe = FootJoint(orthosis=of_toe)
     match kind:
@@ -268,7 +293,7 @@ def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
             ankle_spring, toe_spring = _springs(value)
             ankle = FootJoint(device=ankle_spring, orthosis=of_ankle)
             toe = FootJoint(device=toe_spring, orthosis=of_toe)
-        case "adaptive" if "schedule" in given:
+        case "adaptive" if "schedule" in given:  # whose K and rest angles replace those of these springs
             ankle = FootJoint(device=Spring(), orthosis=of_ankle)
             toe = FootJoint(device=Spring(), orthosis=of_toe)
         case "adaptive":
@@ -283,11 +308,12 @@ def _physical(kind: str, given: Mapping[str, Any]) -> Foot:
     return Foot(kind=kind, ankle=ankle, toe=toe, schedule=schedule, one_piece=kind == "no_toe", **segments)
 
 
-def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
-    """Separate settings in which `left_foot` and `right_foot` may be lists, a foot for each of `num` environments.
+def foot_pairs(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], list[Feet] | None]:
+    """Return settings for all environments, and the pair of feet of each, from settings with lists of feet.
 
-    Returns the settings with the first foot of each list, and the feet of each environment, None without lists. Raises
-    `SpringfootError` for a list of another length, and for feet of a list to which different people have adapted.
+    In `settings` `left_foot` and `right_foot` may be lists, a foot for each of `num` environments. The returned
+    settings have the first foot of each list; the pairs are None without lists. Raises `SpringfootError` for a list of
+    another length, and for feet of a list to which different people have adapted.
     """
     listed = {name: settings[name] for name in FOOT_SETTINGS if isinstance(settings.get(name), (list, tuple))}
     for name, feet in listed.items():
@@ -305,13 +331,13 @@ def each_foot(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], li
     return {**settings, **first}, pairs if listed else None
 
 
-def _usual(numbers: Mapping[str, Number]) -> dict[str, float | None]:
-    """Return the defaults of the numbers."""
+def _defaults(numbers: Mapping[str, Number]) -> dict[str, float | None]:
+    """Return the default of each number by its name."""
     return {name: number.usual for name, number in numbers.items()}
 
 
 def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
-    """Return springs at ankle and toe from the values of `SPRING_NUMBERS`."""
+    """Return springs at ankle and toe from values by the names of `SPRING_NUMBERS`, `TABLES` and `ENGAGES`."""
 
     def spring(joint: str) -> Spring:
         """Return the spring of one joint: by its torque-angle line if there is one, else by its numbers."""

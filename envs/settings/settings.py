@@ -31,8 +31,8 @@ from .checks import (
     check_start,
     check_weights,
     check_windows,
-    plain,
     refusing_unknown,
+    with_python_types,
 )
 from .feet import FOOT_SETTINGS, INTACT_FOOT, FootSetting, foot_setting
 
@@ -249,11 +249,12 @@ class BipedSettings:
     @property
     def step_seconds(self) -> float:
         """Return the time of one step of the environment [s]."""
-        return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP
+        return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP  # 20 ms in all other cases
 
     @property
     def max_episode_steps(self) -> int:
-        """Return the steps after which an episode is truncated: `episode_seconds`, to the nearest step."""
+        """Return the steps after which an episode is truncated: `episode_seconds`, to the nearest step, half a step
+        down."""
         return ceil(self.episode_seconds / self.step_seconds - 0.5)
 
     def _check_draws(self) -> None:
@@ -266,8 +267,9 @@ class BipedSettings:
                 check_range(name, getattr(self, name), unit)
                 for value in getattr(self, name):
                     require_within(name, value, allowed, unit)
-        short, tall = self.height_range or 2 * (self.height,)
-        light, heavy = self.mass_range or 2 * (self.mass,)
+        short, tall = self.height_range or (self.height, self.height)
+        light, heavy = self.mass_range or (self.mass, self.mass)
+        # Not all pairs of height and mass have to make a body: bodies are drawn until one is possible.
         if light / tall**2 > BMI_RANGE[1] or heavy / short**2 < BMI_RANGE[0]:
             raise SpringfootError(
                 "height_range and mass_range must have a body with a body-mass index in "
@@ -307,11 +309,15 @@ CONDITION_SETTINGS = tuple(
 
 
 def settings_from(**values: Any) -> BipedSettings:
-    """Return settings from keyword arguments or JSON: lists become tuples, numbers become floats.
+    """Return settings from plain JSON values by name: lists become tuples, numbers become floats.
 
     Raises `SpringfootError` for a bad value, and for an unknown name one that is a `TypeError` too.
     """
-    return BipedSettings(**{name: value if name in FOOT_SETTINGS else plain(value) for name, value in values.items()})
+    converted = {
+        name: value if name in FOOT_SETTINGS else with_python_types(value)  # a foot's lists stay lists
+        for name, value in values.items()
+    }
+    return BipedSettings(**converted)
 
 
 def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
@@ -331,7 +337,10 @@ def plan_file_of(settings: BipedSettings) -> Path | None:
 
 
 def reference_gait(settings: BipedSettings, speed: float | None = None) -> HumanGait:
-    """Return people's gait, or that of `settings.human`, at the height of the body and its speed or another [m/s]."""
+    """Return people's gait, or that of `settings.human`, for the body's height at `speed` [m/s], the settings' if None.
+
+    People's data come from the setting `people_file`, or from the package.
+    """
     people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
     speed = settings.speed if speed is None else speed
     if settings.human is None:

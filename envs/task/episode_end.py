@@ -24,11 +24,11 @@ TOO_LOW, TOO_TILTED = 1, 2
 
 @part
 def average(rows, window_forces, running) -> None:
-    """Count a step of environments `running` (N,), and average their contact forces over its W control windows.
+    """Count a step of environments `running` (N,), and set `force` to the mean of their contact forces in the step.
 
     Args:
         rows: (N,) of `TASK_ROW`; `steps` and `force` are changed.
-        window_forces: (W, N, side, contact, 2) in the step's control windows [N].
+        window_forces: (W, N, side, contact, 2) forces, forward and up, in each of the step's W control windows [N].
         running: (N,) bool.
     """
     for i in range(len(rows)):
@@ -45,6 +45,6 @@ def average(rows, window_forces, running) -> None:
 
 
 def divergence(m: Measurement, index: int) -> int:
-    """Return the code in `TERMINATIONS` of a simulation that diverged."""
+    """Return the code in `TERMINATIONS` of body `index` of `m`, whose simulation has diverged: that of its warning."""
     warning = mujoco.mjtWarning(int(m.diverged[index]))
     return TERMINATIONS.index(f"diverged: {warning.name.removeprefix('mjWARN_')}")

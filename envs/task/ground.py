@@ -58,8 +58,9 @@ class Ground:
         for index, side in np.argwhere(arrived).tolist():
             random = randoms[index]
             if random is not None:
-                lowest_point = self.height[index, side] + m.contact[index, side, :, 1].min()
+                lowest_point = self.height[index, side] + m.contact[index, side, :, 1].min()  # above the mean ground
                 drawn = self._settings.unevenness_m * random.uniform(-1.0, 1.0)
+                # Not into the foot: at most up to its lowest point, unless the old ground is already higher.
                 self.height[index, side] = min(drawn, max(lowest_point, self.height[index, side]))
         ids = np.flatnonzero(arrived.any(axis=1))
         self._simulation.lay(ids, self.slope[ids], self.height[ids])

@@ -26,7 +26,7 @@ def start_table(rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> PhaseTabl
 
 
 def random_phase(random: np.random.Generator) -> float:
-    """Draw a stride phase of the left leg in the single support of either leg."""
+    """Draw a stride phase of the left leg [0, 1) in the single support of either leg, each with the same chance."""
     return (random.uniform(*START_PHASES) + 0.5 * random.integers(2)) % 1.0
 
 
@@ -39,7 +39,7 @@ def walking_posture(
     `table` comes from `start_table`. Returns joint angles, those of the hips to the vertical, and their rates, (K,
     side, joint) each [rad, rad/s]; trunk pitch (K,) [rad]; commanded speed (K,) [m/s].
     """
-    curves = table.at(leg_phases(left_phase), subjects.place[ids])
+    curves = table.at(leg_phases(left_phase), subjects.place[ids])  # (K, side, 9) as `_start_curves`; the last, pitch
     angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
     return angle, velocity / subjects.scale[ids]["time"][:, None, None], curves[:, 0, -1], subjects.speed[ids]
 
@@ -51,16 +51,22 @@ def place(
     posture: tuple[NDArray, NDArray, NDArray, NDArray],
     noise: NDArray,
 ) -> None:
-    """Put simulations `ids` (K,) into a posture, with the lowest contact point `START_DEPTH` in the floor.
+    """Put simulations into a posture, with the lowest contact point of each `START_DEPTH` in the floor.
 
-    `posture` comes from `walking_posture` or `Standing.reset`; `noise` (K, 2, side, joint) is the relative error of
-    angles and rates. Locked joints start at their rest angle.
+    Locked joints start at their rest angle.
+
+    Args:
+        simulation: the simulations.
+        subjects: their bodies.
+        ids: (K,) indices of those that start.
+        posture: of `walking_posture` or `Standing.reset`.
+        noise: (K, 2, side, joint) relative error of angles ([:, 0]) and rates ([:, 1]) [-].
     """
     angle, velocity, pitch, speed = posture
     scale = subjects.scale[ids]
     angle = angle * (1.0 + noise[:, 0])
     velocity = velocity * (1.0 + noise[:, 1])
-    angle[..., HIP] += pitch[:, None]
+    angle[..., HIP] += pitch[:, None]  # from the thigh's angle to the vertical to that to the trunk
     feet = subjects.rows["feet"][ids]
     locked = feet["locked"] > 0
     angle[..., ANKLE:] = np.where(locked, feet["rest"], angle[..., ANKLE:])
@@ -69,7 +75,8 @@ def place(
     base[:, 2] = pitch
     rate[:, 0] = speed
     simulation.reset(ids, base, rate, angle, velocity)
-    lowest = simulation.measure(ids).contact[ids, ..., 1].min(axis=(1, 2))
+    # With the hips at height 0 the height of the lowest point says how far to lift the body.
+    lowest = simulation.measure(ids).contact[ids, ..., 1].min(axis=(1, 2))  # over sides and contacts
     base[:, 1] = -lowest - START_DEPTH * simulation.body.length_scale * scale["length"]
     simulation.reset(ids, base, rate, angle, velocity)
 

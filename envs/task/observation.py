@@ -18,20 +18,21 @@ from .target import error_of, targets_at
 LOW, HIGH = (np.array([getattr(entry, end) for entry in OBSERVATION], np.float32) for end in ("low", "high"))
 """(D,) bounds of the observation."""
 _UNIT = np.array([UNITS.index(entry.unit) for entry in OBSERVATION])
+"""(D,) index in `UNITS` of the unit of each entry."""
 
 SEEN = np.dtype(
     [
-        ("base", float, 2),
+        ("base", float, 2),  # height of the hip, pitch of the trunk
         ("angle", float, (len(SIDES), len(JOINTS))),
-        ("base_velocity", float, 3),
+        ("base_velocity", float, 3),  # of the hip, forward and up, and rate of the pitch
         ("velocity", float, (len(SIDES), len(JOINTS))),
-        ("cycle", float, 4),
+        ("cycle", float, 4),  # sine and cosine of the left leg's phase, then of twice that
         ("load", float, (len(SIDES), len(CONTACTS))),
-        ("error", float, 3),
+        ("error", float, 3),  # CoM minus plan: x, z, forward speed
         ("last_action", float, len(ACTIONS)),
         ("planned_ankle", float, len(SIDES)),
-        ("leading_leg", float),
-        ("command", float, 2),
+        ("leading_leg", float),  # +1 left, -1 right
+        ("command", float, 2),  # commanded speed, height ratio
     ]
 )
 """The entries of `OBSERVATION`, in order, before they are made dimensionless [SI]."""
@@ -39,7 +40,7 @@ SEEN = np.dtype(
 
 @lru_cache(maxsize=256)
 def units_of(body: Body) -> NDArray:
-    """Return (6,) the size of each of `UNITS` for a body [SI]."""
+    """Return the size of each of `UNITS` for a body, (6,) [SI]."""
     leg = body.leg_length
     return np.array([1.0, 1.0, leg, sqrt(GRAVITY * leg), sqrt(GRAVITY / leg), body.total_mass * GRAVITY])
 
@@ -57,7 +58,7 @@ def observe(rows, controls, bodies, table, observation) -> None:
     """
     entries = np.empty(len(LOW))
     curves = np.empty((2, table.shape[-1]))
-    seen = entries.view(SEEN)[0]
+    seen = entries.view(SEEN)[0]  # the same numbers by name
     for i in range(len(rows)):
         row = rows[i]
         control = controls[i]
@@ -69,11 +70,11 @@ def observe(rows, controls, bodies, table, observation) -> None:
         c = cos(2 * pi * left)
         seen.cycle[0] = s
         seen.cycle[1] = c
-        seen.cycle[2] = 2 * s * c
-        seen.cycle[3] = 1 - 2 * s * s
+        seen.cycle[2] = 2 * s * c  # sine of the double angle
+        seen.cycle[3] = 1 - 2 * s * s  # its cosine
         seen.leading_leg = 1.0 if left < 0.5 else -1.0
-        seen.base[0] = m.base[1]
-        seen.base[1] = m.base[2]
+        seen.base[0] = m.base[1]  # height of the hip
+        seen.base[1] = m.base[2]  # pitch of the trunk
         seen.command[0] = control.subject.speed
         seen.command[1] = row.height_ratio
         for k in range(3):
@@ -85,7 +86,7 @@ def observe(rows, controls, bodies, table, observation) -> None:
             for joint in range(4):
                 seen.angle[side, joint], seen.velocity[side, joint] = m.angle[side, joint], m.velocity[side, joint]
             for contact in range(3):
-                seen.load[side, contact] = row.force[side, contact, 1]
+                seen.load[side, contact] = row.force[side, contact, 1]  # [1]: upward
         for k in range(len(entries)):
             value = entries[k] / row.units[_UNIT[k]]
             if not value <= HIGH[k]:  # `not <=`, so that NaN also maps to the upper bound

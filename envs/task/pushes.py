@@ -27,7 +27,7 @@ class Pushes:
         self._interval = settings.push_interval
         self._duration = settings.push_seconds
         self._step = settings.step_seconds
-        self._begin, self._force, self._ends = (rows["push"][name] for name in ("begin", "force", "ends"))
+        self._begin, self._force, self._ends = (rows["push"][name] for name in ("begin", "force", "ends"))  # see `PUSH`
 
     def reset(self, index: int, random: np.random.Generator) -> None:
         """Begin an episode of environment `index`, and draw its first push."""
@@ -50,7 +50,7 @@ class Pushes:
         return np.where(pushed, self._force * self._scale["mass"], 0.0)
 
     def _draw(self, index: int, random: np.random.Generator) -> None:
-        """Draw time and direction of the next push of environment `index`."""
+        """Draw time and direction of the next push of environment `index`, in the interval that begins at `_ends`."""
         self._begin[index] = self._ends[index] + random.uniform(0.0, self._latest)
         self._force[index] = self._size * (-1.0, 1.0)[random.integers(2)]
         self._ends[index] += self._interval

@@ -48,7 +48,8 @@ def body_scales(body: Body) -> NDArray:
     scales = np.zeros(1, SCALES)
     scales["min_hip_height"] = MIN_HIP_HEIGHT * length
     lengths = np.array([COM_X_TOLERANCE, COM_Z_TOLERANCE, COP_TOLERANCE]) * length
-    scales["tolerance"] = *lengths[:2], SPEED_TOLERANCE * sqrt(length), lengths[2]
+    com_x, com_z, cop = lengths
+    scales["tolerance"] = com_x, com_z, SPEED_TOLERANCE * sqrt(length), cop
     scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
     scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
     scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)

@@ -57,7 +57,13 @@ def target_curves(gait: HumanGait, plan: ComPlan, step_seconds: float) -> NDArra
 
 @part
 def targets_at(table, control, curves) -> NDArray:
-    """Return the target at the present phases of both legs, (side,) of `TARGET`; a view of `curves` (side, C)."""
+    """Return the target at the present phases of both legs, (side,) of `TARGET`.
+
+    Args:
+        table: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
+        control: one of `CONTROL_ROW`.
+        curves: (side, C) memory, which is filled; the target is a view of it.
+    """
     for side in range(2):
         read(table, control.subject.place, control.legs.phase[side], curves[side])
     return curves.view(TARGET)[:, 0]
@@ -83,9 +89,10 @@ def error_of(control, targets, m) -> tuple[float, float, float]:
 
 @kernel
 def track(controls, bodies, table, error) -> None:
-    """Fill `error` (N, 3), CoM minus target: x [m], z [m] and forward speed [m/s].
+    """Fill `error` (N, 3) with CoM minus target of each body: x [m], z [m] and forward speed [m/s].
 
-    `controls` (N,) of `CONTROL_ROW`; `bodies` (N,) of `BODY_ROW`; `table` (R, SAMPLES, 2, C) of `TARGET`.
+    `controls` (N,) of `CONTROL_ROW`; `bodies` (N,) of `BODY_ROW`, as measured now; `table` (R, SAMPLES, 2, C) of
+    `TARGET`, of a `PhaseTable`.
     """
     curves = np.empty((2, table.shape[-1]))
     for i in range(len(error)):

@@ -20,7 +20,7 @@ OPEN_LOOP = "open loop"
 
 def open_loop_note(name: str) -> str:
     """Return the sentence that explains a policy's open-loop copy below a table; empty if the policy has none."""
-    copies = ", ".join(f"`{copy}`" for copy in and_copy(name)[1:])
+    copies = ", ".join(f"`{copy}`" for copy in and_copy(name)[1:])  # [0] is the policy itself
     return copies and f" Open loop: {copies}, the policy's mean K over the stride at the same θ_eq, without feedback."
 
 

@@ -24,6 +24,7 @@ _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
     float: (float, "a number"),
     str: (str, "a word"),
 }
+"""Plain type -> its conversion from a word, and its allowed values in words."""
 
 
 def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
@@ -31,38 +32,51 @@ def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
 
     The word `None` is a value only of types that can be None.
     """
-    tuple_kind = next((part for part in _parts(kind) if get_origin(part) is tuple), kind)
-    items = get_args(tuple_kind) if get_origin(tuple_kind) is tuple else ()
-    count: Any = "*" if items[1:] == (...,) else len(items) or 1
-    if tuple_kind is not kind and count != 1:
+    tuple_kind = next((part for part in _parts(kind) if get_origin(part) is tuple), None)  # `kind`, or a part of it
+    items = get_args(tuple_kind) if tuple_kind is not None else ()
+    count: Any = "*" if _is_open(items) else len(items) or 1
+    if tuple_kind not in (None, kind) and count != 1:
         count = (1, count)  # one word for None
-    return spec(lambda words: _read(kind, words), metavar_of(kind), count)
+    return reader_of_words(lambda words: _read(kind, words), metavar_of(kind), count)
 
 
-def spec(read: Callable[[list[str]], Any], metavar: str, count: Any = 1) -> tyro.constructors.PrimitiveConstructorSpec:
-    """Return tyro's reader of a flag of `count` words (a number, a range or "*"), which `read` converts to a value."""
+def reader_of_words(
+    read: Callable[[list[str]], Any], metavar: str, count: Any = 1
+) -> tyro.constructors.PrimitiveConstructorSpec:
+    """Return tyro's reader of a flag, by which `read` converts the words behind the flag to its value.
+
+    Args:
+        read: function that returns the value of the words; raises `ValueError`, with the allowed values, for others.
+        metavar: the help's placeholder for the words.
+        count: number of words: a number, a tuple of the allowed numbers, or "*" for any.
+    """
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs=count,
         metavar=metavar,
         instance_from_str=read,
-        is_instance=lambda value: True,
-        str_from_instance=lambda value: [str(value)],
+        is_instance=lambda value: True,  # `read` checks the value
+        str_from_instance=lambda value: [str(value)],  # in the help alone
     )
 
 
+def _is_open(items: tuple[Any, ...]) -> bool:
+    """Return True for the items of `tuple[kind, ...]`, a tuple of any length."""
+    return items[1:] == (...,)
+
+
 def metavar_of(kind: Any) -> str:
-    """Return the help's placeholder for a value of this type."""
+    """Return the help's placeholder for a value of type `kind`, such as "FLOAT FLOAT" for a pair."""
     parts = get_args(kind)
     if get_origin(kind) is Literal:
         return "|".join(map(str, parts))
     if get_origin(kind) is tuple:
-        return f"{metavar_of(parts[0])} ..." if parts[1:] == (...,) else " ".join(map(metavar_of, parts))
+        return f"{metavar_of(parts[0])} ..." if _is_open(parts) else " ".join(map(metavar_of, parts))
     parts = [part for part in parts if part is not NoneType]
     return "|".join(map(metavar_of, parts)) if parts else kind.__name__.upper()
 
 
 def _parts(kind: Any) -> tuple[Any, ...]:
-    """Return the types of a union; a type that is no union alone."""
+    """Return the types of a union; for another type that type alone."""
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
 
@@ -72,34 +86,39 @@ def _read(kind: Any, words: list[str]) -> Any:
     parts = _parts(kind)
     if NoneType in parts and words == [_NONE]:
         return None
-    for part in parts:
+    for part in parts:  # the first type that takes the words
         try:
             return _read_part(part, words)
         except ValueError:
             continue
-    raise ValueError(f"must be {' or '.join(filter(None, map(_meaning, parts)))}, got {quoted(' '.join(words))}")
+    raise ValueError(f"must be {' or '.join(filter(None, map(_allowed_values, parts)))}, got {quoted(' '.join(words))}")
 
 
 def _read_part(kind: Any, words: list[str]) -> Any:
     """Return the value of a type that is not a union; raise `ValueError` for other words."""
     if get_origin(kind) is tuple:
         items = get_args(kind)
-        kinds = [items[0]] * len(words) if items[1:] == (...,) else items
+        kinds = [items[0]] * len(words) if _is_open(items) else items
         return tuple(_read_part(item_kind, [word]) for item_kind, word in zip(kinds, words, strict=True))
     (word,) = words
     if get_origin(kind) is Literal:
-        return get_args(kind)[[str(value) for value in get_args(kind)].index(word)]
+        allowed = {str(value): value for value in get_args(kind)}
+        if word not in allowed:
+            raise ValueError
+        return allowed[word]
     if kind not in _PLAIN:
         raise ValueError
-    return _PLAIN[kind][0](word)
+    convert, _ = _PLAIN[kind]
+    return convert(word)
 
 
-def _meaning(kind: Any) -> str:
+def _allowed_values(kind: Any) -> str:
     """Return the allowed values of a type for an error message, such as "2 numbers"; empty for types without any."""
     if get_origin(kind) is Literal:
         return f"one of {', '.join(map(str, get_args(kind)))}"
     if get_origin(kind) is tuple:
         items = get_args(kind)
-        count = "" if items[1:] == (...,) else f"{len(items)} "
-        return f"{count}{_PLAIN[items[0]][1].removeprefix('a ')}s"
+        count = "" if _is_open(items) else f"{len(items)} "
+        _, words = _PLAIN[items[0]]
+        return f"{count}{words.removeprefix('a ')}s"
     return _PLAIN[kind][1] if kind in _PLAIN else ""

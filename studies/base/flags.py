@@ -20,12 +20,13 @@ from springfoot.files.json_file import json_fault, keys_once, read_object
 from springfoot.gait.people import read_gait
 from springfoot.gait.springs import StiffnessSchedule, read_foot
 
-from .flag_words import NOT_GIVEN, flag_of, spec
+from .flag_words import NOT_GIVEN, flag_of, reader_of_words
 
 
 def field_help(settings: type) -> dict[str, str]:
     """Return field -> the docstring below it in the source of the dataclass `settings`, on one line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
+    # A field with a text right below it.
     return {
         item.target.id: " ".join(str(doc.value.value).split())
         for item, doc in pairwise(body)
@@ -37,7 +38,10 @@ def field_help(settings: type) -> dict[str, str]:
 
 
 def read_json(words: list[str]) -> dict[str, Any]:
-    """Return a dictionary from JSON text, or from the JSON file of that name."""
+    """Return a dictionary from the first of `words`: JSON text, or the name of a JSON file.
+
+    Raises `ValueError`, with what is wrong, for any other word.
+    """
     text = words[0]
     if not text.lstrip().startswith("{"):
         if not Path(text).is_file():
@@ -90,7 +94,7 @@ def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
     return value
 
 
-FootFlag = Annotated[str | dict[str, Any], spec(_read_word_or_json, "WORD|JSON|FILE")]
+FootFlag = Annotated[str | dict[str, Any], reader_of_words(_read_word_or_json, "WORD|JSON|FILE")]
 """Type of a flag for a foot; `foot_given` converts its value to a setting."""
 FILE_FLAGS = {"human": read_own_gait}
 """Setting whose flag is a file's name -> function that reads the setting from the file."""
@@ -134,7 +138,7 @@ def optional_flags(
             if item_name in refused:
                 text = f"Refused: {refused[item_name]}."
                 hint = ""
-            group_flags = themed.get(metadata[item_name].get("theme", ""), flags)
+            group_flags = themed.get(metadata[item_name].get("theme", ""), flags)  # fields without a theme: no group
             group_flags.append((item_name, _optional_flag(item_name, kind, text, hint), NOT_GIVEN))
             if item_name in FILE_FLAGS:
                 group_flags.append((TRUST, _TRUST_FLAG, False))
@@ -160,13 +164,13 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
     """Return the annotation of a flag for a setting of type `kind`, with its help `text` and the `hint` behind it."""
     parts = get_args(kind)
     if name in FILE_FLAGS:
-        reader = spec(lambda words: words[0], "FILE")
+        reader = reader_of_words(lambda words: words[0], "FILE")
     elif name in FOOT_SETTINGS:
-        reader = spec(_read_word_or_json, "WORD|JSON|FILE")
+        reader = reader_of_words(_read_word_or_json, "WORD|JSON|FILE")
     elif get_origin(kind) is not dict and StiffnessSchedule not in parts:
         reader = flag_of(kind)
     else:
-        reader = spec(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
+        reader = reader_of_words(partial(_read_json_or_none, NoneType in parts), "JSON|FILE")
     return Annotated[Any, reader, tyro.conf.arg(help=text, help_behavior_hint=hint)]
 
 
@@ -198,7 +202,7 @@ def _given_words(flags: Any) -> dict[str, Any]:
 
 def _evaluated(theme: str) -> str:
     """Return the help of a theme in an evaluation, which says which of its settings a trained policy brings."""
-    settings = [name for name, its_theme in THEME_OF.items() if its_theme == theme]
+    settings = [name for name, theme_of_name in THEME_OF.items() if theme_of_name == theme]
     settings = [name for name in settings if name != "episode_seconds"]  # the flag --seconds
     brought = [f"--{name.replace('_', '-')}" for name in settings if name not in CONDITION_SETTINGS]
     if len(brought) == len(settings):

@@ -49,9 +49,10 @@ def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float,
 
 
 def paired_p(fell: NDArray, other: NDArray) -> float:
-    """Return p of McNemar's exact test that two policies fall equally often, from falls (n,) in the same episodes.
+    """Return p of McNemar's exact test that two policies fall equally often.
 
-    Only episodes in which one of them fell and the other did not count; without any p is 1.
+    `fell` and `other` (n,) are True where the one and the other policy fell, in the same n episodes. Only episodes in
+    which one of them fell and the other did not count; without any p is 1.
     """
     alone = int((fell & ~other).sum())
     other_alone = int((other & ~fell).sum())

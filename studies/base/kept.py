@@ -11,7 +11,10 @@ from springfoot.files.writing import write_atomically
 
 
 class Kept:
-    """Results by question, kept in the file `path`; in memory only if that is None."""
+    """Results of a study by question, kept in the JSON file `path`; in memory only if that is None.
+
+    Raises `SpringfootError` for a file of another kind.
+    """
 
     def __init__(self, path: Path | None):
         self._path = path

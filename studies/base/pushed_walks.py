@@ -1,6 +1,5 @@
 """Measure a policy's walks undisturbed and pushed, from the same seeds, and keep the result in a file."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,15 +30,15 @@ class PushedWalks:
     """Function called with the simulated time [s] of each step."""
 
     def metrics(self, policy: str, settings: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
-        """Record the policy of that name; return its metrics by condition, `undisturbed` and `pushed`.
+        """Return the metrics of walks of the policy of that name, by condition: `undisturbed` and `pushed`.
 
         The reward is the default one. `settings` are further environment settings; `legs` are leg constants in place of
         the tuned ones.
         """
         metrics = {}
         for condition, push in (("undisturbed", 0.0), ("pushed", self.push_newton)):
-            wanted = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (settings or {})
-            acting, environment = policy_and_settings(policy, wanted, self.seed)
+            given = {"reward_weights": {}, "episode_seconds": self.seconds, "push_newton": push} | (settings or {})
+            acting, environment = policy_and_settings(policy, given, self.seed)
             names = ("episodes", "seed", "threads", "progress")
             arguments: dict[str, Any] = {name: getattr(self, name) for name in names} | {"legs": legs}
             metrics[condition] = measure(record(acting, environment, name=policy, **arguments)).metrics
@@ -59,6 +58,11 @@ class PushedWalks:
 
 
 def kept_metrics(path: Path, walks: PushedWalks, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the metrics kept in the file `path` for these `walks` and this `key`; `make` and keep them if missing."""
-    question = json.loads(json.dumps({"how": {**vars(walks), "threads": None, "progress": None}, "of": key}))
+    """Return the metrics kept in the file `path` for these `walks` of what `key` names; `make` and keep them if
+    missing.
+
+    `key` are JSON values that tell walks of other policies, settings or legs apart. Threads and progress are left out
+    of the question, as the metrics do not depend on them.
+    """
+    question = {"how": {**vars(walks), "threads": None, "progress": None}, "of": key}
     return Kept(path).get(question, make)

@@ -92,12 +92,12 @@ class Study:
 
 
 def without_places(command: str) -> str:
-    """Return a command without the flags that name the folders and files it writes."""
+    """Return a command line without the flags that name the folders and files it writes, and their values."""
     words = shlex.split(command)
     for flag in ("--out", "--keep", "--feet"):
         if flag in words:
             index = words.index(flag)
-            del words[index : index + 2]
+            del words[index : index + 2]  # flag and value
     return shlex.join(words)
 
 

@@ -39,7 +39,8 @@ from .person_search import Person, PersonSearch
 
 
 def kept_name(name: str, search: int) -> str:
-    """Return the foot's name in the file for a search: the first by its name alone."""
+    """Return the name under which the file of adapted feet keeps what a search found: `name` alone for the first
+    one."""
     return name if search == 1 else f"{name}, search {search}"
 
 
@@ -125,26 +126,28 @@ class Adapt(Study):
     def ask(self, progress: OnProgress) -> Answer:
         """Search, and compare the walks of the person before and after."""
         setting = foot_setting("foot", foot_given(self.foot))
-        foot = without_person(setting.plain) if isinstance(setting.plain, dict) else setting.plain
+        foot = without_person(setting.plain) if isinstance(setting.plain, dict) else setting.plain  # its kind alone
         name = self.name or (setting.kind if self.speed == TUNED_SPEED else f"{setting.kind}, {self.speed:g} m/s")
         begin = self._begin(foot)
         lines = []
-        told = []
+        costs_text = []
         files = {}
         walks = []
         for search in self.searches:
             label = kept_name(name, search)
-            person, own = self._search(begin, search, label, progress)
-            lines += [[search, *line] for line in own]
-            told.append(f"`{label}`: best {own[0][1]:.2f} to {own[-1][1]:.2f}, median {own[-1][2]:.2f}")
+            person, of_generations = self._search(begin, search, label, progress)
+            lines += [[search, *line] for line in of_generations]
+            _, first_best, _ = of_generations[0]
+            _, last_best, last_median = of_generations[-1]
+            costs_text.append(f"`{label}`: best {first_best:.2f} to {last_best:.2f}, median {last_median:.2f}")
             walks.append([f"{label}, not adapted", *self._walked("pretrained", person.foot)])
             walks.append([label, *self._walked(SCHEDULE[0], person.setting(self.speed))])
             files[f"foot-{search}.json"] = json.dumps(person.setting(self.speed), indent=1) + "\n"
-        head = ["", *(each.label for each in TOLD)]
+        head = ["", *(number.label for number in TOLD)]
         text = (
             f"{table(head, walks)}\n\n{self.episodes} episodes × {self.seconds:g} s; falls as shares, the last by "
             f"±{PUSH_NEWTON:g} N; not adapted by `pretrained` on the same foot, adapted by the schedule found. "
-            f"{ABOUT_STOPS}\n\nPrices of candidates (studies/feet/person_cost.py): {'; '.join(told)}.\n\n"
+            f"{ABOUT_STOPS}\n\nPrices of candidates (studies/feet/person_cost.py): {'; '.join(costs_text)}.\n\n"
             "Walk with what was found:\n\n"
         )
         text += "\n".join(f"  --right-foot {self.out or 'FOLDER'}/{file}" for file in files)
@@ -152,28 +155,36 @@ class Adapt(Study):
         return Answer(text=text, files=files)
 
     def _walked(self, policy: str, foot: str | dict[str, Any]) -> list[str]:
-        """Describe a walk on the right `foot` in a table's words."""
+        """Return the numbers `TOLD` of a policy's walk on the right `foot`, as cells of a table."""
+        schedule, as_factors = SCHEDULE
         given = {"right_foot": foot, "speed": self.speed, "episode_seconds": self.seconds}
-        given |= SCHEDULE[1] if policy == SCHEDULE[0] else {}
-        found = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
-        return [text_of(found[each.key], each.pattern) for each in TOLD]
+        given |= as_factors if policy == schedule else {}
+        numbers = walked(policy, given, episodes=self.episodes, seed=self.seed, threads=self.threads)
+        return [text_of(numbers[number.key], number.pattern) for number in TOLD]
 
     def _begin(self, foot: str | dict[str, Any]) -> Person:
+        """Return the person from whom the search for `foot` starts, as the flag `start` says.
+
+        Raises `SpringfootError` for a `start` that the file does not have.
+        """
         if not self.start:
             return beginning(foot, self.speed)
         known = read_feet(self.feet)["feet"]
         if self.start not in known:
             raise SpringfootError(f"no foot {self.start!r} to start from in {self.feet}; there are {', '.join(known)}")
-        if foot == known[self.start]["kind"]:  # a word: the numbers found there
+        if foot == known[self.start]["kind"]:  # a kind alone: the numbers are those of the foot to start from
             foot = without_person(known[self.start])
-        walked = BipedSettings(speed=self.speed, right_foot=known[self.start])
-        sound, other = (person_constants(walked, self.speed, side) for side in (LEFT, RIGHT))
+        settings = BipedSettings(speed=self.speed, right_foot=known[self.start])
+        sound, other = (person_constants(settings, self.speed, side) for side in (LEFT, RIGHT))
         return Person(sound=sound, other=other, foot=foot)
 
     def _search(
         self, begin: Person, search: int, label: str, progress: OnProgress
     ) -> tuple[Person, list[tuple[int, float, float]]]:
-        """Run one search; return the person at its mean, and number, best and median cost of each generation."""
+        """Run search number `search` from the person `begin`, and keep the best person under `label`.
+
+        Returns the person at the search's mean, and number, best and median cost of each generation.
+        """
         settings = BipedSettings(speed=self.speed)
         space = PersonSearch(begin, self.speed, self.design)
         seed = self.seed + 1_000_000 * (search - 1)
@@ -181,19 +192,22 @@ class Adapt(Study):
         strategy = cma.CMAEvolutionStrategy(np.zeros(space.size), self.sigma, options)
         bend = None if self.bend_deg is None else radians(self.bend_deg)
 
-        def price(generation: int, vectors: list[NDArray]) -> NDArray:
+        def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
+            """Return the costs of a generation's candidates, which all walk from the same seeds."""
             people = [space.person(vector) for vector in vectors]
-            own = seed + 1000 * generation
-            return person_cost.cost(settings, people, own, self.threads, self.push_newton, bend, self.bend_weight)
+            first_seed = seed + 1000 * generation
+            threads = self.threads
+            return person_cost.cost(settings, people, first_seed, threads, self.push_newton, bend, self.bend_weight)
 
         lines = []
-        for generation, _, paid in generations(strategy, self.generations, price):
-            lines.append((generation + 1, float(paid.min()), float(np.median(paid))))
+        for generation, _, costs in generations(strategy, self.generations, costs_of):
+            lines.append((generation + 1, float(costs.min()), float(np.median(costs))))
             progress(1)
             last = generation == self.generations - 1
             if generation % 10 == 9 or last:
                 self._keep(label, space.person(strategy.mean), last)
-                tqdm.write(f"{label}: generation {generation + 1}: best {paid.min():.2f}, median {np.median(paid):.2f}")
+                _, best, median = lines[-1]
+                tqdm.write(f"{label}: generation {generation + 1}: best {best:.2f}, median {median:.2f}")
         return space.person(strategy.mean), lines
 
     def _keep(self, label: str, found: Person, last: bool) -> None:

@@ -47,14 +47,15 @@ class AdaptAll(Study):
         known = read_feet(self.feet)
         lines = []
         for label, command in list(known["found_by"].items())[: self.first]:
-            if read_feet(self.to)["found_by"].get(label) != command or self.quick:
+            if read_feet(self.to)["found_by"].get(label) != command or self.quick:  # not yet finished there
                 self._run(label, command, progress)
-            found = read_feet(self.to)["feet"].get(label)
-            same = "same" if found == known["feet"][label] else "other"
+            foot_now = read_feet(self.to)["feet"].get(label)
+            same = "same" if foot_now == known["feet"][label] else "other"
             lines.append([label, same, f"`{command}`"])
         return Answer(text=table(["foot", "as committed", "found by"], lines))
 
     def _run(self, label: str, command: str, progress: OnProgress) -> None:
+        """Run the search `command` of the foot `label`, which writes its result into the file `to`."""
         if not command.startswith(f"{PROGRAM} "):
             raise SpringfootError(f"{self.feet}: {label} was found by no command of this study: {command:.60}")
         study = tyro.cli(Adapt, args=shlex.split(command.removeprefix(PROGRAM)), prog=PROGRAM)

@@ -61,7 +61,7 @@ TOLD = (
     Told(key="beyond_stop", label="at a stop", pattern=".1%"),
 )
 """Numbers that tables show of a walk."""
-NAMES = [each.key for each in TOLD]
+NAMES = [number.key for number in TOLD]
 """Keys of these numbers. They are part of the question of kept results, so that a new number has all walks measured
 again."""
 ABOUT_STOPS = (
@@ -131,12 +131,18 @@ def beyond_stop(recording: Recording) -> float | None:
     Episodes that end in a fall are left out; None if no time is left.
     """
     low, high = np.deg2rad(JOINT_RANGE_DEG).T
-    angle = recording.series["angle"][recording.fall_reason == "", round(WARM_UP / TICK) :]
-    return float(((angle < low) | (angle > high)).any((-2, -1)).mean()) if angle.size else None
+    angle = recording.series["angle"][
+        recording.fall_reason == "", round(WARM_UP / TICK) :
+    ]  # (episodes, T, side, joint)
+    beyond = ((angle < low) | (angle > high)).any((-2, -1))
+    return float(beyond.mean()) if angle.size else None
 
 
 def for_body(foot: Mapping[str, Any], height: float, mass: float) -> dict[str, Any]:
-    """Return the foot for a body of this height [m] and mass [kg]: stiffness scales with mass x height."""
+    """Return the dictionary of a foot for a body of this height [m] and mass [kg].
+
+    Its stiffness is for 1.70 m and 63 kg, scales with mass x height, and stays within the range of `SPRING_NUMBERS`.
+    """
     ratio = height * mass / (REFERENCE_HEIGHT * REFERENCE_MASS)
     scaled = {
         key: round(float(np.clip(value * ratio, SPRING_NUMBERS[key].low, SPRING_NUMBERS[key].high)), 3)

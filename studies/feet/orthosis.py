@@ -12,7 +12,7 @@ such a foot, without an orthosis.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import permutations, product
+from itertools import permutations, product, takewhile
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -84,7 +84,7 @@ class Orthosis(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         weak = len(list(self._weak_cells())) * len(WEAK_SPRINGS) * self.episodes
         drop = 2 * len(self._drop_speeds()) * len(SWING_SPRINGS) * len(SWING_RESTS) * self.episodes_drop
         return (weak + drop + 4 * len(self._people()) * self.episodes_drop) * self.seconds
@@ -92,10 +92,10 @@ class Orthosis(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with every spring."""
         kept = Kept(self.keep)
-        dropping = replace(self, episodes=self.episodes_drop)
-        elsewhere = replace(dropping, seed=UNSEARCHED)
+        with_drop_foot = replace(self, episodes=self.episodes_drop)
+        with_people = replace(with_drop_foot, seed=UNSEARCHED)  # from seeds that no search has used
         weak = self._weak(kept, progress)
-        drop = dropping._drop(kept, progress)
+        drop = with_drop_foot._drop(kept, progress)
         even = at_walked_speeds(weak, SPRING_OF_A_BODY, (1.1,) if self.quick else WALKED_SPEEDS)
         best = best_springs(even)
         by_effort = best_springs(even, "effort")
@@ -111,10 +111,10 @@ class Orthosis(WalkingStudy):
         }
         text = {
             "WEAK": weak_text(weak, best, by_effort, as_asked, self.what_ran),
-            "DROP": drop_text(drop, self.episodes_drop, dropping.what_ran, self.push_newton),
-            "ADAPTED": people_text(elsewhere._adapted(kept, progress), elsewhere.what_ran, self.push_newton),
+            "DROP": drop_text(drop, self.episodes_drop, with_drop_foot.what_ran, self.push_newton),
+            "ADAPTED": people_text(with_people._adapted(kept, progress), with_people.what_ran, self.push_newton),
         }
-        text = {name: told for name, told in text.items() if told}
+        text = {name: section for name, section in text.items() if section}
         return Answer(text="\n\n".join(text.values()), files=files)
 
     def _weak(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
@@ -123,10 +123,10 @@ class Orthosis(WalkingStudy):
         orthoses = [{"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": 0.0} for spring in WEAK_SPRINGS]
         for mass, speed, strength in self._weak_cells():
             where = {"mass_kg": mass, "speed_m_s": speed, "strength": strength}
-            feet = [{"kind": "weak", "strength": strength, "orthosis": each} for each in orthoses]
-            cell = self._walk(kept, {"mass": mass, "speed": speed}, feet, progress)
-            pairs = zip(WEAK_SPRINGS, cell, strict=True)
-            rows += [{**where, "spring_Nm_deg": spring, **_renamed(own)} for spring, own in pairs]
+            feet = [{"kind": "weak", "strength": strength, "orthosis": orthosis} for orthosis in orthoses]
+            of_springs = self._walk(kept, {"mass": mass, "speed": speed}, feet, progress)
+            pairs = zip(WEAK_SPRINGS, of_springs, strict=True)
+            rows += [{**where, "spring_Nm_deg": spring, **_with_walked_speed(numbers)} for spring, numbers in pairs]
         return rows
 
     def _drop(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
@@ -135,40 +135,41 @@ class Orthosis(WalkingStudy):
         springs = list(product(SWING_SPRINGS, SWING_RESTS))
         feet = [{"kind": "drop", "orthosis": {"ankle_stiffness": k, "ankle_deg": rest}} for k, rest in springs]
         for speed in self._drop_speeds():
-            cells = [
+            of_pushes = [
                 self._walk(kept, {"speed": speed, "push_newton": push}, feet, progress)
                 for push in (0.0, self.push_newton)
             ]
-            for (stiffness, rest), own, pushed in zip(springs, *cells, strict=True):
-                line = {"speed_m_s": speed, "spring_Nm_rad": stiffness, "rest_deg": rest, **_renamed(own)}
+            for (stiffness, rest), undisturbed, pushed in zip(springs, *of_pushes, strict=True):
+                line = {"speed_m_s": speed, "spring_Nm_rad": stiffness, "rest_deg": rest}
+                line |= _with_walked_speed(undisturbed)
                 rows.append({**line, "falls_pushed": pushed["falls"]})
         return rows
 
     def _adapted(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
-        """Walk on the feet of `WHO_ADAPTED`, with the legs of sound feet and with the adapted person's."""
+        """Return rows of walks on the feet of `WHO_ADAPTED`: with legs of sound feet, and with the adapted person's."""
         rows = []
+        schedule, as_factors = SCHEDULE
         for name in self._people():
-            bare = without_person(committed_feet()[name])
+            foot_alone = without_person(committed_feet()[name])
             walks = (
-                ("not adapted", self.policy, bare, {}),
-                ("adapted", SCHEDULE[0], {**bare, ADAPTED: name}, SCHEDULE[1]),
+                ("not adapted", self.policy, foot_alone, {}),
+                ("adapted", schedule, {**foot_alone, ADAPTED: name}, as_factors),
             )
             for person, policy, foot, given in walks:
                 given = {**given, "right_foot": foot, "episode_seconds": self.seconds}
-                key = [policy, given, committed_feet()[name], {**self.how, "threads": 0}, self.push_newton, NAMES]
-                own = kept.get(
-                    key, lambda p=policy, g=given: walked(p, g, self.push_newton, progress=progress, **self.how)
+                # All that the numbers depend on; they do not on the threads.
+                question = [policy, given, committed_feet()[name], {**self.how, "threads": 0}, self.push_newton, NAMES]
+                numbers = kept.get(
+                    question, lambda p=policy, g=given: walked(p, g, self.push_newton, progress=progress, **self.how)
                 )
-                rows.append({"foot": name, "person": person, **own})
+                rows.append({"foot": name, "person": person, **numbers})
         return rows
 
     def _weak_cells(self) -> Iterator[tuple[float, float, float]]:
         """Yield mass [kg], commanded speed [m/s] and strength of each weak calf."""
-        return (
-            iter([(63.0, asked, 0.25) for asked in (1.2, 1.4)])
-            if self.quick
-            else product(MASSES, ASKED_SPEEDS, STRENGTHS)
-        )
+        if self.quick:
+            return product((63.0,), (1.2, 1.4), (0.25,))
+        return product(MASSES, ASKED_SPEEDS, STRENGTHS)
 
     def _drop_speeds(self) -> Sequence[float]:
         return (1.2,) if self.quick else DROP_SPEEDS
@@ -182,6 +183,7 @@ class Orthosis(WalkingStudy):
         """Return the numbers of a walk on each of the right `feet`, all on the same episodes."""
 
         def make() -> dict[str, Any]:
+            """Walk on all feet, and return their numbers under the key `walks`."""
             acting, settings = policy_and_settings(self.policy, {**given, "episode_seconds": self.seconds})
             recordings = record_feet(acting, settings, feet, name=self.policy, progress=progress, **self.how)
             return {"walks": [numbers_of(measure(recording)) for recording in recordings]}
@@ -190,7 +192,8 @@ class Orthosis(WalkingStudy):
         return kept.get([how, given, feet, NAMES], make)["walks"]
 
 
-def _renamed(numbers: Mapping[str, Any]) -> dict[str, Any]:
+def _with_walked_speed(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers of a walk with its speed as `walked_m_s`, as a row's `speed_m_s` is the commanded one."""
     return {("walked_m_s" if key == "speed_m_s" else key): value for key, value in numbers.items()}
 
 
@@ -199,6 +202,7 @@ def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 OF_A_CELL = ("mass_kg", "speed_m_s", "strength")
+"""Columns whose values make a cell: body, speed and strength of the calf."""
 SPRING_OF_A_BODY = ("mass_kg", "strength", "spring_Nm_deg")
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#555555")
 
@@ -209,20 +213,21 @@ def best_springs(rows: Sequence[Row], price: str = TWO_PRICES[0]) -> list[dict[s
     A row has the spring of the least price, the percentage that the worst one costs more, and the spring that slows the
     walk least.
     """
-    found = []
+    lines = []
     for cell in _cells(rows):
         walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row[price] is not None]
         line = {**dict(zip(OF_A_CELL, cell, strict=True)), "springs_without_falls": len(walking)}
         names = ("best_Nm_deg", price, "walked_m_s", "worst_Nm_deg", "worst_more_percent", "fastest_Nm_deg")
         line |= dict.fromkeys(names)
         if walking:
-            best, worst = (of(walking, key=lambda row: row[price]) for of in (min, max))
+            best = min(walking, key=lambda row: row[price])
+            worst = max(walking, key=lambda row: row[price])
             line |= {"best_Nm_deg": best["spring_Nm_deg"], "worst_Nm_deg": worst["spring_Nm_deg"]}
             line |= {price: best[price], "walked_m_s": best["walked_m_s"]}
             line["fastest_Nm_deg"] = max(walking, key=lambda row: row["walked_m_s"])["spring_Nm_deg"]
             line["worst_more_percent"] = 100 * (worst[price] / best[price] - 1)
-        found.append(line)
-    return found
+        lines.append(line)
+    return lines
 
 
 def _cells(rows: Sequence[Row]) -> list[tuple[float, ...]]:
@@ -287,13 +292,14 @@ def directions(best: Sequence[Row], column: str) -> str:
     Counted over all cells (body, speed and strength), and in pairs of cells that differ in that quantity alone.
     """
     known = [row for row in best if row[column] is not None]
-    told = []
+    texts = []
     for name, label, sign in (("strength", "weakness", -1), ("mass_kg", "mass", 1), ("speed_m_s", "speed", 1)):
+        # `sign` -1: a weaker calf has less strength.
         levels = sorted({row[name] for row in known}, key=lambda value: sign * value)
         means = [np.mean([row[column] for row in known if row[name] == level]) for level in levels]
         pairs = np.array([(sign * row[name], row[column]) for row in known]).reshape(-1, 2)
         varies = len(levels) > 1 and np.ptp(pairs[:, 1]) > 0
-        ranks = np.apply_along_axis(rankdata, 0, pairs)
+        ranks = np.apply_along_axis(rankdata, 0, pairs)  # Spearman's rho is Pearson's r of ranks
         rho = f"ρ {np.corrcoef(ranks.T)[0, 1]:+.2f}" if varies else "ρ –"
         steps = ", ".join(f"{level:g}: {mean:.1f}" for level, mean in zip(levels, means, strict=True))
         others = [other for other in OF_A_CELL if other != name]
@@ -303,30 +309,35 @@ def directions(best: Sequence[Row], column: str) -> str:
             if sign * less[name] < sign * more[name] and all(less[other] == more[other] for other in others)
         ]
         counts = f"stiffer {alike.count(1)}, softer {alike.count(-1)}, same {alike.count(0)}"
-        told.append(f"{label} {rho} ({steps}; {len(alike)} pairs: {counts})")
-    return "; ".join(told)
+        texts.append(f"{label} {rho} ({steps}; {len(alike)} pairs: {counts})")
+    return "; ".join(texts)
 
 
 def at_the_ends(best: Sequence[Row], springs: Sequence[float]) -> str:
-    """Return, in words, in how many cells of each speed the best spring is the weakest or the stiffest of `springs`."""
-    told = []
+    """Return, in words, in how many cells of each speed the best spring is the stiffest, and the weakest, of `springs`.
+
+    `springs` are the stiffnesses of the map, ascending.
+    """
+    texts = []
     for speed in sorted({row["speed_m_s"] for row in best}):
-        own = [row["best_Nm_deg"] for row in best if row["speed_m_s"] == speed]
-        told.append(f"{own.count(springs[-1])} and {own.count(springs[0])} of {len(own)} at {speed:g} m/s")
-    return "; ".join(told)
+        at_speed = [row["best_Nm_deg"] for row in best if row["speed_m_s"] == speed]
+        stiffest = at_speed.count(springs[-1])
+        weakest = at_speed.count(springs[0])
+        texts.append(f"{stiffest} and {weakest} of {len(at_speed)} at {speed:g} m/s")
+    return "; ".join(texts)
 
 
 def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:
-    """Return the weakest spring with which nobody falls, nor with any stiffer spring of the same rest angle."""
+    """Return the weakest spring with which nobody falls, nor with any stiffer spring of the same rest angle.
+
+    `column` is that of the falls, undisturbed or pushed. None if somebody falls with the stiffest spring of every
+    angle.
+    """
     cures = []
     for rest in sorted({row["rest_deg"] for row in rows}):
-        own = sorted((row for row in rows if row["rest_deg"] == rest), key=lambda row: -row["spring_Nm_rad"])
-        standing = []
-        for row in own:
-            if row[column] > 0:
-                break
-            standing.append(row)
-        cures += standing[-1:]
+        stiffest_first = sorted((row for row in rows if row["rest_deg"] == rest), key=lambda row: -row["spring_Nm_rad"])
+        without_falls = list(takewhile(lambda row: row[column] == 0, stiffest_first))
+        cures += without_falls[-1:]  # the weakest of them, if there is one
     return min(cures, key=lambda row: row["spring_Nm_rad"], default=None)
 
 
@@ -338,18 +349,18 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
         rests = sorted({row["rest_deg"] for row in here})
         lines = []
         for stiffness in sorted({row["spring_Nm_rad"] for row in here}):
-            own = {row["rest_deg"]: row for row in here if row["spring_Nm_rad"] == stiffness}
-            lines.append([f"{stiffness:g}", *(_cell(own[rest]) for rest in rests)])
+            by_rest = {row["rest_deg"]: row for row in here if row["spring_Nm_rad"] == stiffness}
+            lines.append([f"{stiffness:g}", *(_cell(by_rest[rest]) for rest in rests)])
         head = [f"K N·m/rad at {speed:g} m/s", *(f"rest {rest:g}°" for rest in rests)]
         cures = [weakest_cure(here, column) for column in ("falls", "falls_pushed")]
-        told = [
+        undisturbed, pushed = [
             "no spring of the map" if cure is None else f"{cure['spring_Nm_rad']:g} N·m/rad at {cure['rest_deg']:g}°"
             for cure in cures
         ]
         parts.append(
-            f"{table(head, lines)}\n\nWeakest with which 0 of {episodes} fell: {told[0]}; under pushes: {told[1]}."
+            f"{table(head, lines)}\n\nWeakest with which 0 of {episodes} fell: {undisturbed}; under pushes: {pushed}."
         )
-    most = share_interval(0, episodes)[1]
+    _, most = share_interval(0, episodes)
     return (
         "![Drop foot](drop.png)\n\n"
         + "\n\n".join(parts)
@@ -365,9 +376,10 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
 
 def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
     """Return the report's section on people who adapted; empty if there are none."""
-    head = ["right foot", "person", *(each.label for each in TOLD)]
+    head = ["right foot", "person", *(number.label for number in TOLD)]
     lines = [
-        [row["foot"], row["person"], *(_unless_all_fall(row, each.key, each.pattern) for each in TOLD)] for row in rows
+        [row["foot"], row["person"], *(_unless_all_fall(row, number.key, number.pattern) for number in TOLD)]
+        for row in rows
     ]
     note = (
         f"{what_ran}, undisturbed and, for `falls, pushed`, pushed by ±{push_newton:g} N; without an orthosis. "
@@ -377,10 +389,12 @@ def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
 
 
 def _unless_all_fall(row: Row, key: str, pattern: str) -> str:
+    """Return a number of a walk as text; a dash where every episode fell, but for the falls themselves."""
     return MISSING if row["falls"] == 1.0 and not key.startswith("falls") else text_of(row[key], pattern)
 
 
 def _cell(row: Row) -> str:
+    """Return falls, undisturbed / pushed, and toe clearance of a walk, as a cell of a table."""
     clearance = MISSING if row["clearance_m"] is None else f"{1000 * row['clearance_m']:.0f} mm"
     return f"{row['falls']:.0%} / {row['falls_pushed']:.0%}, {clearance}"
 
@@ -396,9 +410,9 @@ def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
             np.ravel(figure.subplots(1, len(speeds), sharey=True, squeeze=False)), speeds, strict=True
         ):
             for strength, color in zip(sorted({row["strength"] for row in rows}), COLORS * 9, strict=False):
-                own = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
-                x = [row["spring_Nm_deg"] for row in own]
-                y = [row["fibre_J_kg_m"] for row in own]
+                walking = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
+                x = [row["spring_Nm_deg"] for row in walking]
+                y = [row["fibre_J_kg_m"] for row in walking]
                 ax.plot(x, y, "o-", color=color, ms=3.5, lw=1.3, label=f"a calf of {100 * strength:.0f} %")
                 for row in _of(best, (mass, speed, strength)):
                     if row["best_Nm_deg"] is not None:
@@ -423,10 +437,16 @@ def draw_drop(path: Path, rows: Sequence[Row]) -> None:
         ):
             grid = np.full((len(rests), len(stiffness)), np.nan)
             for row in (row for row in rows if row["speed_m_s"] == speed):
-                place = rests.index(row["rest_deg"]), stiffness.index(row["spring_Nm_rad"])
-                grid[place] = np.nan if row["clearance_m"] is None else 1000 * row["clearance_m"]
-                mark = "x" if row["falls"] else "+" if row["falls_pushed"] else ""
-                ax.plot(place[1], place[0], mark or ",", color="#a03030", ms=7)
+                y = rests.index(row["rest_deg"])
+                x = stiffness.index(row["spring_Nm_rad"])
+                grid[y, x] = np.nan if row["clearance_m"] is None else 1000 * row["clearance_m"]
+                if row["falls"]:
+                    mark = "x"
+                elif row["falls_pushed"]:
+                    mark = "+"
+                else:
+                    mark = ","  # a pixel
+                ax.plot(x, y, mark, color="#a03030", ms=7)
             image = ax.imshow(grid, origin="lower", aspect="auto", cmap="viridis", vmin=0.0, vmax=35.0)
             ax.set_xticks(range(len(stiffness)), [f"{value:g}" for value in stiffness])
             ax.set_yticks(range(len(rests)), [f"{value:g}" for value in rests])

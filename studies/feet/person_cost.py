@@ -51,8 +51,14 @@ def cost(
 ) -> NDArray:
     """Return the cost of each person, (C,).
 
-    `push` is the size of the pushes [N]. With `bend` [rad] a right toe that moves through a larger range costs too,
-    `bend_weight` times.
+    Args:
+        settings: settings of the environment, the right foot aside.
+        people: C candidates.
+        seed: seed of the first walk, the same for all.
+        threads: threads of the physics.
+        push: size of the pushes in the pushed walks [N].
+        bend: range of the right toe beyond which it costs [rad]; None for none.
+        bend_weight: factor on that cost.
     """
     settings = replace(settings, unevenness_m=UNEVENNESS, action_mode="residual")
     legs = [p.sound for p in people]
@@ -61,12 +67,12 @@ def cost(
     total = np.zeros(len(people))
     seeds = [seed + index % LEVEL for index in range(LEVEL * len(people))]
     walked = walk(settings, legs, seeds, threads, foreign=(), right=right, feet=feet)
-    for index, lost in enumerate(walked.missing):
-        if lost > 0:
-            total[index // LEVEL] += lost * 3 * FALL_COST / LEVEL
+    for index, missing in enumerate(walked.missing):  # 0 without a fall; LEVEL walks in turn of each candidate
+        if missing > 0:
+            total[index // LEVEL] += missing * 3 * FALL_COST / LEVEL
         else:
-            missed = misses(walked.episode(index), walked.biped, bend, bend_weight)
-            total[index // LEVEL] += (FALL_COST if missed is None else float(np.linalg.norm(missed))) / LEVEL
+            distances = misses(walked.episode(index), walked.biped, bend, bend_weight)
+            total[index // LEVEL] += (FALL_COST if distances is None else float(np.linalg.norm(distances))) / LEVEL
     pushed = replace(settings, push_newton=push, push_interval=PUSH_INTERVAL)
     seeds = [seed + index % PUSHED for index in range(PUSHED * len(people))]
     missing = walk(pushed, legs, seeds, threads, foreign=(), right=right, feet=feet).missing
@@ -76,15 +82,16 @@ def cost(
 def misses(
     series: dict[str, NDArray], biped: Biped, bend: float | None = None, bend_weight: float = 1.0
 ) -> NDArray | None:
-    """Return the distance of one walk from a good one, number by number, in tolerances.
+    """Return the distances of one walk from a good one, as one vector, each in its unit of `TOLERANCE`.
 
-    The numbers are those of an evaluation, of the strides that begin after `SETTLED`; None if they are too few.
+    The numbers are those of an evaluation, of the strides that begin after `SETTLED`; None if these are too few.
+    `series` are the walk's, from `leg_walks.Walks.episode`; `bend` and `bend_weight` are as for `cost`.
     """
     tally = measured(series, biped)
     if tally is None:
         return None
     target = biped.target
-    first = round(SETTLED / TICK)
+    first = round(SETTLED / TICK)  # tick
     sides = np.array(tally.stride_sides)
     landed = np.array(tally.step_sides)
     off: dict[str, list[float]] = {name: [] for name in TOLERANCE}
@@ -102,7 +109,7 @@ def misses(
         stance.append(float(np.mean(np.array(tally.toe_off)[sides == side])) / 100)
     off["speed"] = [tally.speed[0] - biped.settings.speed]
     for name, (left, right) in (("step_length", step_length), ("stance", stance)):
-        off[name] = [2 * (right - left) / max(abs(right + left), 0.1)]
+        off[name] = [2 * (right - left) / max(abs(right + left), 0.1)]  # 0.1: where both are about 0
     off["work"] = [max(tally.work / biped.body.mass / max(tally.distance, 0.1) - MOST_WORK, 0.0)]
-    off["pitch"] = [float(np.sqrt(np.mean(series["base"][first:, 2] ** 2)))]
+    off["pitch"] = [float(np.sqrt(np.mean(series["base"][first:, 2] ** 2)))]  # base: x, z, pitch
     return np.concatenate([np.array(values) / TOLERANCE[name] for name, values in off.items()])

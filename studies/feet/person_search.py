@@ -32,14 +32,14 @@ class Person:
 
     @property
     def feet(self) -> Feet:
-        """A sound left foot, and this one on the right."""
+        """Return a sound left foot, and this one on the right."""
         return INTACT, foot_setting("foot", self.foot).foot
 
     def setting(self, speed: float) -> dict[str, Any]:
         """Return the foot as a setting, with `adapted` for `speed` [m/s]."""
         foot = {"kind": self.foot} if isinstance(self.foot, str) else dict(self.foot)
         legs = dict(zip(LEGS, (asdict(self.sound), asdict(self.other)), strict=True))
-        return foot | {ADAPTED: {f"{speed:g}": {leg: _listed(values) for leg, values in legs.items()}}}
+        return foot | {ADAPTED: {f"{speed:g}": {leg: _with_lists(values) for leg, values in legs.items()}}}
 
 
 class PersonSearch:
@@ -48,7 +48,7 @@ class PersonSearch:
     Args:
         start: where it begins.
         speed: for which the constants are [m/s].
-        design: how many units of the legs one of the numbers that the kind of foot has is worth; at 0 they stay.
+        design: steps of the foot's own numbers, in units of those of the legs; at 0 the numbers stay.
     """
 
     def __init__(self, start: Person, speed: float, design: float):
@@ -57,30 +57,31 @@ class PersonSearch:
         self._legs = [Search(start.sound, speed), Search(start.other, speed)]
         foot = foot_setting("foot", start.foot)
         device = foot.foot.ankle.device is not None
-        skipped = [NEVER, NEVER + HELD_BY_SOUND + (OF_MUSCLES if device else ())]
+        left_out = [NEVER, NEVER + HELD_BY_SOUND + (OF_MUSCLES if device else ())]  # of the sound and the other leg
         self._free = [
-            np.array([name not in left_out for name in legs.names])
-            for legs, left_out in zip(self._legs, skipped, strict=True)
+            np.array([name not in left_out_names for name in legs.names])
+            for legs, left_out_names in zip(self._legs, left_out, strict=True)
         ]
         self._numbers = tuple(KINDS[foot.kind]) if design else ()
         self._numbers = tuple(name for name in self._numbers if name in SPRING_NUMBERS and name != "damping_time")
         self.size = sum(int(free.sum()) for free in self._free) + len(self._numbers)
 
     def person(self, vector: NDArray) -> Person:
-        """Return the candidate at a vector (size,)."""
-        place = 0
+        """Return the candidate at a vector (size,): entries of the sound leg, of the other leg, and of the foot."""
+        first = 0  # entry of the next part in the vector
         legs = []
         for search, free in zip(self._legs, self._free, strict=True):
-            own = np.zeros(search.size)
-            own[free] = vector[place : place + int(free.sum())]
-            place += int(free.sum())
-            legs.append(search.constants(own))
+            steps = np.zeros(search.size)
+            steps[free] = vector[first : first + int(free.sum())]
+            first += int(free.sum())
+            legs.append(search.constants(steps))
         sound, other = legs
         shared = {name: getattr(sound, name) for name in HELD_BY_SOUND}
         other = constants_from(asdict(other) | shared)
-        return Person(sound=sound, other=other, foot=self._foot(vector[place:]))
+        return Person(sound=sound, other=other, foot=self._foot(vector[first:]))
 
     def _foot(self, steps: NDArray) -> str | dict[str, Any]:
+        """Return the foot at these `steps` of its numbers: angles by steps, stiffness by e^(`GAIN_STEP` step)."""
         if not self._numbers:
             return self._start.foot
         foot: dict[str, Any] = (
@@ -94,5 +95,6 @@ class PersonSearch:
         return foot
 
 
-def _listed(values: Mapping[str, Any]) -> dict[str, Any]:
+def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `values` with lists for tuples, as in JSON."""
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}

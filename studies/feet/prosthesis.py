@@ -111,6 +111,7 @@ class Prosthesis(TrainingStudy):
         rows = []
         for labels, policy, settings in self._rows():
             how = self._how(labels)
+            # All that the numbers depend on; they do not on the threads.
             question = [labels, policy, _digest(policy, settings), settings, {**how, "threads": 0}, PUSH_NEWTON, NAMES]
             numbers = kept.get(question, lambda p=policy, s=settings, h=how: walked(p, s, progress=progress, **h))
             rows.append({**labels, **numbers})
@@ -128,8 +129,11 @@ class Prosthesis(TrainingStudy):
         return Answer(text="\n\n".join(text.values()), files=files, failed=failed)
 
     def _how(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the arguments of `record` for the episodes of a row; without a trained policy those of its group."""
-        if not (_is_first_place(row) or row["asked_m_s"] == _held_speed()):
+        """Return the arguments of `record` for the episodes of a row; without a trained policy those of its group.
+
+        `row` has the row's labels. Rows at other places have fewer episodes.
+        """
+        if not (_is_first_place(row) or row["asked_m_s"] == _speed_of_held_toe()):
             return {**self.how, "episodes": self.episodes_elsewhere}
         if row["person"] == WITH_POLICY:
             return self.how
@@ -143,7 +147,7 @@ class Prosthesis(TrainingStudy):
         """
         feet = committed_feet()
         schedule, as_factors = SCHEDULE
-        for (height, mass), speed in PLACES[: 1 if self.quick else None]:
+        for (height, mass), speed in PLACES[:1] if self.quick else PLACES:
             settings = {"height": height, "mass": mass, "speed": speed, "episode_seconds": self.seconds}
             place = {"height_m": height, "mass_kg": mass, "asked_m_s": speed}
             groups = range(self.groups if _is_first_place(place) else 1)
@@ -177,7 +181,7 @@ class Prosthesis(TrainingStudy):
     def _rows_with_held_toe(self) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
         """Yield, as `_rows` does, the rigid foot with a held toe and the passive feet, at the speed of the held toe's
         search."""
-        if (speed := _held_speed()) is None:
+        if (speed := _speed_of_held_toe()) is None:
             return
         height, mass = BODIES[0]
         feet = committed_feet()
@@ -210,7 +214,8 @@ class Prosthesis(TrainingStudy):
         self.policies.mkdir(parents=True, exist_ok=True)
         for _, folder, _ in jobs:
             if (folder / BEST).is_file():
-                shutil.copyfile(folder / BEST, self.policies / f"{folder.parent.name}-{folder.name[5:]}.safetensors")
+                seed_text = folder.name.removeprefix("seed-")
+                shutil.copyfile(folder / BEST, self.policies / f"{folder.parent.name}-{seed_text}.safetensors")
         return failed
 
 
@@ -219,22 +224,29 @@ def _is_first_place(row: Mapping[str, Any]) -> bool:
     return (row["height_m"], row["mass_kg"], row["asked_m_s"]) == (*BODIES[0], TUNED_SPEED)
 
 
-def _held_speed() -> float | None:
+def _speed_of_held_toe() -> float | None:
     """Return the speed at which the person with a held toe was searched for [m/s]; None without that foot."""
-    held = committed_feet().get(TOE_HELD)
-    return None if held is None else float(next(iter(held[ADAPTED])))
+    foot = committed_feet().get(TOE_HELD)
+    return None if foot is None else float(next(iter(foot[ADAPTED])))  # its one speed
 
 
 def _labels(foot: str, person: str, place: Mapping[str, float], search: int | str, seed: int) -> dict[str, Any]:
-    """Return the labels of a row: its first columns in the CSV file."""
+    """Return the labels of a row: its first columns in the CSV file.
+
+    `place` has height [m], mass [kg] and speed [m/s] by the names of `WHERE`; `search` is "" for feet without a search.
+    """
     return {"foot": foot, "person": person, "search": search, "seed": seed, **place}
 
 
 def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
-    """Return the preset `walk` on the adapted foot `name`, with stiffness as factors on the schedule of its search."""
+    """Return the preset `walk` on the committed foot `name`, worn by the person who has adapted to it.
+
+    Actions are factors on the stiffness schedule in that person's leg constants, which the search found.
+    """
     if name not in committed_feet():
         raise SpringfootError(f"no adapted foot {name!r}; there are {', '.join(committed_feet())}")
     preset = PRESETS["walk"]
+    # The person by name, in place of the whole dictionary of leg constants.
     worn = {**without_person(committed_feet()[name]), ADAPTED: name}
     return replace(
         preset,
@@ -245,7 +257,10 @@ def config_of(name: str, seed: int, timesteps: int) -> TrainingConfig:
 
 
 def _digest(policy: str, settings: Mapping[str, Any]) -> str:
-    """Return a digest of the policy's file, and of the legs and the foot that its settings name."""
+    """Return a digest of the policy's file, and of the committed foot and person that `settings` name.
+
+    Kept numbers of a row are of this digest, so that another file or another search has the row walked again.
+    """
     path = find_policy(policy) if policy in SHIPPED else Path(policy)
     foot = settings.get("right_foot")
     name = foot.get(ADAPTED, "") if isinstance(foot, dict) else ""
@@ -295,6 +310,7 @@ def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list
         for search, pairs in by_search.items()
     ]
     if len(searches) > 1:
+        # (searches, 2), also without any: the passive and the adaptive foot.
         means = np.array([pairs.mean(0) for pairs in by_search.values() if len(pairs)]).reshape(-1, 2)
         both = {"search": "both", "pairs": sum(map(len, by_search.values()))}
         changes.append(both | _change(means, intact, asked.better, few=True))
@@ -302,7 +318,10 @@ def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list
 
 
 def pairs_of(rows: Sequence[Row], feet: Sequence[tuple[str, Any]], key: str) -> np.ndarray:
-    """Return (n, 2) the number `key` of two `feet` (foot, search), in pairs of rows with the same seed."""
+    """Return the number `key` of two feet, (n, 2), from pairs of rows with the same seed; None leaves a pair out.
+
+    `feet` are two pairs of foot and search.
+    """
     first, second = (
         {row["seed"]: row[key] for row in rows if (row["foot"], row["search"]) == foot_and_search}
         for foot_and_search in feet
@@ -333,7 +352,7 @@ def _change(pairs: np.ndarray, intact: float | None, better: int, few: bool = Fa
         gap = intact - passive
         has_gap = (better * gap).min() > 0 if few else min(t_interval(better * gap)) > 0
         if has_gap:
-            ends = sorted(value / float(gap.mean()) for value in (low, high))
+            ends = sorted(value / float(gap.mean()) for value in (low, high))  # a negative gap changes their order
             result |= {"share": float(change.mean() / gap.mean()), "share_low": ends[0], "share_high": ends[1]}
     return result
 
@@ -417,7 +436,12 @@ def _passive_against(rows: Sequence[Row], foot: str) -> str:
             compared = (foot, search if search in searches_of_foot else ""), ("passive", search)
             passive_minus_foot = np.diff(pairs_of(adapted, compared, asked.key), axis=1).ravel()
             low, high = t_interval(asked.better * passive_minus_foot)  # `better` is 1 or -1, the better direction
-            verdict = "better" if low > 0 else "worse" if high < 0 else "not told apart"
+            if low > 0:
+                verdict = "better"
+            elif high < 0:
+                verdict = "worse"
+            else:
+                verdict = "not told apart"
             numbers_by_verdict[verdict].append(asked.label)
         words = [
             f"{verdict} in {len(names)} ({'; '.join(names)})" for verdict, names in numbers_by_verdict.items() if names

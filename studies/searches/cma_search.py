@@ -38,26 +38,44 @@ def generations(
     file: Path | None = None,
     asked: Any = None,
 ) -> Iterator[tuple[int, list[NDArray], NDArray]]:
-    """Run `count` generations and yield the number of each, from 0, its candidates and their costs.
+    """Return an iterator that runs `count` generations: number of each, from 0, its candidates and their costs.
 
     Args:
         strategy: the search, not yet begun.
         count: generations to run, kept ones included.
         costs_of: function of the generation's number and its candidates that returns their costs (candidates,).
         file: file of the costs. If it exists, the generations in it are not computed again.
-        asked: plain JSON values that describe the search. Raises `SpringfootError` if `file` belongs to another search.
+        asked: plain JSON values that describe the search.
+
+    Raises `SpringfootError`, before any generation, if `file` is of another kind or belongs to another search.
     """
-    asked = json.loads(json.dumps(asked))
-    known: list[NDArray] = []
-    if file is not None and file.exists():
-        table = read_object(file, "file of a search's costs")
-        try:
-            asked_before = table["asked"]
-            known = [_read_costs(costs, strategy.popsize) for costs in table["paid"]]
-        except (ValueError, TypeError, KeyError, OverflowError) as error:
-            raise SpringfootError(f"{file} is no file of a search's costs: {error}") from None
-        if json.dumps(asked_before, sort_keys=True) != json.dumps(asked, sort_keys=True):
-            raise SpringfootError(f"{file} is of a search with other settings; choose another place")
+    known = [] if file is None or not file.exists() else _kept_costs(file, strategy.popsize, asked)
+    return _run(strategy, count, costs_of, file, asked, known)
+
+
+def _kept_costs(file: Path, candidates: int, asked: Any) -> list[NDArray]:
+    """Return the costs (candidates,) of each generation in a file; raise `SpringfootError` unless it is of the search
+    that `asked` describes."""
+    table = read_object(file, "file of a search's costs")
+    try:
+        asked_before = table["asked"]
+        known = [_read_costs(costs, candidates) for costs in table["costs"]]
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
+        raise SpringfootError(f"{file} is no file of a search's costs: {error}") from None
+    if json.dumps(asked_before, sort_keys=True) != json.dumps(asked, sort_keys=True):
+        raise SpringfootError(f"{file} is of a search with other settings; choose another place")
+    return known
+
+
+def _run(
+    strategy: cma.CMAEvolutionStrategy,
+    count: int,
+    costs_of: Callable[[int, list[NDArray]], NDArray],
+    file: Path | None,
+    asked: Any,
+    known: list[NDArray],
+) -> Iterator[tuple[int, list[NDArray], NDArray]]:
+    """Run the generations of `generations`; the first have the costs `known`, and the others are added to `file`."""
     for generation in range(count):
         vectors = [np.asarray(vector) for vector in strategy.ask()]
         if generation < len(known):
@@ -66,7 +84,7 @@ def generations(
             costs = np.asarray(costs_of(generation, vectors), float)
             known.append(costs)
             if file is not None:
-                table = {"asked": asked, "paid": [of_generation.tolist() for of_generation in known]}
+                table = {"asked": asked, "costs": [of_generation.tolist() for of_generation in known]}
                 write_atomically(file, (json.dumps(table) + "\n").encode())
         strategy.tell(vectors, costs.tolist())
         yield generation, vectors, costs

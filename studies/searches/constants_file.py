@@ -32,8 +32,10 @@ def read_styles(path: Path) -> dict[str, Any]:
 
 
 def _read(path: Path, key: str, content: str) -> dict[str, Any]:
-    """Return the object of a JSON file with the entries `key` and `found_by`; raise `SpringfootError`, which says that
-    it is no file of `content`, for any other."""
+    """Return the object in a JSON file, which must have an object `key`; `found_by` is added if it is missing.
+
+    Raises `SpringfootError`, which says that the file is not one of `content`, for any other file.
+    """
     try:
         table = read_object(path, content)
     except (OSError, SpringfootError):

@@ -12,14 +12,14 @@ def generic_constants() -> LegConstants:
     No curve is corrected, all moments are fed forward, springs are equally stiff at every phase, and the trunk is
     upright.
     """
-    level = (0.0,) * len(KNOTS)
-    stiff = (200.0, 200.0)
+    uncorrected = (0.0,) * len(KNOTS)
+    stance_and_swing = (200.0, 200.0)
     return LegConstants(
-        hip_knots_deg=level,
-        knee_knots_deg=level,
-        ankle_knots_deg=level,
-        hip_stiffness=stiff,
-        knee_stiffness=stiff,
+        hip_knots_deg=uncorrected,
+        knee_knots_deg=uncorrected,
+        ankle_knots_deg=uncorrected,
+        hip_stiffness=stance_and_swing,
+        knee_stiffness=stance_and_swing,
         feedforward=(1.0, 1.0, 1.0),
         period_factor=1.0,
         period_speed_gain=0.0,

@@ -139,7 +139,7 @@ def cost(
     walks = SCHEDULED + len(springs)
     seeds = [seed + index % walks for index in range(walks * count)]
     walked = walk(settings, candidates, seeds, threads, ease, springs)
-    missing = walked.missing
+    missing = walked.missing  # 0 for walks without a fall
     for index in range(walks * count):
         candidate = index // walks
         if index % walks >= SCHEDULED:
@@ -223,8 +223,8 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     # Curves: joints, forces and moments from the target, CoM and CoP from the plan.
     off: dict[str, Any] = {curve: values - target_mean[curve] for curve, values in mean.items()}
     course = planned_course(biped.plan)
-    planned_speed = biped.plan.com_velocity(np.minimum(phase, 1 - 1e-9))[0]
-    off["com_x"] = tally.com.mean("x") - course["plan_com"][:, 0]
+    planned_speed = biped.plan.com_velocity(np.minimum(phase, 1 - 1e-9))[0]  # at 100 % still of this step
+    off["com_x"] = tally.com.mean("x") - course["plan_com"][:, 0]  # columns x, z
     off["com_z"] = tally.com.mean("z") - course["plan_com"][:, 1]
     off["com_speed"] = tally.com.mean("vx") - planned_speed
     off["cop"] = np.nan_to_num(tally.cop.mean("x") - course["plan_zmp"])[:-1]  # at 100 % the plan is at the next foot
@@ -239,11 +239,12 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["double_support"] = np.mean(tally.double_support) - (target.toe_off - 0.5) * target.stride_time
     features = astuple(force_features(mean["grf_vertical"], mean["grf_forward"]))
     target_features = astuple(force_features(target_mean["grf_vertical"], target_mean["grf_forward"]))
+    # `ForceFeatures` begin with two peaks and the valley between them, then braking and forward peak.
     for name, part in (("vertical", slice(0, 3)), ("fore_aft", slice(3, 5))):
         off[name] = _beyond(np.subtract(features[part], target_features[part]), ALLOWED[name])
     peak_moment = mean["ankle_moment"].max() - target_mean["ankle_moment"].max()
     off["peak_moment"] = _beyond(peak_moment, ALLOWED["peak_moment"])
-    work = np.abs(np.mean(tally.joint_work, axis=0))
+    work = np.abs(np.mean(tally.joint_work, axis=0))  # (joint, positive and negative), mean over strides
     off["work"] = _beyond(work[: len(target_work)] - target_work, ALLOWED["work"])
     ankle_r = np.corrcoef(mean["ankle"], target_mean["ankle"])[0, 1]
     off["ankle_r"] = max(LEAST_ANKLE_R - ankle_r, 0.0)
@@ -256,7 +257,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
 
 
 def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
-    """Return the part of a difference outside the band [-band, band], signed."""
+    """Return by how much a difference lies outside [-band, band], with its sign; 0 inside."""
     return np.sign(difference) * np.maximum(np.abs(difference) - band, 0.0)
 
 

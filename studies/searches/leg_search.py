@@ -55,7 +55,7 @@ class Search:
     def constants(self, vector: NDArray) -> LegConstants:
         """Return the constants at a vector (size,): start plus steps, or for gains start times e^(`GAIN_STEP` step)."""
         values = {}
-        first = 0
+        first = 0  # entry of the next constant in the vector
         leads = dict(zip(LED, vector[-len(LED) :], strict=True))
         for name, start in self._start.items():
             step = vector[first : first + start.size]

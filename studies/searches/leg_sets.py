@@ -77,22 +77,24 @@ class LegSets(WalkingStudy):
         numbers = []
         front = {}
         for label, given, legs in _sets(read_constants(self.constants)):
-            name, own = SCHEDULE
-            level, pushed = (self._walk(name, {**given, **own, **more}, legs, progress) for more in ({}, PUSHED))
+            name, as_factors = SCHEDULE
+            undisturbed, pushed = (
+                self._walk(name, {**given, **as_factors, **pushes}, legs, progress) for pushes in ({}, PUSHED)
+            )
             misses = self._misses(given, legs)
             untuned = None
             if given == SETTINGS[0]:
                 walks = [self._walk(other, {**given, **PUSHED}, legs, progress) for other in UNTUNED]
-                untuned = 100 * sum(each["falls"] for each in walks) / (len(UNTUNED) * self.episodes)
+                untuned = 100 * sum(metrics["falls"] for metrics in walks) / (len(UNTUNED) * self.episodes)
                 front[label] = misses, untuned
-            values = [misses, untuned, *(each.of(level) for each in WALKED)]
-            patterns = [".1f", ".0f", *(each.pattern for each in WALKED)]
-            falls = [f"{m['falls']} of {m['episodes']}" for m in (level, pushed)]
+            values = [misses, untuned, *(column.of(undisturbed) for column in WALKED)]
+            patterns = [".1f", ".0f", *(column.pattern for column in WALKED)]
+            falls = [f"{m['falls']} of {m['episodes']}" for m in (undisturbed, pushed)]
             ankle = "/".join(f"{k:.0f}" for k in legs.ankle_schedule)
             texts = [text_of(value, pattern) for value, pattern in zip(values, patterns, strict=True)]
             lines.append([label, *falls, *texts, ankle, f"{legs.toe_schedule:.0f}"])
-            numbers.append([label, level["falls"], pushed["falls"], *values])
-        walked = ["misses", "untuned springs fall %", *(each.label for each in WALKED)]
+            numbers.append([label, undisturbed["falls"], pushed["falls"], *values])
+        walked = ["misses", "untuned springs fall %", *(column.label for column in WALKED)]
         head = ["set", "falls", "pushed", *walked, "K ankle", "K toe"]
         names = ", ".join(f"`{name}`" for name in UNTUNED)
         text = (
@@ -107,7 +109,7 @@ class LegSets(WalkingStudy):
             "falls_pushed",
             "misses",
             "untuned_falls_percent",
-            *(each.csv_name for each in WALKED),
+            *(column.csv_name for column in WALKED),
         ]
         files = {"leg_sets.csv": csv_text(columns, numbers), "leg_sets.png": partial(_draw, front=front)}
         picture = "![Misses of a set against falls of springs that nobody tuned](leg_sets.png)"
@@ -145,7 +147,8 @@ def _draw(path: Path, front: Mapping[str, tuple[float | None, float]]) -> None:
         drawn = sorted((falls, misses, label) for label, (misses, falls) in front.items() if misses is not None)
         for index, (falls, misses, label) in enumerate(drawn):
             ax.plot(misses, falls, "o", color=MODEL)
-            ax.annotate(label, (misses, falls), (6, (4, -11)[index % 2]), textcoords="offset points", fontsize=8)
+            above_or_below = 4 if index % 2 == 0 else -11  # in turn, as labels of neighbours would overlap
+            ax.annotate(label, (misses, falls), (6, above_or_below), textcoords="offset points", fontsize=8)
         ax.set_xlabel("misses of the walk with its own schedule (tolerances)")
         ax.set_ylabel("falls of springs nobody tuned,\nunder ±150 N (%)")
         ax.set_ylim(0, 105)

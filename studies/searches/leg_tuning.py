@@ -141,7 +141,7 @@ class LegTuning(Study):
         known = read_constants(self.constants)["constants"]
         if self.start == GENERIC:
             known = known | {GENERIC: asdict(generic_constants())}
-        if (start := self.start or name) not in known:
+        if (start := self.start or name) not in known:  # by default those to be replaced
             raise SpringfootError(
                 f"no constants {start!r} to start from in {self.constants}; start can be {', '.join(known)}"
             )

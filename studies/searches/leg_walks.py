@@ -77,7 +77,7 @@ def walk(
     num = len(seeds)
     walks_each = num // len(candidates)
     variant = np.repeat(np.arange(len(candidates)), walks_each)
-    rest = _eased(settings, candidates, ease) if ease else None
+    rest = _eased_rest_angles(settings, candidates, ease) if ease else None
     feet_of_walks = feet and [feet[index] for index in variant.tolist()]
     biped = Biped(
         settings, num, threads, legs=candidates, variant=variant, rest=rest, feet=feet_of_walks, right_legs=right
@@ -93,7 +93,7 @@ def walk(
         else:
             action = action_of(biped.scheduled_stiffness(), settings, biped.body)
         for index, stiffness in enumerate(foreign):
-            sample = (biped.leg_phase[springs == index] * len(GRID)).astype(int)
+            sample = (biped.leg_phase[springs == index] * len(GRID)).astype(int)  # index on `GRID` of each leg's phase
             action[springs == index] = action_of(stiffness[sample], settings, biped.body)
         return action.reshape(num, -1)
 
@@ -153,10 +153,10 @@ def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED)
 
 def mean_speed(tally: StrideTally) -> float:
     """Return the mean forward speed of the CoM over whole steps [m/s]."""
-    return float(tally.com.mean("vx")[:-1].mean())
+    return float(tally.com.mean("vx")[:-1].mean())  # at 100 % the next step has begun
 
 
-def _eased(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
+def _eased_rest_angles(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
     """Return (C, SAMPLES, 2) rest angles of ankle and toe [rad], moved by the fraction `ease` to the planned ones."""
     walk = reference_walk_at(settings, settings.speed, candidates)
     curves = [

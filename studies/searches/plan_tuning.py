@@ -96,7 +96,7 @@ def style_at(vector: NDArray) -> WalkStyle:
         values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
     groups = {name: [values.pop(f"{name}_{k + 1}") for k in range(count)] for name, count in GROUPS.items()}
     travel = [values.pop("zmp_from"), values.pop("zmp_to")]
-    way = groups["zmp_way"]
+    way = groups["zmp_way"]  # the ZMP's place after a third and two thirds of single support
     way[1] = max(way[1], way[0] + LEAST_ADVANCE)
     # A style has entries of the walk, and the others in an object `foot`.
     of_foot = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
@@ -141,7 +141,7 @@ def price(
         effort = effort_of(plan, muscle)
     except SpringfootError:
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
-    lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())
+    lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())  # all but the ends of swing, which touch the ground
     too_low = max(0.0, LOWEST_SOLE - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
     cost = (
         float(np.dot(weights, effort.terms))
@@ -208,6 +208,7 @@ class PlanTuning(Study):
         best_vector = begin
 
         def costs_of(_: int, vectors: list[NDArray]) -> NDArray:
+            """Return the costs of a generation's candidates."""
             return np.array([self._price(body, vector)[0] for vector in vectors])
 
         for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked_of(self)):

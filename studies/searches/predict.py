@@ -116,7 +116,7 @@ class Predict(WalkingStudy):
         seconds = {}  # wall time of each stage
 
         def stage(name: str, make: Callable[[], Any]) -> Any:
-            """Make a stage's result, and note its wall time."""
+            """Return the result of a stage, made by `make`, and note its wall time."""
             began = perf_counter()
             result = make()
             seconds[name] = perf_counter() - began

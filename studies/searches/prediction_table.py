@@ -19,7 +19,7 @@ JOINT_LIMITS = {"thigh": (3.5, 0.95), "knee": (5.0, 0.95), "ankle": (5.5, 0.93)}
 
 
 def _force(label: str, name: str, low: float, high: float = np.inf) -> Criterion:
-    """Return a criterion on a number of the ground reaction force."""
+    """Return a criterion on the number `name` of the ground reaction force in metrics: from `low` to `high`."""
     return Criterion(name=label, path=("grf", name), low=low, high=high)
 
 

@@ -48,7 +48,7 @@ JUDGED_WALKS, JUDGED_SECONDS = 16, 10.0
 
 
 def constants_of(vector: NDArray) -> SlopeConstants:
-    """Return the constants of a vector (10,): hip, knee, ankle, trunk."""
+    """Return the constants of a vector (10,): three coefficients each of hip, knee and ankle, and the trunk's one."""
     hip, knee, ankle = np.round(vector[:9], 3).reshape(3, 3).tolist()
     return slope_constants_from({"hip": hip, "knee": knee, "ankle": ankle, "trunk": round(float(vector[9]), 3)})
 
@@ -79,7 +79,7 @@ def walk(
     steps = round(seconds / biped.dt)
     episodes = Episodes.empty(num, steps * biped.windows_per_step)
     record_walk(biped, act, episodes, steps=steps)
-    lived = episodes.ticks * TICK
+    lived = episodes.ticks * TICK  # [s] until the walk's end or its fall
     numbers = {
         "missing": np.where(episodes.fall_reason == "", 0.0, 1.0 - 2.0 / 3.0 * lived / seconds),
         "speed": np.zeros(num),
@@ -101,14 +101,17 @@ def _heel_peak(series: dict[str, NDArray], body: Body) -> float:
 
 
 def cost(walked: dict[str, NDArray], level_reward: float) -> float:
-    """Return the cost of a candidate, averaged over its walks; `walked` comes from `walk`."""
+    """Return the cost of a candidate, averaged over its walks.
+
+    `walked` comes from `walk`; `level_reward` is the mean reward of a step on level ground.
+    """
     errors = {
         "speed": walked["speed"],
         "reward": 1.0 - walked["reward"] / level_reward,
         "heel": np.maximum(walked["heel"] - HARD, 0.0),
     }
-    paid = sum(np.hypot(1.0, error / TOLERANCE[name]) - 1.0 for name, error in errors.items())
-    return float(np.where(walked["missing"] > 0, FALL_COST * walked["missing"], paid).mean())
+    of_errors = sum(np.hypot(1.0, error / TOLERANCE[name]) - 1.0 for name, error in errors.items())
+    return float(np.where(walked["missing"] > 0, FALL_COST * walked["missing"], of_errors).mean())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,9 +162,10 @@ class SlopeTuning(Study):
             raise SpringfootError(f"{self.constants} has no constants for slopes to begin with") from None
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(vector_of(began), self.sigma, options)
-        length = self.walks, self.seconds
+        length = self.walks, self.seconds  # of each candidate at each slope
 
         def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
+            """Return the costs of a generation's candidates, which all walk from the same seeds."""
             seed = self.seed + 1000 * generation
             level_reward = walk(None, (0.0,), *length, seed, self.threads)["reward"].mean()
             walks = [walk(constants_of(vector), SLOPES_DEG, *length, seed, self.threads) for vector in vectors]

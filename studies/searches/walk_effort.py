@@ -23,7 +23,7 @@ TASK_TOLERANCE = {"speed": 0.01, "period": 0.02, "place": 0.01, "skipped": 0.01,
 """Units in which errors of the task count; chosen. Speed [m/s]; stride time over the plan's, less 1; place of the CoM
 over the foot, root mean square over the stride [m]; planned travel that a leg skips as its foot lands [m]; travel of
 the sole on the floor in a stance [m]; SD of the vertical force over the strides of both legs [body weights]."""
-PER_HELD, PER_MISS = 0.6, 0.01
+PER_TASK_ERROR, PER_MISS = 0.6, 0.01
 """Cost of one unit of `TASK_TOLERANCE`, and of one tolerance of distance from the plan; chosen: the task counts, and
 the planned angles hardly."""
 
@@ -36,10 +36,10 @@ def effort_price(
     `missed` is the walk's distance from the plan [tolerances] (`leg_cost.misses`), `impact` the price of impact over
     that of effort.
     """
-    effort, landing, held = effort_and_impact(series, tally, biped)
-    paid = effort.total + PER_DEGREE * effort.beyond_range + impact * landing
-    off = [PER_HELD * held[name] / TASK_TOLERANCE[name] for name in TASK_TOLERANCE]
-    return PER_EFFORT * paid + float(np.linalg.norm([*off, *(PER_MISS * missed)]))
+    effort, impact_of_legs, task_errors = effort_and_impact(series, tally, biped)
+    of_effort = effort.total + PER_DEGREE * effort.beyond_range + impact * impact_of_legs
+    of_task = [PER_TASK_ERROR * task_errors[name] / TASK_TOLERANCE[name] for name in TASK_TOLERANCE]
+    return PER_EFFORT * of_effort + float(np.linalg.norm([*of_task, *(PER_MISS * missed)]))
 
 
 def impact_of(force: NDArray, tick: float) -> float:
@@ -60,23 +60,24 @@ def effort_and_impact(
     body = biped.body
     weight = body.mass * GRAVITY
     speed = mean_speed(tally)
-    ahead = series["com"][:, 0] - series["com_reference"][:, 0]
+    ahead = series["com"][:, 0] - series["com_reference"][:, 0]  # of the CoM, forward of the plan's [m]
     impacts: list[float] = []
     places: list[float] = []
     landings: list[float] = []
     for side, foot in enumerate(foot_contacts(series["force"][..., 1].sum(axis=2), body)):
-        strides = strides_within(foot, (settled, np.inf))
+        strides = strides_within(foot, (settled, np.inf))  # (strides, 3): heel strike, toe-off, next heel strike [s]
         begin, _, end = strides.T
         off = on_percent(ahead, begin, end, TICK, first=TICK).mean(0)[:-1]
         places.append(float(np.sqrt(np.mean(off**2))))
         force = series["force"][:, side].sum(1) / weight
-        first, last = (strides[[0, -1], [0, 2]] / TICK).astype(int)
+        first, last = (strides[[0, -1], [0, 2]] / TICK).astype(int)  # begin of the first stride, end of the last one
         impacts.append(impact_of(force[first : last + 1], TICK))
         phase = series["phase"][:, side]
+        # The phase that the leg reaches in swing, before the foot's landing sets it to 0.
         landings += [phase[leave:land].max() for _, leave, land in np.floor(strides / TICK).astype(int)]
     effort = mean_effort(tally.effort, body)
     assert effort is not None  # `measured` lets no such walk pass
-    held = {
+    task_errors = {
         "speed": speed - biped.settings.speed,
         "period": float(np.mean(tally.stride_time)) / biped.plan.stride_time - 1,
         "place": float(np.mean(places)),
@@ -84,4 +85,4 @@ def effort_and_impact(
         "travel": float(np.mean(tally.travel)),
         "unsteady": float(np.sqrt(np.mean(tally.both.sd("grf_vertical_bw") ** 2))),
     }
-    return effort, float(np.mean(impacts)), held
+    return effort, float(np.mean(impacts)), task_errors

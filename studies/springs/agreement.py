@@ -23,7 +23,7 @@ from matplotlib.patches import Patch
 from springfoot.agents.policies import and_copy
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers import HUMAN_LIKE, Criterion, Gait, measure, number_text, with_derived
+from springfoot.evaluation.numbers import HUMAN_LIKE, Gait, measure, number_text, with_derived
 from springfoot.evaluation.recording import policy_and_settings, policy_label, record
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
@@ -130,6 +130,7 @@ def agreement_table(of_joints: Sequence[Agreement]) -> str:
 
 def _stretches(mask: NDArray) -> str:
     """Return the percents at which a mask (101,) is True, as in "2–60, 95–100"."""
+    # First percent of each stretch, and the one after its last, in turn.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return ", ".join(f"{first}–{last - 1}" for first, last in edges.reshape(-1, 2))
 
@@ -146,15 +147,20 @@ def criteria_table(
 
     Bracketed numbers meet only the loosened criterion, bold ones not even that; the row `missed` counts the bold ones.
     """
-    measured = [with_derived(each) for each in metrics]
+    measured = [with_derived(metrics_of_policy) for metrics_of_policy in metrics]
     lines = []
     missed = [0] * len(measured)
     for criterion in HUMAN_LIKE:
         cells = []
         for column, values in enumerate(measured):
-            state = _state(criterion, values)
-            missed[column] += state == "**"
-            cells.append({"": "{}", "(": "({})", "**": "**{}**"}[state].format(number_text(criterion, values)))
+            text = number_text(criterion, values)
+            if criterion.holds(values):
+                cells.append(text)
+            elif criterion.loosened().holds(values):
+                cells.append(f"({text})")
+            else:
+                cells.append(f"**{text}**")
+                missed[column] += 1
         loose = criterion.loosened()
         lines.append([criterion.name, criterion.text, loose.text if loose != criterion else "", *cells])
     lines.append(["missed", "", "", *map(str, missed)])
@@ -163,13 +169,6 @@ def criteria_table(
         angles = [MISSING if copy is None else rmse_text(copy) for copy in copies]
         lines += [[f"{OPEN_LOOP}: falls", "", "", *falls], [f"{OPEN_LOOP}: thigh / knee / ankle °", "", "", *angles]]
     return table(["", "criterion", "loosened", *(f"`{name}`" for name in names)], lines)
-
-
-def _state(criterion: Criterion, values: dict[str, Any]) -> str:
-    """Return the mark of a number: "" if it meets the criterion, "(" if only the loosened one, "**" if neither."""
-    if criterion.holds(values):
-        return ""
-    return "(" if criterion.loosened().holds(values) else "**"
 
 
 def curves_csv(of_joints: Sequence[Agreement]) -> str:
@@ -240,7 +239,7 @@ class SeedAgreement(WalkingStudy):
         """Walk with every policy, and compare them."""
         walked = [[self._walk(row, progress) for row in and_copy(name)] for name in self.policies]
         gaits = [gait for gait, *_ in walked]
-        copies = [copy[0].metrics if copy else None for _, *copy in walked]
+        copies = [copy[0].metrics if copy else None for _, *copy in walked]  # one copy, or none
         of_joints = agreements(gaits)
         labels = [policy_label(name) for name in self.policies]
         note = (
@@ -257,6 +256,6 @@ class SeedAgreement(WalkingStudy):
         return Answer(text=text, files=files)
 
     def _walk(self, name: str, progress: OnProgress) -> Gait:
-        """Record and measure the policy of that name."""
+        """Return the measured walk of the policy of that name."""
         policy, settings = policy_and_settings(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
         return measure(record(policy, settings, name=policy_label(name), progress=progress, **self.how))

@@ -70,6 +70,7 @@ def mean_springs(recording: Recording) -> MeanSprings:
     begin = round(WARM_UP / TICK)
     phase = recording.series["phase"][:, begin:].ravel()
     valid = np.isfinite(phase)
+    # Index of the segment of each sample; a phase of float32 just below 1 may round up to it.
     segment = np.minimum((phase[valid] * PHASE_SEGMENTS).astype(int), PHASE_SEGMENTS - 1)
     count = np.bincount(segment, minlength=PHASE_SEGMENTS)
     seen = count > 0  # a leg that lands early skips the last segments: they are interpolated
@@ -77,8 +78,8 @@ def mean_springs(recording: Recording) -> MeanSprings:
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be rebuilt")
 
     def mean(name: str) -> NDArray:
-        """Return the mean of a series over the samples of each segment."""
-        values = recording.series[name][:, begin:]
+        """Return the mean of a series over the samples of each segment, (PHASE_SEGMENTS, 2)."""
+        values = recording.series[name][:, begin:]  # of all four joints, but `stiffness` of ankle and toe alone
         values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[valid].astype(float)
         totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[seen] for joint in range(2)]
         return np.stack([np.interp(STARTS, STARTS[seen], total / count[seen], period=1.0) for total in totals], -1)
@@ -101,13 +102,13 @@ def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
 def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
     """Return K of ankle and toe (PHASE_SEGMENTS, 2) [N m/rad] for a name as in `STIFFNESSES`, with any positive number
     after the colon; raise `SpringfootError` for another name."""
-    kind, _, text = name.partition(":")
+    kind, _, text = name.partition(":")  # "flat:150"
     try:
         number = float(text) if text else nan
     except ValueError:
         number = nan
     scale = springs.body.stiffness_scale
-    if kind in ("flat", "times") and 0 < number < inf:
+    if kind in ("flat", "times") and 0 < number < inf:  # NaN is refused below
         if kind == "times":
             return number * springs.stiffness
         flat = number * np.array([1.0, TOE_STIFFNESS_UNIT / ANKLE_STIFFNESS_UNIT]) * scale
@@ -136,7 +137,7 @@ class Row:
 
 
 def walk_row(name: str, walks: dict[str, Recording]) -> Row:
-    """Measure the recordings of one stiffness, by condition; the first condition is the undisturbed one."""
+    """Return the measurements of one stiffness from its recordings by condition, the undisturbed condition first."""
     metrics = {condition: measure(recording).metrics for condition, recording in walks.items()}
     springs = next(iter(metrics.values()))["springs_J_kg"]["ankle"]
     work = {source: springs[f"{source}_changes"] for source in ("stiffness", "equilibrium")}
@@ -169,7 +170,7 @@ def any_stiffness(
     def walk(
         row_name: str, make_policy: Callable[[BipedSettings], Any], settings: BipedSettings
     ) -> dict[str, Recording]:
-        """Record one row under every condition."""
+        """Return condition -> recording of one row, by the policy that `make_policy` makes for its settings."""
         recordings = {}
         for condition, changes in conditions.items():
             changed = replace(settings, **changes)
@@ -222,7 +223,7 @@ def stiffness_table(rows: Sequence[Row]) -> str:
     return table(head, lines)
 
 
-def _numbers(rows: Sequence[Row]) -> str:
+def stiffness_csv(rows: Sequence[Row]) -> str:
     """Return the CSV with a line for each stiffness and condition."""
     return walks_csv(
         [
@@ -280,4 +281,4 @@ class AnyStiffness(WalkingStudy):
             f"{name.replace(':', '-')}.json": json.dumps(springs.to_json()) + "\n"
             for name, springs in schedules.items()
         }
-        return Answer(text=text, files={"stiffness.csv": _numbers(rows)} | files)
+        return Answer(text=text, files={"stiffness.csv": stiffness_csv(rows)} | files)

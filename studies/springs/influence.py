@@ -157,7 +157,7 @@ def headline(study: Influence, responses: Mapping[str, Response]) -> str:
     acceleration foretells the walk."""
     first = next(iter(responses.values()))
     mean = first.mean[MANY_STRIDES_SPEED]
-    largest = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]
+    largest = [cell for cell in np.argsort(-np.abs(np.nan_to_num(mean))) if first.moved[cell]][:3]  # three at most
     largest_elsewhere = np.nanmax(np.abs(np.delete(mean, largest)))
     effects = [f"{_cell(cell)}, {_number(first, MANY_STRIDES_SPEED, cell, '+.1f', 1e3)} mm/s" for cell in largest]
     r, low, high, scrambled = first.links["∫Δa dt → Δspeed of many strides"]
@@ -213,6 +213,7 @@ def _chain_table(responses: Mapping[str, Response]) -> str:
         begin, end = PHASES[phase]
 
         def several(duration: str, name: str, times: tuple[str, ...], pattern: str = "+.1f", cell: int = cell) -> str:
+            """Return the means of a quantity at several times, in thousandths of its unit, as in "+1.2 / +0.9"."""
             return " / ".join(_number(first, (duration, name, time), cell, pattern, 1e3, False) for time in times)
 
         number = partial(_number, first, cell=cell)
@@ -376,7 +377,7 @@ def _draw_prediction(ax: Axes, responses: Mapping[str, Response]) -> None:
     ax.plot(x, y, "o", ms=5, color=MODEL, label=name)
     for cell, (joint, phase) in enumerate(CELLS):
         if abs(y[cell]) >= 1e3 * LABELLED:
-            label_right = x[cell] < 0.5 * x.max()  # of the point, where there is room
+            label_right = x[cell] < 0.5 * x.max()  # to the right of the point, where there is room
             ax.annotate(
                 f"{SPRINGS[joint]}, {phase}",
                 (x[cell], y[cell]),

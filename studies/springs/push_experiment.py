@@ -73,15 +73,16 @@ class Samples:
 def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> Samples:
     """Return the samples of a recording after the warm-up, without the last second of an episode that fell.
 
-    The noise of the torque has a standard deviation of `noise_percent` of the largest torque of the joint's mean
-    course, and a correlation time of `NOISE_LASTS`.
+    `seed` is that of the noise on the torque. The noise of the torque has a standard deviation of `noise_percent` of
+    the largest torque of the joint's mean course, and a correlation time of `NOISE_LASTS`.
     """
     series = {name: values.astype(float) for name, values in recording.series.items()}
     phase = series["phase"]
-    pitch_rate = np.gradient(series["base"][..., 2], TICK, axis=1)[..., None]
+    pitch_rate = np.gradient(series["base"][..., 2], TICK, axis=1)[..., None]  # base: x, z and pitch
     trunk = np.concatenate([series["com_velocity"], series["base"][..., 1:], pitch_rate], -1)
+    # The trunk's states beside those of each leg: (episodes, T, side, states).
     trunk = np.broadcast_to(trunk[:, :, None], (*phase.shape, trunk.shape[-1]))
-    above = [series[name][..., :ANKLE] for name in ("angle", "velocity")]
+    above = [series[name][..., :ANKLE] for name in ("angle", "velocity")]  # hip and knee
     earlier = np.roll(series["angle"][..., FEET], round(REFLEX_DELAY / TICK), axis=1)
     states = np.concatenate([trunk, *above, earlier], -1)
     tick = np.arange(phase.shape[1])
@@ -92,7 +93,7 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be found")
     torque = series["torque"][..., FEET]
     segment = (phase[keep] * COURSE).astype(int)
-    count = np.maximum(np.bincount(segment, minlength=COURSE), 1)
+    count = np.maximum(np.bincount(segment, minlength=COURSE), 1)  # 1 where there are no samples: the sum is 0
     course = np.stack([np.bincount(segment, column, COURSE) / count for column in torque[keep].T], -1)
     # Noise of standard deviation 1 and correlation exp(-t / NOISE_LASTS): x' = a x + sqrt(1 - a^2) w, w white.
     a = np.exp(-TICK / NOISE_LASTS)

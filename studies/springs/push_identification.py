@@ -77,7 +77,7 @@ def springs_table(experiment: Experiment) -> str:
         mean, low, high = row.applied
         spring = row.pushed
         undisturbed = row.undisturbed and row.undisturbed.stiffness
-        varies = high - low > 0.01 * mean
+        varies = high - low > 0.01 * mean  # by more than the rounding of a constant K
         lines.append(
             (
                 row.joint,
@@ -127,12 +127,12 @@ def coverage_table(experiments: Sequence[Experiment]) -> str:
                 [[row.pushed.verdict == REACTS for row in repeats] for repeats in phases],
             ]
             counts = (f"{len(rows)}", f"{len(experiment.repeats)}")
-            lines.append((f"`{experiment.policy}`", joint, *counts, *map(_percent_true, columns)))
+            lines.append((f"`{experiment.policy}`", joint, *counts, *map(_percent_text, columns)))
     return table(head, lines)
 
 
 def springs_csv(experiments: Sequence[Experiment]) -> str:
-    """Return the CSV with a line for each policy, joint and phase, of the experiment (repeat 0) and of its repeats."""
+    """Return the CSV with a line for each policy, repeat, joint and phase; repeat 0 is the experiment itself."""
     spans = [f"{name}{end}" for name in ("stiffness_Nm_rad", "damping_time_s") for end in ("", "_low", "_high")]
     head = (
         *("policy", "repeat", "joint", "start", "end", "load", "applied_Nm_rad", "applied_lowest", "applied_highest"),
@@ -163,11 +163,14 @@ def _holds(estimate: Estimate | None, truth: float) -> bool:
     return estimate is not None and estimate.low <= truth <= estimate.high
 
 
-def _percent_true(phases: Sequence[Sequence[bool]]) -> str:
-    """Return the percentage of True over all repeats and phases, and in brackets its lowest and highest in a phase."""
-    if not phases:
+def _percent_text(hits: Sequence[Sequence[bool]]) -> str:
+    """Return how often something holds, as in "94.2 % (90.0–98.5)": over all, then in the worst and the best phase.
+
+    `hits` has for each phase a bool for each repeat; a dash stands for no phases.
+    """
+    if not hits:
         return MISSING
-    percent = 100 * np.mean(phases, axis=1)
+    percent = 100 * np.mean(hits, axis=1)  # of each phase
     return f"{percent.mean():.1f} % ({percent.min():.1f}–{percent.max():.1f})"
 
 
@@ -252,7 +255,7 @@ class Identify(WalkingStudy):
         )
 
     def _push(self, name: str, progress: OnProgress) -> Experiment:
-        """Push one policy, find its springs, and repeat the experiment on other episodes."""
+        """Return the experiment on the policy of that name, with its repeats on other episodes."""
         pushes = ("push_newton", "push_seconds", "push_interval")
         conditions: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
         conditions |= {"decisions": self.decisions} if self.decisions else {}

@@ -58,7 +58,7 @@ class Response:
     def moved(self) -> NDArray:
         """Return (C,) True for cells that change the speed of many strides: by `LEAST_MOVEMENT` or more in the mean,
         with both ends of the interval on the same side of 0."""
-        off_zero = self.interval[MANY_STRIDES_SPEED].prod(-1) > 0
+        off_zero = self.interval[MANY_STRIDES_SPEED].prod(-1) > 0  # both ends have the same sign
         return off_zero & (np.abs(self.mean[MANY_STRIDES_SPEED]) >= LEAST_MOVEMENT)
 
     @property
@@ -69,7 +69,7 @@ class Response:
 
 
 def summarise(walks: PairedWalks, change: float) -> Response:
-    """Compute means, intervals and links of paired walks with a `change` of K, as a fraction of it."""
+    """Return means, intervals and links of paired walks with a `change` of K, as a fraction of it."""
     values = _values(walks)
     mean = {key: np.full(len(CELLS), np.nan) for key in values}
     interval = {key: np.full((len(CELLS), 2), np.nan) for key in values}
@@ -77,7 +77,7 @@ def summarise(walks: PairedWalks, change: float) -> Response:
         rows = np.stack([quantity[cell] for quantity in values.values()])  # (quantities, S)
         rows = rows[:, np.isfinite(rows).all(0)]  # seeds that do not fall
         if rows.shape[1] < 2:
-            continue
+            continue  # the cell's entries stay NaN
         options = {"n_resamples": RESAMPLES, "method": "percentile", "rng": np.random.default_rng(0)}
         spread = bootstrap((rows,), np.mean, axis=-1, **options).confidence_interval
         for key, cell_mean, low, high in zip(values, rows.mean(-1), spread.low, spread.high, strict=True):
@@ -111,7 +111,10 @@ def _values(walks: PairedWalks) -> dict[Key, NDArray]:
 
 
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
-    """Correlate two quantities, (C, S) each, over the cells; return an entry of `Response.links`."""
+    """Return an entry of `Response.links`: the correlation over the cells of two quantities, (C, S) each.
+
+    Seeds that fall in any cell are left out.
+    """
     complete = np.isfinite(x + y).all(0)
     x = x[:, complete]
     y = y[:, complete]

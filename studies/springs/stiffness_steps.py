@@ -88,7 +88,7 @@ def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
 
 
 def step_at(model: mujoco.MjModel, data: mujoco.MjData, change: float) -> tuple[NDArray, NDArray]:
-    """Compute the effect at the state of `data` of changing one spring's K to K (1 + `change`), its rest angle kept.
+    """Return the effect at the state of `data` of changing one spring's K to K (1 + `change`), its rest angle kept.
 
     Each spring changes by itself; contacts respond by MuJoCo's solver. Returns the change of the spring's torque (side,
     (ankle, toe)) [N m], dorsiflexion positive, and of the CoM's acceleration (side, (ankle, toe), (forward, up))
@@ -185,17 +185,23 @@ def paired_walks(
 
 
 class _Changes:
-    """Changes of the actions in each of N walks: none in the first S, then S walks for each cell and duration."""
+    """Changes of the actions in each of N walks: none in the first S, then S walks for each cell and duration.
+
+    Args:
+        step: (2,) change of ankle and toe actions that changes K as wanted (`action_step`).
+        num: number S of seeds.
+    """
 
     def __init__(self, step: NDArray, num: int):
+        # A row for each copy of the walks: change of ankle and toe, begin and end of the phase, whether it lasts.
         rows = [(np.zeros(len(SPRINGS)), (0.0, 0.0), False)]
         for (joint, name), duration in product(CELLS, DURATIONS):
             rows.append((step * (np.arange(len(SPRINGS)) == joint), PHASES[name], duration == "every stride"))
         steps, edges, self._lasts = (
             np.repeat(column, num, axis=0) for column in map(np.array, zip(*rows, strict=True))
         )
-        self._step = steps[:, None]
-        self._begin, self._end = edges.T[..., None]
+        self._step = steps[:, None]  # (N, 1, 2), for both sides
+        self._begin, self._end = edges.T[..., None]  # (N, 1) each
 
     def added(self, phase: NDArray, stride: NDArray) -> NDArray:
         """Return the changes (N, 4) of the actions at `phase` (N, side), in the left foot's `stride` (N,), 0 the first.
@@ -203,7 +209,7 @@ class _Changes:
         A change of one stride is made in the left leg alone, a lasting one in both.
         """
         left = (stride == 0) | (self._lasts & (stride > 0))
-        due = np.stack([left, left & self._lasts], -1)
+        due = np.stack([left, left & self._lasts], -1)  # (N, side)
         return ((due & (phase >= self._begin) & (phase < self._end))[..., None] * self._step).reshape(len(phase), -1)
 
 
@@ -234,7 +240,9 @@ class _Record:
         self._change = change
         self._num = num
         self._ticks: list[_Series] = []
-        self._samples = np.zeros((len(CELLS), num, 4))  # count; sums of torque [N m], acceleration (x, z) [m/s^2]
+        self._samples = np.zeros(
+            (len(CELLS), num, 4)
+        )  # number of samples; sums of torque [N m], acceleration (x, z) [m/s^2]
         biped.on_tick = self._keep
 
     def _keep(self, tick: Tick) -> None:
@@ -309,7 +317,7 @@ class _Record:
 
 def _ends(phase: NDArray, stride: NDArray) -> list[int]:
     """Return the last tick of each of `PHASES` in the first stride, from a leg's `phase` and `stride` (T,)."""
-    until_next = np.where(stride <= 0, phase, 1.0)  # 1 once the first stride is over
+    until_next = np.where(stride <= 0, phase, 1.0)  # phase; 1 once the first stride is over
     begin = np.argmax(stride == 0)
     return [int(begin + np.argmax(until_next[begin:] >= end)) - 1 for _, end in PHASES.values()]
 
@@ -327,6 +335,7 @@ def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: ND
     ankles = sample(ankle, times, TICK, TICK)  # (steps, (begin, end), side)
     length = np.take_along_axis(ankles[:, 1], 1 - side[:, None], 1) - np.take_along_axis(ankles[:, 0], side[:, None], 1)
     stride = np.searchsorted(landed, times[:, 0], side="right") - 1
+    # Sum and number of the steps that begin in each stride.
     total, count = (np.bincount(stride, weights, len(landed))[: len(clock)] for weights in (length[:, 0], None))
     with np.errstate(invalid="ignore"):  # a stride without a whole step has NaN
         step_length = total / count

@@ -109,7 +109,7 @@ def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
     walk = reference_walk_at(settings, settings.speed)
     planned = replace(settings, equilibrium="planned", schedule=None)
     rest, stiffness = foot_curves(planned, walk.constants[0], walk)
-    stretch = np.searchsorted(PLATEAUS, GRID, side="right") - 1
+    stretch = np.searchsorted(PLATEAUS, GRID, side="right") - 1  # index of each sample's stretch
     of_joints: list[list[Segment]] = [[], []]
     for index, start in enumerate(PLATEAUS):
         for joint, segments in enumerate(of_joints):
@@ -201,7 +201,7 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
         cells = [name, str(len(seeds))]
         for column in ABLATION_COLUMNS:
             values = [value for value in map(column.of, seeds) if value is not None]
-            is_count = column.path[-1] == "falls" and len(values) == 1
+            is_count = column.path[-1] == "falls" and len(values) == 1  # a whole number, no mean
             cells.append(plus_minus(mean_sd(values), ".0f" if is_count else column.pattern))
         lines.append(cells)
     if people:
@@ -216,12 +216,12 @@ def _people_cell(metrics: dict[str, Any], column: Column) -> str:
     """Return people's number of a column, from metrics nested as those of a walk without its condition; empty if there
     is none."""
     value: Any = metrics
-    for key in column.path[1:]:
+    for key in column.path[1:]:  # [0] is the condition
         value = value.get(key) if isinstance(value, dict) else None
     return text_of(value, column.pattern)
 
 
-def _numbers(tables: dict[str, Rows]) -> str:
+def ablations_csv(tables: dict[str, Rows]) -> str:
     """Return the CSV with a line for each seed of each row of each table."""
     lines = [
         [name, row, seed, *(column.of(metrics) for column in ABLATION_COLUMNS)]
@@ -282,4 +282,4 @@ class Ablations(TrainingStudy):
         note = f"{walks.sentence} Mean ± SD over training seeds."
         texts = {name: rows_table(rows, heads[name], people=name == "SPRINGS") for name, rows in tables.items()}
         text = "\n\n".join([*texts.values(), note])
-        return Answer(text=text, files={"ablations.csv": _numbers(tables)}, failed=failed)
+        return Answer(text=text, files={"ablations.csv": ablations_csv(tables)}, failed=failed)

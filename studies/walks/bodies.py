@@ -71,7 +71,7 @@ def walk_pairs(
     Args:
         policy, settings, name, seed, threads, progress: as for `recording.record_each`.
         subjects: `height` [m], `mass` [kg] and `speed` [m/s], (pairs,) each, as from `draw_pairs`.
-        block: number of pairs that walk at a time; their series are freed before the next.
+        block: number of pairs that walk at a time; their series are freed before the next ones walk.
 
     docs/reference/metrics.md explains the columns; None stands for a number that could not be measured.
     """
@@ -113,16 +113,16 @@ def pairs_table(rows: Sequence[Mapping[str, Any]], copy: Sequence[Mapping[str, A
     """
     lines: list[list[str]] = [["falls", _falls(rows), "", "", "", *([_falls(copy), "", ""] if copy else [])]]
     for label, column, pattern, badness in BODY_COLUMNS:
-        if standing := _standing(rows, column, badness):
-            line = [label, *_spread(standing, column, pattern), _subject(standing[-1])]
+        if standing := _pairs_that_stood(rows, column, badness):
+            line = [label, *_spread(standing, column, pattern), _body_and_speed(standing[-1])]
             if copy:
-                copy_standing = _standing(copy, column, badness) if column != VERTICAL_R else []
+                copy_standing = _pairs_that_stood(copy, column, badness) if column != VERTICAL_R else []
                 line += _spread(copy_standing, column, pattern) if copy_standing else ["", "", ""]
             lines.append(line)
     columns = ("median", "95 % within", "worst")
     text = table(["", *columns, "worst pair", *(f"{OPEN_LOOP}: {name}" for name in columns if copy)], lines)
     fallen = [row for row in rows if row["fall"]]
-    falls = [f"{_subject(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
+    falls = [f"{_body_and_speed(row)}: after {row['seconds']:.1f} s, {row['fall']}" for row in fallen[:WORST_FALLS]]
     return "\n".join([text, "", *falls]).rstrip("\n")
 
 
@@ -131,8 +131,11 @@ def _falls(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"{sum(bool(row['fall']) for row in rows)} of {len(rows)}"
 
 
-def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
-    """Return the pairs that did not fall and have a number in the column, the worst last."""
+def _pairs_that_stood(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[[float], float]) -> list:
+    """Return the rows of pairs that did not fall and have a number in the column, the worst last.
+
+    `badness` is larger for a worse number (`BODY_COLUMNS`).
+    """
     return sorted(
         (row for row in rows if not row["fall"] and row[column] is not None), key=lambda row: badness(row[column])
     )
@@ -141,11 +144,11 @@ def _standing(rows: Sequence[Mapping[str, Any]], column: str, badness: Callable[
 def _spread(standing: Sequence[Mapping[str, Any]], column: str, pattern: str) -> list[str]:
     """Return median, 95 % bound and worst magnitude of a column, as text, from pairs with the worst last."""
     size = [abs(row[column]) for row in standing]
-    bound = size[int(np.ceil(0.95 * len(size))) - 1]
+    bound = size[int(np.ceil(0.95 * len(size))) - 1]  # 95 % of the pairs are no worse than this one
     return [format(value, pattern) for value in (np.median(size), bound, size[-1])]
 
 
-def _subject(row: Mapping[str, Any]) -> str:
+def _body_and_speed(row: Mapping[str, Any]) -> str:
     """Return body and speed of a pair, in words."""
     return f"{row['height_m']:.2f} m, {row['mass_kg']:.0f} kg, {row['speed_m_s']:.2f} m/s"
 

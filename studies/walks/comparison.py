@@ -98,7 +98,8 @@ class Row:
 
 
 def run_row(name: str, policy: PolicyFunction, settings: BipedSettings, **how: Any) -> Row:
-    """Record and measure a policy; `how` has `episodes`, `seed`, `threads`, `progress` as for `recording.record`."""
+    """Return the row of a policy's walk; `how` has `episodes`, `seed`, `threads`, `progress` as for
+    `recording.record`."""
     recording = record(policy, settings, name=name, **how)
     fell = recording.fall_reason != ""
     return Row(name=name, metrics=measure(recording).metrics, returns=recording.returns, fell=fell)
@@ -143,7 +144,7 @@ def springs_beside(
     for baseline in spring_names(constant, factor):
         conditions = settings_to_json(settings) | own_settings(baseline, settings)
         springs.append(Contender(baseline, *policy_and_settings(baseline, conditions, seed)))
-        if baseline == "quasi_stiffness" and settings.speed == BipedSettings.speed:
+        if baseline == "quasi_stiffness" and settings.speed == BipedSettings.speed:  # the default speed, 1.2 m/s
             faster = policy_and_settings(baseline, conditions | {"speed": QUASI_SPEED}, seed)
             springs.append(Contender(f"{baseline}, commanded {QUASI_SPEED:g} m/s", *faster))
     return springs
@@ -151,8 +152,12 @@ def springs_beside(
 
 def spring_names(constant: tuple[float, float] | None, factor: float | None) -> list[str]:
     """Return the names of the baselines that `springs_beside` compares a policy with."""
-    names = ["untrained", "schedule", *([f"schedule:{factor:g}"] if factor else [])]
-    names += [f"constant:{constant[0]:g},{constant[1]:g}"] if constant else []
+    names = ["untrained", "schedule"]
+    if factor:
+        names.append(f"schedule:{factor:g}")
+    if constant:
+        ankle, toe = constant
+        names.append(f"constant:{ankle:g},{toe:g}")
     return [*names, "constant", "quasi_stiffness", "thesis", "thesis_printed", "random"]
 
 
@@ -225,6 +230,7 @@ def elsewhere_table(name: str, rows: Sequence[tuple[str, Sequence[Row]]]) -> str
     columns = ["falls", "speed m/s", "RMSE thigh / knee / ankle °"]
     copy_columns = [f"{OPEN_LOOP}: {column}" for column in columns] * (max(len(row) for _, row in rows) - 1)
     head = [f"`{name}` with", *columns, "peaks 1 / 2 BW", "largest 10 ms BW", *copy_columns]
+    # A dash in each cell of a copy that does not walk under a condition.
     return table(head, [[*line, *[MISSING] * (len(head) - len(line))] for line in lines])
 
 

@@ -33,7 +33,10 @@ def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | N
     """Return the first of the periodic evaluations without a fall up to the last; None if the last has falls."""
     first = None
     for entry in evaluations:
-        first = None if entry["falls"] else first or entry
+        if entry["falls"]:
+            first = None
+        elif first is None:
+            first = entry
     return first
 
 

@@ -119,7 +119,7 @@ class Play(WalkingStudy):
         for begin in range(0, len(pairs), pairs_per_batch):
             factor = np.repeat(pairs[begin : begin + pairs_per_batch], self.episodes, axis=0)
             batch = record(
-                _scaled(policy, factor, settings),
+                _with_scaled_stiffness(policy, factor, settings),
                 settings,
                 name=self.policy,
                 episodes=len(factor),
@@ -131,13 +131,14 @@ class Play(WalkingStudy):
                 yield episodes_of(batch, np.arange(first, first + self.episodes))
 
 
-def _scaled(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) -> PolicyFunction:
-    """Return `policy` with K of ankles and toes times `factor` (N, 2), within the range of actions."""
+def _with_scaled_stiffness(policy: PolicyFunction, factor: NDArray, settings: BipedSettings) -> PolicyFunction:
+    """Return `policy` with its K of ankles and toes times `factor` (N, 2), within the range of actions, in N bodies."""
     body = body_of(settings)
 
     def scaled(observation: NDArray) -> NDArray:
+        """Return the actions (N, 4) of scaled stiffness for observations (N, D)."""
         action = policy(observation).astype(float).reshape(-1, len(SIDES), len(SPRINGS))
-        stiffness = stiffness_of(action, settings, body) * factor[:, None]
+        stiffness = stiffness_of(action, settings, body) * factor[:, None]  # (N, side, 2)
         return action_of(stiffness, settings, body).reshape(len(factor), -1).astype(np.float32)
 
     return scaled

@@ -79,7 +79,7 @@ def test_a_search_takes_no_cost_that_is_no_number(tmp_path, bad):
     first = search(path)
     table = json.loads(path.read_text(encoding="utf-8"))
     assert [vectors for _, vectors, _ in search(path)][1][0] == pytest.approx(first[1][1][0])
-    table["paid"][0][2] = bad
+    table["costs"][0][2] = bad
     path.write_text(json.dumps(table), encoding="utf-8")
     refused(path)
 
@@ -108,7 +108,7 @@ def test_a_study_takes_no_kept_answer_that_it_did_not_write(tmp_path, answer):
 
 def test_a_search_of_other_settings_is_told_from_this_one_by_their_types_too(tmp_path):
     path = tmp_path / "log.json"
-    path.write_text('{"asked": true, "paid": []}')
+    path.write_text('{"asked": true, "costs": []}')
     strategy = cma.CMAEvolutionStrategy(np.zeros(3), 0.5, {"popsize": 4, "seed": 1, "verbose": -9})
     with pytest.raises(SpringfootError, match="is of a search with other settings"):
         list(generations(strategy, 0, lambda _, vectors: np.zeros(len(vectors)), path, 1))
