@@ -128,7 +128,7 @@ class Tick:
     fibre_moment: NDArray
     """(N, side, joint) mean moment of the muscles' fibres in the window, extension positive, 0 where none act [N m]."""
     muscle_work: NDArray
-    """(N, side, joint) work in the window of muscles, tissue left out, on the joint [J]."""
+    """(N, side, joint, 2) work in the halves of the window of muscles, tissue left out, on the joint [J]."""
     com_reference: NDArray
     """(N, 2) the plan's CoM (x, z) in the world at the window's end [m]."""
     active: NDArray

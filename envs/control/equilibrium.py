@@ -6,7 +6,6 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
-from springfoot.gait.body.tissue import TENDON_SHARE, ankle_tissue_stiffness
 from springfoot.gait.people.human import FootHabits, HumanGait, foot_habits
 
 from ..physics.model import ANKLE, TOE, damping_times
@@ -65,26 +64,9 @@ def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, Refe
     for constants, walk in rows:
         rest, stiffness = foot_curves(settings, constants, walk)
         feed = foot_feed(settings, constants, walk)
-        if settings.ankle_tendon is not None:
-            _bound_by_tendon(rest, stiffness, settings.ankle_tendon, walk, feeds=feed is not None)
         rests.append(rest if feed is None else np.concatenate([rest, feed], axis=-1))
         stiffnesses.append(stiffness)
     return np.stack(rests), np.stack(stiffnesses)
-
-
-def _bound_by_tendon(rest: NDArray, stiffness: NDArray, tendon: float, walk: ReferenceWalk, *, feeds: bool) -> None:
-    """Bound the ankle's scheduled stiffness by that of its `tendon` [N m/rad] and tissue, in place.
-
-    Unless the torques are fed beside the springs (`feeds`), the ankle's rest angles move so that its torque at the
-    target's angle stays. `rest` [rad] and `stiffness` [N m/rad] are (SAMPLES, 2), the ankle in column 0.
-    """
-    ankle = walk.target.mean("ankle", GRID)
-    tissue = ankle_tissue_stiffness(walk.target.mean("knee", GRID), ankle)
-    bounded = np.minimum(stiffness[:, 0], walk.body.stiffness_scale * (TENDON_SHARE * tendon + tissue))
-    if not feeds:
-        # K' (theta_eq' - theta) = K (theta_eq - theta), theta the target's angle.
-        rest[:, 0] = ankle + stiffness[:, 0] / bounded * (rest[:, 0] - ankle)
-    stiffness[:, 0] = bounded
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:

@@ -15,7 +15,7 @@ from springfoot.gait.plan.effort import TENDON_GIVE, interval_work, metabolic_en
 
 from .foot import Feet
 from .kernel import part
-from .model import JOINTS, SIDES, joints_of, torque_ranges
+from .model import JOINTS, SIDES, joints_of
 from .timing import CONTROL_WINDOW
 
 _LEGS = (len(SIDES), len(JOINTS))
@@ -36,7 +36,7 @@ MUSCLE_ROW = np.dtype(
         ("judged", np.int64),  # 1 once a step has used the sums below, which then begin anew
         ("angle", float, _LEGS),  # at the end of the last window [rad]
         ("velocity", float, _LEGS),  # likewise [rad/s]
-        ("delivered", float, (2, *_LEGS)),  # work of fibres and tendon in the last window and the one before [J]
+        ("delivered", float, (2, *_LEGS, 2)),  # work of fibres and tendon in halves of the last two windows [J]
         ("moment", float, (3, *_LEGS)),  # mean moment of the fibres in the last three windows, the last first [N m]
         ("energy", float, _LEGS),  # metabolic, of the fibres' work in the step, one window late [J]
         ("activation", float),  # time integral of the squared activation, likewise [s]
@@ -63,10 +63,12 @@ def muscles_of(body: Body, feet: Feet) -> NDArray:
 
 
 def leg_strengths(body: Body, feet: Feet) -> NDArray:
-    """Return the largest moments (side, joint, 2) [N m] of the muscles above these feet, in extension and in flexion:
-    a sound leg's, or the largest torque of the joint's actuator where that is less."""
-    most = np.abs(torque_ranges(body, feet))  # downwards, which is extension, and upwards
-    return np.minimum(strengths(body), most)
+    """Return the largest moments (side, joint, 2) [N m] of the muscles above these feet, in extension and in flexion.
+
+    Those of a sound leg; in extension times the joint's `strength`.
+    """
+    of_extensors = [[joint.strength for joint in joints_of(foot)] for foot in feet]
+    return strengths(body) * np.stack([of_extensors, np.ones(_LEGS)], -1)
 
 
 @part
@@ -75,14 +77,15 @@ def _price_last_but_one(row):
     for side in range(2):
         for joint in range(4):
             moment = row.moment[1, side, joint]
-            work = _interval_work(
+            first, second = _interval_work(
                 row.moment[2, side, joint],
                 moment,
                 row.moment[0, side, joint],
-                row.delivered[1, side, joint],
+                row.delivered[1, side, joint, 0],
+                row.delivered[1, side, joint, 1],
                 row.muscles.give[joint],
             )
-            row.energy[side, joint] += _metabolic_energy(work)
+            row.energy[side, joint] += _metabolic_energy(first) + _metabolic_energy(second)
             row.activation += row.muscles.activation[side, joint, 0 if moment > 0.0 else 1] * moment**2 * CONTROL_WINDOW
 
 
@@ -104,7 +107,8 @@ def work_muscles(row, m, actuator, velocity, control) -> None:
         row.judged = 0
         row.activation = row.positive_work = 0.0
         row.energy[:] = 0.0
-    timestep = CONTROL_WINDOW / len(actuator)
+    steps = len(actuator)
+    timestep = CONTROL_WINDOW / steps
     muscles = row.muscles
     middle = np.empty(4)
     for side in range(2):
@@ -113,25 +117,30 @@ def work_muscles(row, m, actuator, velocity, control) -> None:
         tissue = _tissue_moments(middle[0], middle[1], middle[2], middle[3])
         for joint in range(4):
             dof = 3 + 4 * side + joint
-            mean_torque = work = 0.0
+            mean_torque = first = second = 0.0
             before = row.velocity[side, joint]
-            for step in range(len(actuator)):
+            for step in range(steps):
                 after = velocity[step, dof]
-                mean_torque += actuator[step, dof] / len(actuator)
-                work += actuator[step, dof] * 0.5 * (before + after) * timestep
+                mean_torque += actuator[step, dof] / steps
+                work = actuator[step, dof] * 0.5 * (before + after) * timestep
+                early = min(max(0.5 * steps - step, 0.0), 1.0)  # part of the step in the window's first half
+                first += early * work
+                second += (1.0 - early) * work
                 before = after
-            row.positive_work += max(work, 0.0)
+            row.positive_work += max(first + second, 0.0)
             turn = m.angle[side, joint] - row.angle[side, joint]
             row.angle[side, joint] = m.angle[side, joint]
             row.velocity[side, joint] = before
-            row.delivered[1, side, joint] = row.delivered[0, side, joint]
             row.moment[2, side, joint] = row.moment[1, side, joint]
             row.moment[1, side, joint] = row.moment[0, side, joint]
-            row.moment[0, side, joint] = row.delivered[0, side, joint] = 0.0
+            row.delivered[1, side, joint] = row.delivered[0, side, joint]
+            row.moment[0, side, joint] = 0.0
+            row.delivered[0, side, joint] = 0.0
             if muscles.present[side, joint] and control[side, joint, 0] > 0.0:
                 of_tissue = muscles.tissue * tissue[joint]
                 row.moment[0, side, joint] = -mean_torque - of_tissue
-                row.delivered[0, side, joint] = work + of_tissue * turn
+                row.delivered[0, side, joint, 0] = first + 0.5 * of_tissue * turn
+                row.delivered[0, side, joint, 1] = second + 0.5 * of_tissue * turn
     row.windows += 1
     if row.windows >= 3:
         _price_last_but_one(row)

@@ -53,7 +53,7 @@ SERIES: dict[str, Callable[[Tick], NDArray]] = {
     "joint_torque": lambda tick: tick.work.torque,  # (side, joint) actuator + joint damping, mean of the tick [N m]
     "joint_work": lambda tick: tick.work.work,  # (side, joint, (positive, negative)) work of it in the tick [J]
     "fibre_moment": lambda tick: tick.fibre_moment,  # (side, joint) of the muscles' fibres, mean of the tick [N m]
-    "muscle_work": lambda tick: tick.muscle_work,  # (side, joint) of fibres and tendon on the joint in the tick [J]
+    "muscle_work": lambda tick: tick.muscle_work,  # (side, joint, half) of fibres and tendon in halves of the tick [J]
     "energy": lambda tick: tick.work.energy.view(float).reshape(len(tick.active), -1),  # (LEDGER,) [J]
     "com": lambda tick: tick.measurement.com,  # (x, z) [m]
     "com_velocity": lambda tick: tick.measurement.com_velocity,  # (x, z) [m/s]

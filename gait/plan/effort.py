@@ -57,16 +57,20 @@ PER_DEGREE = 0.1
 # The price of a short interval --------------------------------------------------------------------------------
 
 
-def interval_work(before: Any, moment: Any, after: Any, delivered: Any, give: Any) -> Any:
-    """Return the work [J] of the fibres of a joint in one interval; numbers, as in kernels, or arrays.
+def interval_work(before: Any, moment: Any, after: Any, first: Any, second: Any, give: Any) -> Any:
+    """Return the work [J] of a joint's fibres in the first and in the second half of one interval.
+
+    The moment is linear between the middles of intervals. Arguments are numbers, as in kernels, or arrays.
 
     Args:
         before, moment, after: the fibres' moment, mean over the interval before, this one and the next [N m].
-        delivered: work of fibres and tendon on the joint in this interval [J].
+        first, second: work of fibres and tendon on the joint in each half of this interval [J].
         give: of the tendon [rad/(N m)].
     """
-    pull_change = 0.5 * (np.maximum(after, 0.0) - np.maximum(before, 0.0))
-    return delivered + give * np.maximum(moment, 0.0) * pull_change
+    pull = np.maximum(moment, 0.0)
+    begins = 0.5 * (np.maximum(before, 0.0) + pull)
+    ends = 0.5 * (pull + np.maximum(after, 0.0))
+    return first + 0.5 * give * (pull**2 - begins**2), second + 0.5 * give * (ends**2 - pull**2)
 
 
 def metabolic_energy(work: Any) -> Any:
@@ -131,7 +135,7 @@ def muscle_use(
 
     Args:
         moment: (S, L, 4) moment of the fibres, mean over each interval [N m], extension positive.
-        delivered: (S, L, 4) work of fibres and tendon on each joint in the interval [J].
+        delivered: (S, L, 4, 2) work of fibres and tendon on each joint in the two halves of the interval [J].
         tick: length of an interval [s].
         strength: (L, 4, 2) largest moments of each leg's muscles, extension and flexion [N m].
         scale: of stiffness, `Body.stiffness_scale`.
@@ -139,17 +143,16 @@ def muscle_use(
     """
     # Intervals 1 to S - 2 have an interval before and one after: [:-2], [1:-1] and [2:] are before, they and after.
     give = np.array(TENDON_GIVE) * [1.0, 1.0, muscle.tendon, muscle.toe_tendon] / scale
-    work = interval_work(moment[:-2], moment[1:-1], moment[2:], delivered[1:-1], give)
+    halves = np.moveaxis(delivered[1:-1], -1, 0)
+    work = np.stack(interval_work(moment[:-2], moment[1:-1], moment[2:], halves[0], halves[1], give))
     extends = moment > 0.0
-    # The moment over the largest one in its own direction: extension is the first strength, flexion the second.
     activation = moment / np.where(extends, strength[..., 0], strength[..., 1])
-    change = activation[2:] - activation[:-2]
-    # The weight of the extensors where the moment extends, otherwise that of the flexors.
+    squared_rate = (ACTIVATION_TIME * np.diff(activation, axis=0) / tick) ** 2  # between the middles of intervals
     weight = np.where(extends, *np.moveaxis(volume_weights(), -1, 0))[1:-1]
     return MuscleUse(
-        work=np.stack([np.maximum(work, 0.0).sum(0), np.minimum(work, 0.0).sum(0)], -1),
+        work=np.stack([np.maximum(work, 0.0).sum((0, 1)), np.minimum(work, 0.0).sum((0, 1))], -1),
         activation=(weight * activation[1:-1] ** 2).sum(0) * tick,
-        rate=(weight * (ACTIVATION_TIME * change / (2 * tick)) ** 2).sum(0) * tick,
+        rate=(weight * 0.5 * (squared_rate[:-1] + squared_rate[1:])).sum(0) * tick,
     )
 
 
@@ -242,7 +245,8 @@ def effort_of_stride(
     tick = stride_time / len(angle)
     fibres = moment - muscle.tissue * passive_moments(body, angle)
     # One leg, as an axis of length 1: its sums are doubled for both.
-    moments, delivered = (_with_neighbours(values)[:, None] for values in (fibres, -fibres * rate * tick))
+    moments, half = (_with_neighbours(values)[:, None] for values in (fibres, -fibres * rate * tick / 2))
+    delivered = np.stack([half, half], -1)
     use = muscle_use(moments, delivered, tick, strengths(body), body.stiffness_scale, muscle)
     return Effort(
         work=float(2 * use.energy.sum() / (body.total_mass * GRAVITY * distance)),

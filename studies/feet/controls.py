@@ -14,10 +14,9 @@ from typing import Any, ClassVar
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.files.markdown import MISSING, table, text_of
-from springfoot.files.writing import csv_text
 
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .walked_speeds import TWO_PRICES, Row, at_walked_speeds
+from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
 """Commanded speeds [m/s]."""
@@ -86,7 +85,7 @@ class Controls(WalkingStudy):
             for speed in self._asked()
         ]
         even = at_walked_speeds(walks, ("condition",), (0.9,) if self.quick else WALKED_SPEEDS)
-        files = {"walks.csv": _csv(walks), "equal_speeds.csv": _csv(even)}
+        files = {"walks.csv": rows_csv(walks), "equal_speeds.csv": rows_csv(even)}
         return Answer(
             text=f"{controls_table(even)}\n\n{self.what_ran} of each condition and commanded speed.", files=files
         )
@@ -125,12 +124,8 @@ def controls_table(even: Sequence[Row]) -> str:
 
 def _cell(own: Row, sound: Row) -> str:
     """Return both prices of a walk with their differences from the sound one."""
-    if own["falls"] or sound["falls"]:
+    if own[TWO_PRICES[0]] is None or sound[TWO_PRICES[0]] is None:
         return MISSING
     differences = [own[price] / sound[price] - 1.0 for price in TWO_PRICES]
     shown = " / ".join(text_of(own[price], ".2f") for price in TWO_PRICES)
     return f"{shown} ({differences[0]:+.0%} / {differences[1]:+.0%})"
-
-
-def _csv(rows: Sequence[Row]) -> str:
-    return csv_text(list(rows[0]), [list(row.values()) for row in rows])

@@ -28,13 +28,12 @@ from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
-from springfoot.files.writing import csv_text
 
 from ..base.intervals import share_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_walks import ABOUT_STOPS, NAMES, SCHEDULE, TOLD, UNSEARCHED, numbers_of, walked
-from .walked_speeds import TWO_PRICES, Row, at_walked_speeds
+from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
 
 PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
@@ -46,7 +45,7 @@ MASSES = (50.0, 63.0, 80.0)
 """Masses of the bodies [kg], all 1.70 m tall."""
 ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6, 1.8)
 """Commanded speeds of walks with a weak calf [m/s]."""
-WALKED_SPEEDS = (0.8, 1.1, 1.4)
+WALKED_SPEEDS = (0.9, 1.1, 1.3)
 """Walked speeds at which springs are compared [m/s]; energy is interpolated linearly between two walks."""
 DROP_SPEEDS = (0.8, 1.2, 1.6)
 """Commanded speeds of walks with a drop foot [m/s]."""
@@ -101,11 +100,11 @@ class Orthosis(WalkingStudy):
         by_effort = best_springs(even, "effort")
         as_asked = best_springs([row for row in weak if row["speed_m_s"] in DROP_SPEEDS])
         files = {
-            "weak.csv": _csv(weak),
-            "best.csv": _csv(best),
-            "best-by-effort.csv": _csv(by_effort),
-            "best-as-asked.csv": _csv(as_asked),
-            "drop.csv": _csv(drop),
+            "weak.csv": rows_csv(weak),
+            "best.csv": rows_csv(best),
+            "best-by-effort.csv": rows_csv(by_effort),
+            "best-as-asked.csv": rows_csv(as_asked),
+            "drop.csv": rows_csv(drop),
             "weak.png": partial(draw_weak, rows=even, best=best),
             "drop.png": partial(draw_drop, rows=drop),
         }
@@ -197,10 +196,6 @@ def _with_walked_speed(numbers: Mapping[str, Any]) -> dict[str, Any]:
     return {("walked_m_s" if key == "speed_m_s" else key): value for key, value in numbers.items()}
 
 
-def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    return csv_text(list(rows[0]), [list(row.values()) for row in rows])
-
-
 OF_A_CELL = ("mass_kg", "speed_m_s", "strength")
 """Columns whose values make a cell: body, speed and strength of the calf."""
 SPRING_OF_A_BODY = ("mass_kg", "strength", "spring_Nm_deg")
@@ -215,7 +210,7 @@ def best_springs(rows: Sequence[Row], price: str = TWO_PRICES[0]) -> list[dict[s
     """
     lines = []
     for cell in _cells(rows):
-        walking = [row for row in _of(rows, cell) if row["falls"] == 0 and row[price] is not None]
+        walking = [row for row in _of(rows, cell) if not row.get("falls") and row[price] is not None]
         line = {**dict(zip(OF_A_CELL, cell, strict=True)), "springs_without_falls": len(walking)}
         names = ("best_Nm_deg", price, "walked_m_s", "worst_Nm_deg", "worst_more_percent", "fastest_Nm_deg")
         line |= dict.fromkeys(names)
@@ -410,7 +405,7 @@ def draw_weak(path: Path, rows: Sequence[Row], best: Sequence[Row]) -> None:
             np.ravel(figure.subplots(1, len(speeds), sharey=True, squeeze=False)), speeds, strict=True
         ):
             for strength, color in zip(sorted({row["strength"] for row in rows}), COLORS * 9, strict=False):
-                walking = [row for row in _of(rows, (mass, speed, strength)) if row["falls"] == 0]
+                walking = [row for row in _of(rows, (mass, speed, strength)) if row["fibre_J_kg_m"] is not None]
                 x = [row["spring_Nm_deg"] for row in walking]
                 y = [row["fibre_J_kg_m"] for row in walking]
                 ax.plot(x, y, "o-", color=color, ms=3.5, lw=1.3, label=f"a calf of {100 * strength:.0f} %")

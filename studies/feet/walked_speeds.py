@@ -6,16 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from springfoot.files.writing import csv_text
+
 Row = Mapping[str, Any]
 TWO_PRICES = ("fibre_J_kg_m", "effort")
 """Columns of the two prices of a walk: fibre work, and all of the effort."""
 
 
 def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[float]) -> list[dict[str, Any]]:
-    """Return a row for each case and each of the walked `speeds` [m/s], with `TWO_PRICES` and `falls`.
+    """Return a row for each case and each of the walked `speeds` [m/s], with `TWO_PRICES`.
 
-    Prices are linear between two neighbouring commanded speeds without a fall. A case that reaches a speed nowhere
-    counts as falling there (`falls` 1, prices None).
+    Prices are linear between two neighbouring commanded speeds without a fall; None where a case has no such pair
+    around the speed: it falls, or walks at other speeds.
 
     Args:
         rows: walks with `keys`, `TWO_PRICES`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
@@ -29,7 +31,6 @@ def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[
             walks.sort(key=lambda row: row["speed_m_s"])
             between = [prices for pair in pairwise(walks) if (prices := _prices_at(speed, *pair)) is not None]
             line: dict[str, Any] = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
-            line["falls"] = 0.0 if between else 1.0
             line |= between[0] if between else dict.fromkeys(TWO_PRICES)
             compared.append(line)
     return compared
@@ -46,3 +47,8 @@ def _prices_at(speed: float, slow: Row, fast: Row) -> dict[str, float] | None:
     if not low <= speed <= high:
         return None
     return {price: float(np.interp(speed, [low, high], [slow[price], fast[price]])) for price in TWO_PRICES}
+
+
+def rows_csv(rows: Sequence[Row]) -> str:
+    """Return rows of the same columns as CSV text."""
+    return csv_text(list(rows[0]), [list(row.values()) for row in rows])

@@ -42,15 +42,11 @@ def test_every_example_is_run_and_short():
     assert all(len(path.read_text().splitlines()) <= 60 for path in EXAMPLES.glob("*.py"))
 
 
-def imported(source):
-    """(module, name) of every `from springfoot… import` in some Python code."""
-    found = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
-    return {
-        (node.module, part.name)
-        for node in found
-        if (node.module or "").startswith("springfoot")
-        for part in node.names
-    }
+def imported(source: str) -> set[tuple[str, str]]:
+    """Module and name of every `from springfoot… import` in some Python code."""
+    found = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)]
+    parts = [(node.module or "", part.name) for node in found for part in node.names]
+    return {(module, name) for module, name in parts if module.startswith("springfoot")}
 
 
 def test_what_notebooks_and_the_wheels_check_import_is_there():
@@ -61,7 +57,7 @@ def test_what_notebooks_and_the_wheels_check_import_is_there():
     wheel = ast.parse((EXAMPLES.parent / "benchmarks" / "wheel.py").read_text(encoding="utf-8"))
     texts = [node.value for node in ast.walk(wheel) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     sources += [text for text in texts if text.lstrip().startswith("from springfoot")]
-    names = set().union(*map(imported, sources))
+    names: set[tuple[str, str]] = set().union(*map(imported, sources))
     assert ("springfoot.evaluation", "record") in names
     for module, name in names:
         assert hasattr(import_module(module), name), (module, name)

@@ -79,7 +79,7 @@ def people(episodes=2, seconds=10.0, fell=(), cut=None, **settings) -> Recording
         "joint_torque": mean_torque,
         "joint_work": np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1),
         "fibre_moment": -mean_torque - tissue,
-        "muscle_work": work + tissue * rate * 0.01,
+        "muscle_work": np.stack([(work + tissue * rate * 0.01) / 2] * 2, -1),
         "energy": energy,
         "com": com,
         "com_velocity": np.gradient(com, 0.01, axis=0),

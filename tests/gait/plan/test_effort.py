@@ -61,7 +61,7 @@ def test_a_tendon_in_series_stores_and_returns(joint):
     phase = (np.arange(samples) + 0.5) / samples
     pull = np.zeros((samples, 1, 4))
     pull[:, 0, joint] = peak * np.sin(np.pi * phase) ** 2
-    use = muscle_use(pull, np.zeros_like(pull), time / samples, strengths(BODY)[None], 1.0)
+    use = muscle_use(pull, np.zeros((*pull.shape, 2)), time / samples, strengths(BODY)[None], 1.0)
     stored = 0.5 * peak**2 * TENDON_GIVE[joint]
     assert use.work[0, joint] == pytest.approx([stored, -stored], rel=1e-6)
     assert not np.delete(use.work[0], joint, 0).any()
@@ -72,8 +72,9 @@ def test_fibres_of_a_joint_that_moves_as_its_tendon_gives_do_no_work():
     phase = (np.arange(samples) + 0.5) / samples
     pull = 80.0 * np.sin(np.pi * phase) ** 2  # on an ankle that gives by F / k: dorsiflexion as the force rises
     rate = np.gradient(pull, phase, edge_order=2) / k
-    work = interval_work(pull[:-2], pull[1:-1], pull[2:], (-pull * rate / samples)[1:-1], TENDON_GIVE[ANKLE])
-    assert np.abs(work).sum() < 1e-6 * (pull * np.abs(rate)).mean()
+    half = (-pull * rate / samples)[1:-1] / 2
+    work = interval_work(pull[:-2], pull[1:-1], pull[2:], half, half, TENDON_GIVE[ANKLE])
+    assert np.abs(np.sum(work, 0)).sum() < 1e-6 * (pull * np.abs(rate)).mean()
 
 
 @pytest.mark.parametrize("joint", range(4))
@@ -90,8 +91,8 @@ def test_tissue_does_no_net_work_over_a_loop_of_one_joint(joint):
 def test_prices_of_one_joint_cannot_pay_for_another():
     # Shortening 1 J at the hip and stretching 1 J at the knee costs both.
     moment = np.zeros((3, 1, 4))
-    delivered = np.zeros((3, 1, 4))
-    delivered[1, 0, :2] = 1.0, -1.0
+    delivered = np.zeros((3, 1, 4, 2))
+    delivered[1, 0, :2, 0] = 1.0, -1.0
     use = muscle_use(moment, delivered, 0.01, strengths(BODY)[None], 1.0)
     assert use.energy[0].tolist() == pytest.approx([1 / MUSCLE_EFFICIENCY[0], 1 / MUSCLE_EFFICIENCY[1], 0.0, 0.0])
 

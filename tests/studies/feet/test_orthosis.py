@@ -65,7 +65,8 @@ def test_springs_are_compared_where_they_walk_equally_fast():
     assert best_springs(walks)[0]["best_Nm_deg"] == 8.7  # it is the slower walk that takes less
     assert best_springs(list(even.values()))[0]["best_Nm_deg"] == 0.9
     fallen = [row | {"falls": 0.2} if row["spring_Nm_deg"] == 0.9 else row for row in walks]
-    assert [row["falls"] for row in at_walked_speeds(fallen, SPRING_OF_A_BODY, (1.15,))] == [0.0, 1.0]
+    prices = [row["fibre_J_kg_m"] for row in at_walked_speeds(fallen, SPRING_OF_A_BODY, (1.15,))]
+    assert prices == [pytest.approx(4.75), None]
     assert all(row["fibre_J_kg_m"] is None for row in at_walked_speeds(walks, SPRING_OF_A_BODY, (1.5,)))
 
 
