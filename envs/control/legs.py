@@ -242,9 +242,9 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
     """Return the curves over the stride by which the controller moves one leg's hip and knee, (SAMPLES, 7).
 
     Columns, from `STANCE` to `PLANNED_PLACE`: fraction of the stance leg's gains in effect, from 0 in swing to 1 in
-    stance; hip and knee stiffness K [N m/rad]; hip and knee drive torque [N m], K times the rest angle plus the fed-
-    forward moment; the planned CoM's forward speed over its mean; the planned distance of the CoM ahead of the other
-    leg's ankle [m].
+    stance; hip and knee stiffness K [N m/rad]; hip and knee drive torque [N m], K times the rest angle plus the
+    fed-forward moment; the planned CoM's forward speed over its mean; the planned distance of the CoM ahead of the
+    other leg's ankle [m].
     """
     body = walk.body
     target = walk.target

@@ -55,7 +55,7 @@ def _read_all(table, place, phase, curves):
     Each of the P places has M / P consecutive phases: the first M / P belong to `place[0]`, and so on. `table` is (R,
     SAMPLES, 2, C) of a `PhaseTable`; `place` (P,) of `PLACE`.
     """
-    phases_per_place = max(len(phase) // len(place), 1)  # without phases 0, which is no divisor
+    phases_per_place = max(len(phase) // len(place), 1)  # 1 without phases, as 0 is no divisor
     for i in range(len(phase)):
         read(table, place[i // phases_per_place], phase[i], curves[i])
 

@@ -118,9 +118,8 @@ def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray
         angle: (T, side, joint) joint angles [rad].
     """
     foot = angle[..., HIP] - base[..., None, 2] - angle[..., KNEE] + angle[..., ANKLE]  # toes up; base[2] is the pitch
-    turn = np.stack(
-        [foot, foot + angle[..., TOE], foot + angle[..., TOE]], axis=-1
-    )  # heel on the foot, others on the toe
+    toe = foot + angle[..., TOE]
+    turn = np.stack([foot, toe, toe], axis=-1)  # the heel turns with the foot, ball and tip with the toe
     return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
