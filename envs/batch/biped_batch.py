@@ -15,7 +15,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from ..control.constants import LegConstants, SlopeConstants, slope_constants
-from ..control.decisions import DecisionTimes
+from ..control.decision_times import DecisionTimes
 from ..control.equilibrium import foot_tables
 from ..control.foot_springs import FootSprings, draw_delay
 from ..control.legs import LegController, slope_table

@@ -35,7 +35,7 @@ DECISION = np.dtype(
         ("last_action", float, len(ACTIONS)),  # that of the step before
     ]
 )
-"""The actions of one environment (`envs.control.decisions`)."""
+"""The actions of one environment (`envs.control.decision_times`)."""
 FOOT = np.dtype(
     [
         ("controlled", np.int64, FEET),  # 1 where actions set the stiffness; others are read as 0

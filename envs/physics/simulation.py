@@ -189,7 +189,8 @@ class Simulation:
         Args:
             control: (N, side, joint, 2) K [N m/rad], and K theta_eq plus any feed-forward torque [N m].
             ids: (K,) the simulations that run, all if None. The others stay as they are, contact forces included.
-            watched: whether `work` then holds the work of the physics steps, 0 for those not in `ids`; the same bits.
+            watched: whether to fill `work` for this window, with 0 for simulations not in `ids`; else it keeps its last
+                values. The motion has the same bits either way.
         """
         self._control[:] = control
         if watched:

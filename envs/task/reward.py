@@ -76,7 +76,10 @@ TASK_OPTIONS = np.dtype(
 
 @part
 def _near_zmp(scale, control, targets, m, forces, i):
-    """Return exp(-(d / tolerance)^2), d the distance of both feet's mean CoP in the step from the planned ZMP."""
+    """Return exp(-(d / tolerance)^2) of the distance d from the planned ZMP, forward, of the CoP; 0 in flight.
+
+    The CoP is that of both feet, mean over the step. Arguments are as of `judge`, of body `i`.
+    """
     load = moment = 0.0
     for window in range(len(forces)):
         for side in range(2):
@@ -86,8 +89,9 @@ def _near_zmp(scale, control, targets, m, forces, i):
     if load <= 0.0:
         return 0.0
     phase = control.legs.phase
-    leader = LEFT if phase[LEFT] < 0.5 else RIGHT
+    leader = LEFT if phase[LEFT] < 0.5 else RIGHT  # the leg whose stance began last
     target = targets[leader]
+    # From the leader's ankle: the CoM's mean advance so far, and the ZMP less that advance (`TARGET`).
     ahead = control.subject.scale.length * (target.stride_length * phase[leader] + target.zmp)
     return exp(-(((moment / load - m.ankle[leader, 0] - ahead) / scale.tolerance[3]) ** 2))
 

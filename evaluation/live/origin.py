@@ -19,8 +19,9 @@ def is_own_page(headers: Mapping[str, str], host: str) -> bool:
     """Return True if a request with these `headers` comes from the live page itself, or from a program, which sends no
     `Origin`.
 
-    The page itself has the address that the request asks. Where `host`, the address listened on, belongs to this
-    machine alone, the page's address must too: a name that resolves to it (DNS rebinding) is not enough.
+    The page is ours if its address, `Origin`, equals the request's `Host`. If the server listens on an address of this
+    machine alone (`host`), the page's host must be such an address too: another name that resolves to this machine (DNS
+    rebinding) would pass the first test.
     """
     origin = headers.get("Origin")
     if origin is None:

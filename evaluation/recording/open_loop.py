@@ -117,9 +117,10 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
 
 
 def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
-    """Return the mean K over the stride, (SAMPLES, 2) on `GRID`, of decisions at `phase` (n,) of `stiffness` (n, 2).
+    """Return the mean K over the stride on `GRID`, (SAMPLES, 2) [N m/rad], of n decisions.
 
-    Both in N m/rad. The mean is clipped to the range of the decisions, beyond which the fit's knots may lie.
+    `phase` (n,) in [0, 1) and `stiffness` (n, 2) [N m/rad] are those of the decisions. The fitted curve can overshoot
+    them, so it is clipped to their range.
     """
     knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
     knot_phases = np.arange(MEAN_KNOTS) / MEAN_KNOTS

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.decisions import gait_events
+from springfoot.envs.control.decision_times import gait_events
 from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.model import SIDES, damping_times

@@ -268,7 +268,7 @@ def _path_by_matrices(
     of the walk gives the periodic start.
     """
     step_time = zmp_times[-1]
-    back, down = -gravity(slope)
+    back, down = -gravity(slope)  # g sin a and g cos a on a slope a
     pieces = [
         np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)[:-1]
         for start, end in pairwise(zmp_times)
@@ -276,7 +276,10 @@ def _path_by_matrices(
     t = np.append(np.concatenate(pieces), step_time)
 
     def equation(time: NDArray) -> NDArray:
-        """Return the rate of change of (x, x', 1) as matrices (times, 3, 3)."""
+        """Return the matrices A (times, 3, 3) of d/dt (x, x', 1) = A (x, x', 1).
+
+        They are those of x'' = (g cos a + z'') / z (x + ahead - p) - g sin a, with the ZMP p and the slope a.
+        """
         z = height + bob(time)
         squared_rate = (down + bob(time, 2)) / z
         matrix = np.zeros((len(time), 3, 3))

@@ -310,7 +310,7 @@ def _changes(rows: Sequence[Row], asked: Asked, searches: Sequence[int]) -> list
         for search, pairs in by_search.items()
     ]
     if len(searches) > 1:
-        # (searches, 2), also without any: the passive and the adaptive foot.
+        # Mean of each search that has pairs, (n, 2): passive, adaptive; (0, 2) if no search has any.
         means = np.array([pairs.mean(0) for pairs in by_search.values() if len(pairs)]).reshape(-1, 2)
         both = {"search": "both", "pairs": sum(map(len, by_search.values()))}
         changes.append(both | _change(means, intact, asked.better, few=True))

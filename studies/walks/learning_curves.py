@@ -108,7 +108,10 @@ class LearningCurves(WalkingStudy):
 
 
 def read_finished(folder: Path) -> dict[str, Any]:
-    """Return the record of a run; raise `SpringfootError` unless it has the time and steps of every evaluation."""
+    """Return the record of a finished run: one with `seconds` and `timesteps` of its own and of every evaluation.
+
+    Raises `SpringfootError` for others.
+    """
     try:
         record_of_run = read_record(folder)
         for entry in (record_of_run, *record_of_run["evaluations"]):
