@@ -30,7 +30,7 @@ NOT_FUZZED = {
         "agents/training/cluster/rllib_training.py",
         "resume",
     ): "reads a record beside Ray's pickles, in an environment of its own",
-    ("cli/examples.py", "run_examples"): "reads files of the package alone",
+    ("cli/examples.py", "_first_line"): "reads files of the package alone",
     ("gait/people/c3d_file.py", "_refuse_broken"): "runs in the child that the reader of C3D files starts",
 }
 

@@ -177,7 +177,7 @@ def test_a_wrong_table_is_refused_in_one_line(wrong, text):
         ("a.txt", "rigid", "is no foot (a JSON object, or a table in a file .csv): it is not JSON, line 1"),
         ("a.json", '{"ankle": [], "toe": []}', "schedule: ankle segments must ascend in phase"),
         ("a.json", '{"kind": "rigid", "kind": "drop"}', "it is not JSON, 'kind' stands twice in an object"),
-        ("a.json", '{"foot": "rigid"}', "right_foot must be one of 'intact'"),
+        ("a.json", '{"foot": "rigid"}', "right_foot: a dictionary needs a 'kind'"),
     ],
 )
 def test_a_wrong_file_is_one_line_exit_code_2(name, content, text, tmp_path, capsys):
