@@ -297,7 +297,8 @@ class Biped(ExactState):
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, step.running))
         options = self._springs.options
-        begin_step(self._rows, self._physics, self._tables, options, step.factor, step.walking, step.fixed)
+        bodies = self._simulation.arrays.bodies
+        begin_step(self._rows, bodies, self._tables, options, step.factor, step.walking, step.fixed)
 
     def _simulate(self, step: "_Step") -> None:
         """Run the physics of one control window with the control that the springs, the legs and the stance set."""
@@ -321,7 +322,7 @@ class Biped(ExactState):
         else:  # report the window with the control that produced it
             end_window(self._rows, self._physics, window, step.walking)
             self._after_window(step)
-            begin_window(self._rows, self._physics, self._tables, options, step.walking)
+            begin_window(self._rows, self._simulation.arrays.bodies, self._tables, options, step.walking)
 
     def _after_window(self, step: "_Step") -> None:
         """Lay the ground of the next footfalls, and report the window to a listener."""

@@ -58,13 +58,11 @@ class Tables(NamedTuple):
 
 
 @kernel
-def begin_window(rows, physics, tables, springs, walking) -> None:
+def begin_window(rows, bodies, tables, springs, walking) -> None:
     """Begin a control window: put stiffness and rest angles of all joints into the control; arguments as of
     `begin_step`."""
     rows = EnvironmentRows(*rows)
-    physics = Physics(*physics)
     tables = Tables(*tables)
-    bodies = physics.bodies
     move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
     drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
 
@@ -73,12 +71,12 @@ def begin_window(rows, physics, tables, springs, walking) -> None:
 def end_window(rows, physics, window, walking) -> None:
     """End control window number `window` of the step: measure it, advance the phase, and keep its contact forces.
 
-    The other arguments are as of `begin_step`.
+    `physics` is `Physics` of the simulation, as a plain tuple; the other arguments are as of `begin_step`.
     """
     rows = EnvironmentRows(*rows)
     physics = Physics(*physics)
     bodies = physics.bodies
-    measure_bodies(bodies, physics.state, physics.sensors, physics.actuator, physics.velocity, physics.warnings)
+    measure_bodies(bodies, physics.state, physics.sensors, physics.velocity, physics.warnings)
     advance(rows.controls, bodies, walking)
     for i in range(len(bodies)):
         force = bodies[i].measured.force
@@ -89,12 +87,12 @@ def end_window(rows, physics, window, walking) -> None:
 
 
 @kernel
-def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
+def begin_step(rows, bodies, tables, springs, factor, walking, fixed) -> None:
     """Set the stiffness and begin the first control window.
 
     Args:
         rows: `EnvironmentRows`, as a plain tuple.
-        physics: `Physics` of the simulation, as a plain tuple.
+        bodies: (N,) of `BODY_ROW`, as measured now.
         tables: `Tables`, as a plain tuple.
         springs: (1,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
@@ -103,21 +101,21 @@ def begin_step(rows, physics, tables, springs, factor, walking, fixed) -> None:
     """
     stiffen(
         EnvironmentRows(*rows).controls,
-        Physics(*physics).bodies,
+        bodies,
         Tables(*tables).schedule,
         springs,
         factor,
         walking,
         fixed,
     )
-    begin_window(rows, physics, tables, springs, walking)
+    begin_window(rows, bodies, tables, springs, walking)
 
 
 @kernel
 def next_window(rows, physics, tables, springs, window, walking) -> None:
-    """End window number `window` and begin the next; arguments as of `begin_step`."""
+    """End window number `window` and begin the next; arguments as of `end_window` and `begin_step`."""
     end_window(rows, physics, window, walking)
-    begin_window(rows, physics, tables, springs, walking)
+    begin_window(rows, Physics(*physics).bodies, tables, springs, walking)
 
 
 @kernel
@@ -125,7 +123,8 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     """End the last control window, judge the step and observe.
 
     Args:
-        rows, physics, tables: as of `begin_step`.
+        rows, tables: as of `begin_step`.
+        physics: as of `end_window`.
         task: (1,) of `TASK_OPTIONS`.
         walking: (N,) bool, environments with moving phase.
         running: (N,) bool, environments that took the step; the others get no reward.

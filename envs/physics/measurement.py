@@ -13,7 +13,7 @@ from .contact import CONTACTS, contact_offsets
 from .foot import SOUND, Feet, leg_segments, total_mass
 from .kernel import kernel, part
 from .model import ANKLE, BASE, JOINTS, KNEE, SIDES, TOE, damping_times_of, torque_ranges
-from .muscles import MUSCLE_ROW, work_muscles
+from .muscles import MUSCLE_ROW, actuator_torque, work_muscles
 
 DEGREES = len(BASE) + len(SIDES) * len(JOINTS)
 """Degrees of freedom of the body."""
@@ -226,18 +226,13 @@ def _read_joints(segments, plant, m):
 
     The torque is the spring's, within the limits of `segments`, at the state of `plant`, of `PLANT`.
     """
-    beta = segments.beta
-    torque = segments.torque
     for side in range(2):
         for joint in range(4):
             theta = plant.qpos[3 + 4 * side + joint]
             theta_rate = plant.qvel[3 + 4 * side + joint]
-            stiffness = plant.control[side, joint, 0]
-            drive = plant.control[side, joint, 1]
-            spring = drive - stiffness * (theta + beta[side, joint] * theta_rate)
             m.angle[side, joint] = theta
             m.velocity[side, joint] = theta_rate
-            m.torque[side, joint] = min(max(spring, torque[side, joint, 0]), torque[side, joint, 1])
+            m.torque[side, joint] = actuator_torque(segments, plant.control, theta, theta_rate, side, joint)
 
 
 @part
@@ -264,15 +259,14 @@ def plant_of(state, i) -> Any:
 
 
 @kernel
-def measure_bodies(bodies, state, sensors, actuator, velocity, warnings) -> None:
+def measure_bodies(bodies, state, sensors, velocity, warnings) -> None:
     """Measure N bodies after a control window.
 
     Args:
         bodies: (N,) of `BODY_ROW`; `measured` is filled, and the window added to `muscles`.
         state: (N, numbers) MuJoCo's, whose rows begin as `PLANT`.
         sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
-        actuator: (N, S, D) generalised forces of the actuators in these steps [N, N m].
-        velocity: (N, S, D) velocities after them [m/s, rad/s].
+        velocity: (N, S, D) velocities after these steps [m/s, rad/s].
         warnings: (N, kinds) how often MuJoCo has warned of each kind.
     """
     for i in range(len(bodies)):
@@ -286,7 +280,7 @@ def measure_bodies(bodies, state, sensors, actuator, velocity, warnings) -> None
         _locate(segments, plant.qpos, plant.qvel, m)
         _make_relative_to_ground(bodies[i].ground, m)
         _average(sensors[i], m.force)
-        work_muscles(bodies[i].muscles, m, actuator[i], velocity[i], plant.control)
+        work_muscles(bodies[i].muscles, m, segments, velocity[i], plant.control)
         m.diverged = -1
         for kind in range(warnings.shape[1] - 1, -1, -1):  # backwards, so that the lowest kind stays
             if warnings[i, kind] > 0:

@@ -90,14 +90,25 @@ def _price_last_but_one(row):
 
 
 @part
-def work_muscles(row, m, actuator, velocity, control) -> None:
+def actuator_torque(segments, control, theta, theta_rate, side, joint) -> float:
+    """Return the torque of one joint's actuators [N m]: of its spring, within the joint's limits.
+
+    `segments` is of `SEGMENTS`, `control` (side, joint, 2) K [N m/rad] and K theta_eq [N m]; `theta` [rad].
+    """
+    spring = control[side, joint, 1] - control[side, joint, 0] * (theta + segments.beta[side, joint] * theta_rate)
+    return min(max(spring, segments.torque[side, joint, 0]), segments.torque[side, joint, 1])
+
+
+@part
+def work_muscles(row, m, segments, velocity, control) -> None:
     """Add a control window to what the muscles of one body did; nothing if no time has passed.
 
     Args:
         row: of `MUSCLE_ROW`.
         m: of `MEASURED`, at the window's end.
-        actuator: (S, D) generalised forces of the actuators in the window's physics steps [N, N m].
-        velocity: (S, D) velocities after these steps [m/s, rad/s].
+        segments: of `SEGMENTS`.
+        velocity: (S, D) velocities after the window's physics steps [m/s, rad/s]. MuJoCo moves a joint by the velocity
+            after a step, so they give the angles, and these the torques: recording torques too would cost more.
         control: (side, joint, 2) K [N m/rad] and K theta_eq [N m] of the window; muscles without K are slack.
     """
     if m.time <= row.time:
@@ -107,7 +118,7 @@ def work_muscles(row, m, actuator, velocity, control) -> None:
         row.judged = 0
         row.activation = row.positive_work = 0.0
         row.energy[:] = 0.0
-    steps = len(actuator)
+    steps = len(velocity)
     timestep = CONTROL_WINDOW / steps
     muscles = row.muscles
     middle = np.empty(4)
@@ -119,10 +130,13 @@ def work_muscles(row, m, actuator, velocity, control) -> None:
             dof = 3 + 4 * side + joint
             mean_torque = first = second = 0.0
             before = row.velocity[side, joint]
+            theta = row.angle[side, joint]
             for step in range(steps):
+                torque = actuator_torque(segments, control, theta, before, side, joint)
                 after = velocity[step, dof]
-                mean_torque += actuator[step, dof] / steps
-                work = actuator[step, dof] * 0.5 * (before + after) * timestep
+                theta += after * timestep
+                mean_torque += torque / steps
+                work = torque * 0.5 * (before + after) * timestep
                 early = min(max(0.5 * steps - step, 0.0), 1.0)  # part of the step in the window's first half
                 first += early * work
                 second += (1.0 - early) * work

@@ -45,8 +45,6 @@ class Physics(NamedTuple):
     """(N, numbers) MuJoCo's state, whose rows begin as `PLANT`."""
     sensors: NDArray
     """(N, S, side, contact, 3) contact forces of the last window's S physics steps [N]."""
-    actuator: NDArray
-    """(N, S, D) generalised forces of the actuators in those steps [N, N m]."""
     velocity: NDArray
     """(N, S, D) velocities after those steps [m/s, rad/s]."""
     warnings: NDArray
@@ -108,14 +106,13 @@ class Simulation:
         self._parts = np.concatenate([parts_of(body, pair) for pair in self.feet])
         self._ground = bodies["ground"]
         sensors = np.zeros((num, self._substeps, len(SIDES), len(CONTACTS), 3))
-        actuator, velocity = np.zeros((2, num, self._substeps, self.model.nv))
-        self.arrays = Physics(bodies, state, sensors, actuator, velocity, self._batch.warning[:, :, 1])
+        velocity = np.zeros((num, self._substeps, self.model.nv))
+        self.arrays = Physics(bodies, state, sensors, velocity, self._batch.warning[:, :, 1])
         """Arrays that kernels read and write."""
         self.now = Measurement.of(bodies["measured"])
         """The last measurement; its arrays change in place."""
         self._record = {
             SENSORS: sensors.reshape(num, self._substeps, self.model.nsensordata),
-            "qfrc_actuator": actuator,
             "qvel": velocity,
         }
         self._control_before = np.full(self._control.shape, np.nan)  # in the last window that was watched; NaN for none
@@ -201,10 +198,8 @@ class Simulation:
     def _roll_watched(self, ids: NDArray | None) -> None:
         """Run the physics steps of a window in simulations `ids` (K,), all if None, and fill `work` from their
         record."""
-        actuator = self.arrays.actuator
         velocity = self.arrays.velocity
-        passive = np.zeros_like(velocity)
-        constraint = np.zeros_like(velocity)
+        actuator, passive, constraint = (np.zeros_like(velocity) for _ in range(3))
         steps = StepRecord(self._qvel.copy(), self._qpos[:, 2].copy(), velocity, actuator, passive, constraint)
         angle = self._qpos[:, 3:].reshape(self._control.shape[:3]).copy()
         self._roll(ids, self._record | dict(zip(RECORDED, steps[2:], strict=True)))  # behind `before` and `pitch`
@@ -227,7 +222,7 @@ class Simulation:
         rest, the sensors stay and all other records are 0.
         """
         if ids is None:
-            self._batch.rollout(self._substeps, record=list(out), out=out)
+            self._batch.rollout(self._substeps, record=tuple(out), out=out)
             return
         for name, values in out.items():
             if name != SENSORS:
