@@ -37,6 +37,11 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
 
     For 1.70 m and 63 kg; scales with mass x height. Of a joint with a device (Feet) an action is read and seen as 0.
 
+    With `acts="person"` the action is the person instead, `Box(-1, 1, (6,), float32)`: offsets to the rest angles of
+    hips, knees and ankles, up to `person_range_deg` each: `rest_hip_left`, `rest_knee_left`, `rest_ankle_left`, then
+    those of the right leg. With `acts="both"` these six stand behind the four. `stiffness_by` says who sets the
+    stiffness; where the action does not, its four are read and seen as 0.
+
     ## Feet
     `left_foot` and `right_foot` are each one of these kinds, or a dictionary of `kind` and numbers. Stiffness [N m/rad]
     and rest angle [deg] of a device are the same on everybody. Every kind may have an `orthosis`, a dictionary of the
@@ -108,6 +113,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
     | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |
 
+    Where the action moves the person, 37 further entries tell the last offsets, whether the action sets the stiffness,
+    the slope, the stiffness now, and what feet and body are: `springfoot.envs.task.observation_entries`.
+
     ## Rewards
     Sum of weight x term. All terms are dimensionless and stand unweighted in `info`. On the step of a fall the reward
     is 0. Tolerances are those of 1.70 m; lengths scale with height, speeds with its square root.
@@ -127,6 +135,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | fibre_work     | 0      | energy that muscle fibres spend on work, over weight x commanded way            |
     | activation     | 0      | squared moment of the fibres over their strength, weighted by volume            |
     | impact         | 0      | squared change of the feet's forces in a step [body weights], x (50 ms/step)^2  |
+    | speed_held     | 0      | distance of the mean speed of 0.7 s from the commanded one, over that           |
+    | person_rate    | 0      | squared change of the person's offsets over 0.25 rad, per 20 ms                 |
+    | acceleration   | 0      | sum over joints of (acceleration x (50 ms)^2)^2 [rad^2]                         |
 
     ## Starting state
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at
@@ -207,6 +218,11 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `toe_stiffness_range`     | `(5.0, 200.0)`  | toe stiffness at action -1 and +1 [N m/rad]                        |
     | `ankle_tendon`            | `None`          | stiffness of the Achilles tendon, which bounds K [N m/rad]         |
     | `schedule`                | `None`          | a stiffness schedule in JSON form                                  |
+    | **person**                |                 |                                                                    |
+    | `acts`                    | `"stiffness"`   | the action sets `"stiffness"`, the `"person"`, or `"both"`         |
+    | `person`                  | `"tuned"`       | who walks where it sets stiffness: `"tuned"`, or a policy's file   |
+    | `person_range_deg`        | `14.0`          | largest offset of a rest angle [deg]                               |
+    | `stiffness_by`            | `"action"`      | who sets the stiffness where the action moves the person           |
     | **episode**               |                 |                                                                    |
     | `episode_seconds`         | `20.0`          | time until truncation [s]                                          |
     | `start`                   | `"random"`      | left leg's stride phase at the start, `"random"` or `"standing"`   |

@@ -37,7 +37,8 @@ class Setup:
         bodies = np.zeros(len(legs), BODY_ROW)
         for name, values in vars(measurement or self.measurement(legs[:, LEFT])).items():
             bodies["measured"][name] = values
-        return Task(self.settings, list(rows(self.walks)), subjects), subjects.rows, bodies
+        feet = [self.settings.feet] * len(bodies)
+        return Task(self.settings, list(rows(self.walks)), subjects, feet), subjects.rows, bodies
 
     def tracking(self, measurement, left_phase) -> NDArray:
         task, _, bodies = self.at(left_phase, measurement)

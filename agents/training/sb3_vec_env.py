@@ -9,7 +9,6 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from springfoot.envs.control.subjects import DRAWN
-from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.errors import SpringfootError
 
@@ -29,7 +28,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         )
         super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
         self.step_info: dict[str, np.ndarray] = {}
-        self._actions = np.zeros((num_envs, len(ACTIONS)), np.float32)
+        self._actions = np.zeros((num_envs, len(self.env.biped.action_names)), np.float32)
         self._returns = np.zeros(num_envs)
         self._lengths = np.zeros(num_envs, int)
 
@@ -44,7 +43,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return observation
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions (N, 4) for `step_wait`."""
+        """Keep the actions (N, A) for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:

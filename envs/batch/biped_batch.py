@@ -19,13 +19,14 @@ from ..control.decision_times import DecisionTimes
 from ..control.equilibrium import foot_tables
 from ..control.foot_springs import FootSprings, draw_delay
 from ..control.legs import LegController, slope_table
+from ..control.person_actions import PersonActions
 from ..control.reference_walk import rows, walks_of_legs
 from ..control.standing import WALKING, Standing, off_phase
 from ..control.subjects import Subjects
 from ..physics.contact import CONTACTS
 from ..physics.foot import Feet
 from ..physics.measurement import Measurement
-from ..physics.model import ACTIONS, JOINTS, SIDES
+from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES
 from ..physics.simulation import MjData, MjModel, Simulation
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.checks import real_numbers
@@ -57,7 +58,6 @@ class Biped(ExactState):
     """
 
     tick_dt = CONTROL_WINDOW
-    action_names = ACTIONS
 
     def __init__(
         self,
@@ -83,6 +83,10 @@ class Biped(ExactState):
         self.windows_per_step = round(self.dt / CONTROL_WINDOW)
         """Control windows in one step."""
         self.on_tick: Callable[[Tick], None] | None = None
+        self._acts_on_stiffness = settings.acts != "person"
+        self._acts_as_person = settings.acts != "stiffness"
+        self.action_names = ACTIONS * self._acts_on_stiffness + PERSON_ACTIONS * self._acts_as_person
+        """Name of each action, those of the stiffness first."""
         self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
         """Reference walks of the left legs at each tabulated speed; those of the right legs, none if they are the
         same."""
@@ -107,7 +111,8 @@ class Biped(ExactState):
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction, feet)
-        self._task = Task(settings, table, self.subjects)
+        self._person = PersonActions(settings, self.subjects.rows)
+        self._task = Task(settings, table, self.subjects, self._simulation.feet)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
         self._pushes = Pushes(settings, self.subjects, self._task.rows)
@@ -158,7 +163,8 @@ class Biped(ExactState):
     @property
     def controlled(self) -> NDArray:
         """Return (N, side, 2) True where actions set the stiffness of ankle and toe; others are read as 0. A copy."""
-        return self.subjects.rows["feet"]["controlled"].astype(bool)
+        rows = self.subjects.rows
+        return rows["feet"]["controlled"].astype(bool) & (rows["source"]["others"] == 0)[:, None, None]
 
     @property
     def standing_mode(self) -> NDArray:
@@ -230,14 +236,13 @@ class Biped(ExactState):
         self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
         self._noise.draw(ids, randoms)
         self._decisions.reset(ids)
-        self._steps[ids] = 0
-        self._task.rows["force"][ids] = 0.0
+        self._person.reset(ids, randoms)
         posture = walking_posture(self._start, self.subjects, ids, phase)
         if self._standing is not None:
             standing_posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing")
             posture = standing_posture or posture  # None for bodies that walk
         place(self._simulation, self.subjects, ids, posture, noise)
-        self._simulation.measure(ids)
+        self._task.reset(ids, self._simulation.measure(ids).velocity)
 
     def _fit(self, ids: list[int]) -> None:
         """Give environments `ids` the bodies of their subjects, and every leg its commanded speed."""
@@ -255,7 +260,7 @@ class Biped(ExactState):
         return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
 
     def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
-        """Apply actions (N, 4) for one step.
+        """Apply actions (N, A), as `action_names`, for one step.
 
         Environments where the mask `active` (N,) is False stay as they are; their reward is 0.
         Raises `SpringfootError` for actions of another shape, and for NaN or infinity.
@@ -278,14 +283,24 @@ class Biped(ExactState):
             running = active
             ids = np.flatnonzero(active)
         action = real_numbers("actions", actions)
-        if action.shape != (self.num_envs, len(ACTIONS)):
-            raise SpringfootError(f"actions must have shape ({self.num_envs}, {len(ACTIONS)}), got {action.shape}")
-        taken = self._decisions.take(action, running)
+        if action.shape != (self.num_envs, len(self.action_names)):
+            expected = self.num_envs, len(self.action_names)
+            raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
+        of_stiffness = action
+        of_person = None
+        if self._acts_as_person:
+            of_stiffness = np.zeros((self.num_envs, len(ACTIONS)))  # unless the action sets it too
+            of_person = action[:, -len(PERSON_ACTIONS) :]
+            if self._acts_on_stiffness:
+                of_stiffness = np.ascontiguousarray(action[:, : len(ACTIONS)])
+        finite = of_person is None or np.isfinite(of_person[running]).all()
+        taken = self._decisions.take(of_stiffness, running) if finite else None
         if taken is None:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         factor = self._springs.factor(taken)
+        self._person.replace(factor, self._springs.factor_at_one, running, self._random)
         # Without `Standing` all bodies that run walk, and none with the fixed stiffness.
-        return _Step(running=running, ids=ids, factor=factor, walking=running, fixed=self._nobody)
+        return _Step(running=running, ids=ids, factor=factor, of_person=of_person, walking=running, fixed=self._nobody)
 
     def _before_step(self, step: "_Step") -> None:
         """Let bodies set off or stop, change speeds, push, set the stiffness and begin the first window."""
@@ -296,6 +311,8 @@ class Biped(ExactState):
             self._legs.follow()
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, step.running))
+        if step.of_person is not None:
+            self._person.move(step.of_person, step.walking, step.running)
         options = self._springs.options
         bodies = self._simulation.arrays.bodies
         begin_step(self._rows, bodies, self._tables, options, step.factor, step.walking, step.fixed)
@@ -342,7 +359,7 @@ class Biped(ExactState):
 
     def _judge(self, step: "_Step") -> StepResult:
         """End the last window of the step, and return its result: reward, observation, termination."""
-        outcome = empty_outcome(self.num_envs)
+        outcome = empty_outcome(self.num_envs, len(self.observation_names))
         to_fill = tuple(outcome)
         task = self._task.options
         terminated = end_step(self._rows, self._physics, self._tables, task, step.walking, step.running, to_fill)
@@ -370,6 +387,8 @@ class _Step:
     """Indices of the running environments; None for all."""
     factor: NDArray
     """(N, 4) factors of the actions on the stiffness [-]."""
+    of_person: NDArray | None
+    """(N, 6) actions that move the person; None if they do not."""
     walking: NDArray
     """(N,) environments with moving springs and phase; the others stand or do not run."""
     fixed: NDArray

@@ -23,7 +23,7 @@ from ..physics.measurement import measure_bodies
 from ..physics.simulation import Physics
 from ..task.episode_end import average
 from ..task.observation import observe
-from ..task.reward import ALIVE, judge, total
+from ..task.reward import ALIVE, judge, remember, total
 from .step_result import Outcome, report
 
 
@@ -142,6 +142,7 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     judge(tasks, controls, bodies, target, task, forces, terms)
     total(terms, task, outcome.reward)
     average(tasks, forces, running)
+    remember(tasks, bodies, task, running)
     for i in range(len(running)):
         outcome.terminated[i] = running[i] and terms[i, ALIVE] == 0.0
         outcome.truncated[i] = running[i] and not outcome.terminated[i] and tasks[i].steps >= task[0].most_steps
@@ -153,6 +154,10 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
         decision = controls[i].decision
         for k in range(4):
             decision.last_action[k] = decision.action[k]
+        person = controls[i].person
+        for side in range(2):
+            for joint in range(3):
+                person.last_offset[side, joint] = person.offset[side, joint]
     observe(tasks, controls, bodies, target, outcome.observation)
     report(tasks, controls, bodies, terms, task, outcome.values)
     return any_terminated

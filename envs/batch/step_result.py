@@ -13,7 +13,6 @@ from ..physics.kernel import part
 from ..physics.measurement import Measurement
 from ..physics.model import ACTIONS, ANKLE, SIDES
 from ..task.episode_end import TERMINATIONS
-from ..task.observation_entries import OBSERVATION
 from ..task.reward import TERMS
 
 REPORT = np.dtype(
@@ -81,7 +80,7 @@ def report(rows, controls, bodies, terms, options, values) -> None:
                 row.equilibrium[side, joint] = springs.equilibrium[side, joint]
                 row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]
                 row.work_equilibrium[side, joint] = springs.work_equilibrium[side, joint]
-                row.controlled[side, joint] = feet.controlled[side, joint]
+                row.controlled[side, joint] = feet.controlled[side, joint] * (1 - controls[i].source.others)
 
 
 @dataclass(kw_only=True, eq=False)
@@ -155,10 +154,11 @@ class Outcome(NamedTuple):
     values: NDArray
 
 
-def empty_outcome(num: int) -> Outcome:
-    """Return arrays for the outcome of a step of `num` environments, not yet filled."""
+def empty_outcome(num: int, entries: int) -> Outcome:
+    """Return arrays for the outcome of a step of `num` environments with so many entries of the observation, not yet
+    filled."""
     return Outcome(
-        observation=np.empty((num, len(OBSERVATION)), np.float32),
+        observation=np.empty((num, entries), np.float32),
         reward=np.empty(num),
         terminated=np.empty(num, bool),
         truncated=np.empty(num, bool),

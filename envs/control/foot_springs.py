@@ -69,7 +69,7 @@ SPRING_OPTIONS = np.dtype(
         ("middle", float, 2),  # stiffness of ankle and toe at action 0 [N m/rad] where no schedule sets it
         ("tendon", float),  # largest stiffness of the calf with its tendon [N m/rad]; infinite without a bound
         ("tissue", float),  # factor on the stiffness of the ankle's passive tissue beside it [-]
-        ("scheduled", np.int64, 2),  # 1 where the schedule sets that of ankle, of toe
+        ("scheduled", np.int64, 2),  # 1 where an action is a factor on the schedule of ankle, of toe
         ("follows", np.int64),  # 1 if the rest angles change with the slope; constant ones do not
         ("held", np.int64),  # 1 if the rest angles are those of the phases at which K was set
     ]
@@ -107,7 +107,8 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                 springs.work_stiffness[side, joint] = springs.work_equilibrium[side, joint] = 0.0
                 if not walking[i]:
                     continue
-                base = scheduled[joint] if fixed[i] or option.scheduled[joint] else option.middle[joint]
+                of_source = rows[i].source.scheduled if rows[i].source.others else option.scheduled[joint]
+                base = scheduled[joint] if fixed[i] or of_source else option.middle[joint]
                 ratio = 1.0 if fixed[i] else factor[i, 2 * side + joint]
                 if not rows[i].feet.muscles[side, joint]:
                     ratio = 0.0  # a device is in their place
@@ -246,6 +247,8 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
                         acts = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
                         springs.acts[side, joint] = acts
                     new_rest = foot.rest[side, joint] if foot.rests[side, joint] else planned[joint]
+                    if joint == 0 and not foot.rests[side, joint]:
+                        new_rest += rows[i].person.offset[side, ANKLE]  # which lies there as among the joints
                     # A torque beside the spring of muscles shifts their rest angle by torque / K.
                     if feeds and foot.muscles[side, joint] and not foot.rests[side, joint]:
                         new_rest += subject.scale.torque * planned[2 + joint] / k
@@ -329,7 +332,8 @@ class FootSprings:
         """`FootLines`, as a plain tuple for kernels."""
         self._residual = settings.action_mode == "residual"
         middle, factor = _log_scale(settings, body)
-        self._factor = np.tile(factor, 2)  # of the four actions, two for each leg
+        self.factor_at_one = np.tile(factor, 2)
+        """(4,) factor of an action of 1 on the stiffness at action 0, where no schedule sets it [-]."""
         scheduled = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
         follows = settings.equilibrium in ("planned", "angle")
         held = settings.equilibrium == "phase"
@@ -367,7 +371,7 @@ class FootSprings:
 
         Computed by NumPy: powers in a kernel would have other last bits.
         """
-        return np.exp(action) if self._residual else self._factor**action
+        return np.exp(action) if self._residual else self.factor_at_one**action
 
     def hold(self, bodies: NDArray, control: NDArray, standing: NDArray) -> None:
         """Let the springs of the bodies `standing` (N,) take over the K and K theta_eq in `control`.

@@ -121,6 +121,7 @@ def drive(rows, bodies, control, table, incline) -> None:
         m = bodies[i].measured
         gain = legs.gains
         torque = subject.scale.torque
+        offset = rows[i].person.offset
         for side in range(2):
             read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
@@ -137,9 +138,9 @@ def drive(rows, bodies, control, table, incline) -> None:
             shift = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
             feedback = stance * stance_torque + (1.0 - stance) * hip * shift
             control[i, side, HIP, 0] = hip
-            control[i, side, HIP, 1] = torque * curves[side, HIP_DRIVE] + feedback
+            control[i, side, HIP, 1] = torque * curves[side, HIP_DRIVE] + feedback + hip * offset[side, HIP]
             control[i, side, KNEE, 0] = knee
-            control[i, side, KNEE, 1] = torque * curves[side, KNEE_DRIVE]
+            control[i, side, KNEE, 1] = torque * curves[side, KNEE_DRIVE] + knee * offset[side, KNEE]
             if subject.slope != 0.0:  # a slope moves the targets of hips, knees and trunk
                 read(incline, first_row, legs.phase[side], inclined)
                 lean = stance * gain.trunk_stiffness * inclined[INCLINE_TRUNK]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..physics.model import ACTIONS, JOINTS, SIDES
+from ..physics.model import ACTIONS, JOINTS, MOVED, SIDES
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.settings import LONGEST_DELAY
 
@@ -36,6 +36,22 @@ DECISION = np.dtype(
     ]
 )
 """The actions of one environment (`envs.control.decision_times`)."""
+SOURCE = np.dtype(
+    [
+        ("others", np.int64),  # 1 where others than the action set the stiffness
+        ("scheduled", np.int64),  # then: 1 for a factor on the schedule, 0 for a stiffness within the ranges
+        ("anew", np.int64),  # 1 if it is drawn anew in every step
+        ("drawn", float, len(ACTIONS)),  # in place of the action, as the action mode of `scheduled` reads it
+    ]
+)
+"""Who sets the stiffness of one environment (`envs.control.person_actions`)."""
+PERSON = np.dtype(
+    [
+        ("offset", float, (len(SIDES), len(MOVED))),  # of the rest angles of hip, knee and ankle [rad]
+        ("last_offset", float, (len(SIDES), len(MOVED))),  # that of the step before [rad]
+    ]
+)
+"""The person of one environment (`envs.control.person_actions`)."""
 FOOT = np.dtype(
     [
         ("controlled", np.int64, FEET),  # 1 where actions set the stiffness; others are read as 0
@@ -107,6 +123,8 @@ CONTROL_ROW = np.dtype(
     [
         ("subject", SUBJECT),
         ("decision", DECISION),
+        ("source", SOURCE),
+        ("person", PERSON),
         ("feet", FOOT),
         ("springs", SPRING_STATE),
         ("legs", LEGS),

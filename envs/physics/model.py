@@ -27,6 +27,11 @@ BASE = ("x", "z", "pitch")
 LEFT, RIGHT = range(2)
 HIP, KNEE, ANKLE, TOE = range(4)
 ACTIONS = tuple(f"{joint}_{side}" for side in SIDES for joint in ("ankle", "toe"))
+"""Actions that set stiffness."""
+MOVED = ("hip", "knee", "ankle")
+"""Joints whose rest angles a person moves, the first of `JOINTS`."""
+PERSON_ACTIONS = tuple(f"rest_{joint}_{side}" for side in SIDES for joint in MOVED)
+"""Actions of a person: how far the rest angles are moved from those of the constants."""
 
 DAMPING_TIME = (0.031, 0.0377, 0.02, 0.02)
 """beta [s] of tau = K (theta_eq - theta - beta dtheta/dt), in the order of `JOINTS`; scaled with sqrt(l).

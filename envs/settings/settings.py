@@ -11,7 +11,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from springfoot.errors import SpringfootError, require_number, require_within
+from springfoot.errors import SpringfootError, quoted, require_number, require_within
 from springfoot.gait.body.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
 from springfoot.gait.people.human import PEOPLE_FILE, HumanGait, human_gait
 from springfoot.gait.people.own_data import OwnGait
@@ -41,6 +41,8 @@ Feedforward = Literal["people", "plan"]
 Guide = Literal["people", "plan"]
 ActionMode = Literal["absolute", "residual"]
 Decisions = Literal["100hz", "50hz", "25hz", "event"]
+Acts = Literal["stiffness", "person", "both"]
+StiffnessBy = Literal["action", "schedule", "scaled", "constant", "random", "drawn"]
 StiffnessJoints = Literal["both", "ankle", "toe"]
 
 THEMES = {
@@ -49,6 +51,7 @@ THEMES = {
     "speed": "How fast it is commanded to walk.",
     "reference": "Human data, or the plan, that the body follows.",
     "springs": "What its ankle and toe springs do, and which part of that the action decides.",
+    "person": "Who moves the rest angles of hips, knees and ankles.",
     "episode": "How an episode starts and ends.",
     "ground": "What it walks on.",
     "disturbance": "What disturbs it: pushes, noise of the sensors, delay of the actuators.",
@@ -69,6 +72,8 @@ MOST_SENSOR_NOISE = 0.1
 LONGEST_DELAY = 0.04
 """Longest delay of a stiffness behind its command [s]; chosen, two steps of 20 ms."""
 
+FARTHEST_OFFSET_DEG = 30.0
+"""Largest offset of a rest angle that the setting `person_range_deg` takes [deg]; chosen."""
 TENDON_RANGE = (100.0, 2000.0)
 """Stiffness of a tendon that the setting `ankle_tendon` takes [N m/rad]; chosen: a fourth and five times people's."""
 DEFAULT_WEIGHTS = {
@@ -85,10 +90,15 @@ DEFAULT_WEIGHTS = {
     "fibre_work": 0.0,
     "activation": 0.0,
     "impact": 0.0,
+    "speed_held": 0.0,
+    "person_rate": 0.0,
+    "acceleration": 0.0,
 }
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
 
-_BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = ({"theme": t} for t in THEMES)
+_BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _PERSON, _EPISODE, _GROUND, _DISTURBANCE, _REWARD = (
+    {"theme": t} for t in THEMES
+)
 _DRAWN = {"drawn": True}  # the setting makes something differ between episodes, or change within one, by chance
 _KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
 
@@ -162,6 +172,18 @@ class BipedSettings:
     schedule: StiffnessSchedule | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
+    acts: Acts = field(default="stiffness", metadata=_PERSON)
+    """What the action sets: the stiffness of ankles and toes; the person, that is, offsets to the rest angles of hips,
+    knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
+    person: str = field(default="tuned", metadata=_PERSON)
+    """Who walks where the action sets stiffness alone: tuned, that is, the tuned rest angles; or a learned person, a
+    policy file of a training with `acts` `both` or `person`."""
+    person_range_deg: float = field(default=14.0, metadata=_PERSON)
+    """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
+    stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON)
+    """Who sets the stiffness where the action moves the person: the action; the fixed schedule; the schedule times a
+    factor drawn at each reset (scaled); one drawn stiffness of the ankles and one of the toes (constant); one drawn
+    anew in every step (random); or a drawn one of these, in half of the episodes the action (drawn)."""
     human: OwnGait | None = field(default=None, metadata=_REFERENCE)
     """One person's own walk in place of people's, JSON form of `springfoot.gait.people.own_data.OwnGait` (on the
     command line a CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time
@@ -208,6 +230,7 @@ class BipedSettings:
         for name, choices in (
             *(("cadence", Cadence), ("guide", Guide), ("equilibrium", Equilibrium), ("feedforward", Feedforward)),
             *(("action_mode", ActionMode), ("decisions", Decisions), ("stiffness_joints", StiffnessJoints)),
+            *(("acts", Acts), ("stiffness_by", StiffnessBy)),
         ):
             check_choice(name, getattr(self, name), get_args(choices))
         for name in FOOT_SETTINGS:
@@ -233,6 +256,7 @@ class BipedSettings:
         require_number("push_interval", self.push_interval, 0.0, unit="s", above=True)
         require_number("push_seconds", self.push_seconds, 0.0, self.push_interval, "s (push_interval)", above=True)
         self._check_world()
+        self._check_person()
         check_weights(self.reward_weights, DEFAULT_WEIGHTS)
         check_bounds(self)
 
@@ -280,6 +304,24 @@ class BipedSettings:
             if self.speed_range is None:
                 raise SpringfootError("speed_interval needs a speed_range to draw from, got None")
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
+
+    def _check_person(self) -> None:
+        """Raise `SpringfootError` for settings of a person that do not go together."""
+        require_number("person_range_deg", self.person_range_deg, 0.0, FARTHEST_OFFSET_DEG, unit="deg")
+        if not isinstance(self.person, str) or not self.person:
+            raise SpringfootError(f"person must be 'tuned' or the name of a policy file, got {quoted(self.person)}")
+        if self.acts == "stiffness":
+            if self.stiffness_by != "action":
+                raise SpringfootError(f"stiffness_by {self.stiffness_by!r} needs acts 'person' or 'both'")
+            return
+        if self.person != "tuned":
+            raise SpringfootError(f"acts {self.acts!r}: the action is the person, which must be 'tuned' then")
+        if self.decisions not in ("50hz", "event"):
+            raise SpringfootError(f"acts {self.acts!r} needs steps of 20 ms, decisions '50hz' or 'event'")
+        if self.acts == "person" and self.stiffness_by in ("action", "drawn"):
+            raise SpringfootError(
+                f"acts 'person' has no action for stiffness: stiffness_by must be another, got {self.stiffness_by!r}"
+            )
 
     def _check_world(self) -> None:
         """Raise `SpringfootError` for bad ground, noise or delays."""

@@ -2,23 +2,26 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import cos, pi, sin, sqrt
+from math import cos, exp, log, pi, sin, sqrt
 
 import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import GRAVITY, Body
 
+from ..control.foot_springs import muscle_stiffness
 from ..physics.contact import CONTACTS
-from ..physics.kernel import kernel
-from ..physics.model import ACTIONS, ANKLE, JOINTS, LEFT, SIDES
-from .observation_entries import OBSERVATION, UNITS
+from ..physics.kernel import kernel, part
+from ..physics.model import ACTIONS, ANKLE, JOINTS, LEFT, MOVED, SIDES
+from .observation_entries import OBSERVATION, PERSON_OBSERVATION, UNITS
 from .target import error_of, targets_at
+from .worn import WORN
 
-LOW, HIGH = (np.array([getattr(entry, end) for entry in OBSERVATION], np.float32) for end in ("low", "high"))
-"""(D,) bounds of the observation."""
-_UNIT = np.array([UNITS.index(entry.unit) for entry in OBSERVATION])
+LOW, HIGH = (np.array([getattr(entry, end) for entry in PERSON_OBSERVATION], np.float32) for end in ("low", "high"))
+"""(D,) bounds of `PERSON_OBSERVATION`, those of `OBSERVATION` first."""
+_UNIT = np.array([UNITS.index(entry.unit) for entry in PERSON_OBSERVATION])
 """(D,) index in `UNITS` of the unit of each entry."""
+_SHORT = len(OBSERVATION)
 
 SEEN = np.dtype(
     [
@@ -33,9 +36,16 @@ SEEN = np.dtype(
         ("planned_ankle", float, len(SIDES)),
         ("leading_leg", float),  # +1 left, -1 right
         ("command", float, 2),  # commanded speed, height ratio
+        ("last_offset", float, (len(SIDES), len(MOVED))),
+        ("own_stiffness", float),
+        ("slope", float),
+        ("stiffness", float, (len(SIDES), 2)),  # logarithm of K over its unit
+        ("worn", float, WORN),
     ]
 )
-"""The entries of `OBSERVATION`, in order, before they are made dimensionless [SI]."""
+"""The entries of `PERSON_OBSERVATION`, in order, before they are made dimensionless [SI]."""
+_SOFTEST = exp(-6.0)
+"""Stiffness over its unit below which its entry stays [-]; chosen, the entry's lower bound."""
 
 
 @lru_cache(maxsize=256)
@@ -43,6 +53,21 @@ def units_of(body: Body) -> NDArray:
     """Return the size of each of `UNITS` for a body, (6,) [SI]."""
     leg = body.leg_length
     return np.array([1.0, 1.0, leg, sqrt(GRAVITY * leg), sqrt(GRAVITY / leg), body.total_mass * GRAVITY])
+
+
+@part
+def _stiffness_entry(row, control, side, joint) -> float:
+    """Return the logarithm of K over its unit at one ankle or toe: of muscles and device together.
+
+    Before an episode's first step no K of muscles is set, and the entry is 0 but for devices of constant K. `row` is
+    of `TASK_ROW`, `control` of `CONTROL_ROW`.
+    """
+    springs = control.springs
+    stiffness = muscle_stiffness(springs, side, joint) + springs.device[side, joint]
+    if springs.fresh:
+        of_device = control.feet.stiffness[side, joint]
+        stiffness = of_device if of_device > 0.0 else row.scales.stiffness_unit[joint]
+    return log(max(stiffness / row.scales.stiffness_unit[joint], _SOFTEST))
 
 
 @kernel
@@ -54,9 +79,10 @@ def observe(rows, controls, bodies, table, observation) -> None:
         controls: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
         table: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
-        observation: (N, D) float32, which is filled.
+        observation: (N, D) float32, which is filled, D entries as `OBSERVATION` or as `PERSON_OBSERVATION`.
     """
     entries = np.empty(len(LOW))
+    count = observation.shape[1]
     curves = np.empty((2, table.shape[-1]))
     seen = entries.view(SEEN)[0]  # the same numbers by name
     for i in range(len(rows)):
@@ -87,7 +113,17 @@ def observe(rows, controls, bodies, table, observation) -> None:
                 seen.angle[side, joint], seen.velocity[side, joint] = m.angle[side, joint], m.velocity[side, joint]
             for contact in range(3):
                 seen.load[side, contact] = row.force[side, contact, 1]  # [1]: upward
-        for k in range(len(entries)):
+        if count > _SHORT:
+            seen.own_stiffness = 1 - control.source.others
+            seen.slope = control.subject.slope
+            for k in range(len(seen.worn)):
+                seen.worn[k] = row.worn[k]
+            for side in range(2):
+                for joint in range(2):
+                    seen.stiffness[side, joint] = _stiffness_entry(row, control, side, joint)
+                for joint in range(3):
+                    seen.last_offset[side, joint] = control.person.last_offset[side, joint]
+        for k in range(count):
             value = entries[k] / row.units[_UNIT[k]]
             if not value <= HIGH[k]:  # `not <=`, so that NaN also maps to the upper bound
                 value = HIGH[k]
@@ -118,4 +154,7 @@ class SensorNoise:
         """Return the observation (N, D) with its noise, float32, within its bounds."""
         if not self._on:
             return observation
-        return np.clip(observation + self._noise, LOW, HIGH).astype(np.float32)
+        noisy = observation.astype(float)
+        noisy[:, :_SHORT] += self._noise  # what a person knows besides has none
+        count = observation.shape[1]
+        return np.clip(noisy, LOW[:count], HIGH[:count]).astype(np.float32)

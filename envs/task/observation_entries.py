@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from ..physics.contact import CONTACTS
-from ..physics.model import ACTIONS, JOINTS, SIDES
+from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES
 
 UNITS = ("1", "rad", "leg length", "sqrt(g l)", "sqrt(g/l)", "body weight")
 """Units of the entries; each entry is its SI value over its unit."""
@@ -70,6 +70,46 @@ def _entries() -> tuple[Entry, ...]:
     )
 
 
+def _further_entries() -> tuple[Entry, ...]:
+    """Return the entries that a person sees besides, in order: the last offsets, the springs now, the body and feet."""
+    springs = [(side, joint) for side in SIDES for joint in ("ankle", "toe")]
+    return (
+        *(Entry(f"last_{name}", "rad", -1.0, 1.0, "offset of the step before", False) for name in PERSON_ACTIONS),
+        Entry("own_stiffness", "1", 0.0, 1.0, "1 where the action sets the stiffness, else 0", False),
+        Entry("slope", "rad", -0.2, 0.2, "slope of the ground, uphill positive", False),
+        *(
+            Entry(f"stiffness_{joint}_{side}", "1", -6.0, 6.0, "log of K over 300 (ankle), 60 N m/rad (toe)", False)
+            for side, joint in springs
+        ),
+        *(entry for side in SIDES for entry in _worn_entries(side)),
+        Entry("leg_ratio", "1", 0.0, 2.0, "leg length over the average at that height", False),
+        Entry("foot_ratio", "1", 0.0, 2.0, "foot length over the average at that height", False),
+        Entry("carried_ratio", "1", 0.0, 2.0, "load over body mass", False),
+    )
+
+
+def _worn_entries(side: str) -> tuple[Entry, ...]:
+    """Return the entries that tell the foot of one side."""
+    return (
+        Entry(f"muscles_ankle_{side}", "1", 0.0, 1.0, "1 for muscles, 0 for a device in their place", False),
+        Entry(f"muscles_toe_{side}", "1", 0.0, 1.0, "likewise", False),
+        Entry(f"strength_{side}", "1", 0.0, 1.0, "strength of the plantarflexors, 1 for sound ones", False),
+        Entry(f"acts_in_swing_{side}", "1", 0.0, 1.0, "0 for a drop foot, else 1", False),
+        Entry(f"device_rest_ankle_{side}", "rad", -1.0, 1.0, "rest angle of the ankle's device", False),
+        Entry(f"device_rest_toe_{side}", "rad", -1.0, 1.0, "rest angle of the toe's device", False),
+        Entry(f"brace_ankle_{side}", "1", 0.0, 9.0, "K of the orthosis over 300 N m/rad", False),
+        Entry(f"brace_toe_{side}", "1", 0.0, 9.0, "K of the orthosis over 60 N m/rad", False),
+        Entry(f"brace_low_{side}", "rad", -1.0, 1.0, "lowest ankle angle at which the orthosis is slack", False),
+        Entry(f"brace_high_{side}", "rad", -1.0, 1.0, "highest such angle", False),
+        Entry(
+            f"added_mass_{side}", "1", -0.2, 0.2, "mass below the knee beyond the intact one's, over body mass", False
+        ),
+    )
+
+
 OBSERVATION = _entries()
 """Every entry of the observation, in order. l is the leg length (hip to floor when standing); the weight is that of
 body and load. No entry tells the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
+PERSON_OBSERVATION = OBSERVATION + _further_entries()
+"""Every entry of the observation where the action moves the person: `OBSERVATION`, and what a person knows besides.
+Stiffness is over that unit at 1.70 m and 63 kg, scaled with mass x height."""

@@ -24,6 +24,7 @@ from ..control.foot_springs import muscle_stiffness
 from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
+from ..physics.foot import Feet
 from ..physics.kernel import part
 from ..physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT
 from ..physics.muscles import tissue_stiffness
@@ -31,10 +32,11 @@ from ..physics.timing import ACTION_STEP
 from ..settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from .episode_end import TOO_LOW, TOO_TILTED, divergence
 from .observation import HIGH, LOW, observe, units_of
-from .observation_entries import OBSERVATION
+from .observation_entries import OBSERVATION, PERSON_OBSERVATION
 from .scales import body_scales
 from .state import TASK_ROW
 from .target import error_of, target_curves, targets_at, track
+from .worn import worn_entries
 
 if TYPE_CHECKING:
     from ..physics.measurement import Measurement
@@ -55,13 +57,20 @@ FORCE_TOLERANCE = 0.4
 push-off far too strong costs hardly more than one a little too strong."""
 
 
+HELD_SECONDS = 0.7
+"""Time constant of the mean speed that `speed_held` judges [s]; chosen: within a step the speed varies."""
+OFFSET_UNIT = 0.25
+"""Change of an offset of a rest angle in 20 ms that costs one unit [rad]; chosen, 14 deg."""
+
+
 TERMS: tuple[str, ...] = (
     *("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf"),
     *("stiffness_rate", "stiffness", "effort", "fibre_work", "activation", "impact"),
+    *("speed_held", "person_rate", "acceleration"),
 )
 """Reward terms in the order of their sum: rewards, then costs."""
 ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, *_ = range(len(TERMS))
-EFFORT, FIBRE_WORK, ACTIVATION, IMPACT = range(STIFFNESS + 1, len(TERMS))
+EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, ACCELERATION = range(STIFFNESS + 1, len(TERMS))
 TASK_OPTIONS = np.dtype(
     [
         ("weights", float, len(TERMS)),  # of the reward's terms
@@ -143,6 +152,33 @@ def _impact(row, forces, i, seconds):
     return impact
 
 
+@part
+def _mean_speed(row, m, seconds):
+    """Return the mean of the CoM's forward speed [m/s] with one more step of `seconds`; `row` is of `TASK_ROW`."""
+    return row.mean_speed + seconds / HELD_SECONDS * (m.com_velocity[0] - row.mean_speed)
+
+
+@part
+def _acceleration(row, m, seconds):
+    """Return the term `acceleration` of one body in a step of `seconds`; `row` is of `TASK_ROW`."""
+    total = 0.0
+    for side in range(2):
+        for joint in range(4):
+            change = m.velocity[side, joint] - row.velocity[side, joint]
+            total += (change / seconds * ACTIVATION_TIME**2) ** 2
+    return total
+
+
+@part
+def remember(rows, bodies, options, running) -> None:
+    """Keep mean speed and joint velocities of the bodies `running` (N,) for the next step; arguments as of `judge`."""
+    for i in range(len(rows)):
+        if running[i]:
+            m = bodies[i].measured
+            rows[i].mean_speed = _mean_speed(rows[i], m, options[0].seconds)
+            rows[i].velocity[:] = m.velocity
+
+
 _muscle_in_series = part(muscle_in_series)
 
 
@@ -182,7 +218,10 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     price of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
     their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by
     volume, all joints together. `impact`, sum over feet and directions of the squared change of the force since the
-    last step [body weights] x `ACTIVATION_TIME` over the time of a step.
+    last step [body weights] x `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
+    (`HELD_SECONDS`) from the commanded one, over that; it does not saturate. `person_rate`, squared change of the
+    offsets of rest angles in 20 ms, over `OFFSET_UNIT`, all six together. `acceleration`, sum over joints of the
+    squared mean acceleration in the step x `ACTIVATION_TIME` squared [rad^2].
 
     Args:
         rows: (N,) of `TASK_ROW`.
@@ -227,6 +266,16 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, FIBRE_WORK] = muscles.energy.sum() / (scale.weight * way)
         terms[i, ACTIVATION] = muscles.activation / options[0].seconds
         terms[i, IMPACT] = _impact(rows[i], forces, i, options[0].seconds)
+        terms[i, SPEED_HELD] = terms[i, PERSON_RATE] = terms[i, ACCELERATION] = 0.0
+        if terms[i, ALIVE] > 0.0:  # a body that diverged has no speeds
+            held_speed = _mean_speed(rows[i], m, options[0].seconds)
+            terms[i, SPEED_HELD] = abs(held_speed - control.subject.speed) / control.subject.speed
+            terms[i, ACCELERATION] = _acceleration(rows[i], m, options[0].seconds)
+            person = control.person
+            for side in range(2):
+                for joint in range(3):
+                    change = person.offset[side, joint] - person.last_offset[side, joint]
+                    terms[i, PERSON_RATE] += (change / share / OFFSET_UNIT) ** 2
 
 
 @part
@@ -249,14 +298,20 @@ class Task:
         settings: the weights of the reward, and the time of a step.
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
+        feet: N pairs, the present feet of each body.
     """
 
     def __init__(
-        self, settings: BipedSettings, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects
+        self,
+        settings: BipedSettings,
+        rows: Sequence[tuple[LegConstants, ReferenceWalk]],
+        subjects: Subjects,
+        feet: Sequence[Feet],
     ) -> None:
-        self.names = tuple(entry.name for entry in OBSERVATION)
-        self.low = LOW
-        self.high = HIGH
+        entries = OBSERVATION if settings.acts == "stiffness" else PERSON_OBSERVATION
+        self.names = tuple(entry.name for entry in entries)
+        self.low = LOW[: len(entries)]
+        self.high = HIGH[: len(entries)]
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
         self.rows = np.zeros(len(subjects.bodies), TASK_ROW)
         """(N,) all that the task keeps of each environment."""
@@ -271,22 +326,32 @@ class Task:
         self.table = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows])).table
         """(R, SAMPLES, 2, C) of `TARGET`."""
         self._subjects = subjects
+        self._feet = feet
         self.fit(range(len(self.rows)))
 
     def fit(self, ids: Iterable[int]) -> None:
-        """Take over the present bodies of the subjects `ids`."""
+        """Take over the present bodies and feet of the subjects `ids`."""
         for index in ids:
             body = self._subjects.bodies[index]
             self.rows["scales"][index] = body_scales(body)[0]
             self.rows["units"][index] = units_of(body)
             self.rows["height_ratio"][index] = body.length_scale
+            self.rows["worn"][index] = worn_entries(body, self._feet[index])
 
-    def observe(self, bodies: NDArray) -> NDArray:
-        """Return the observation, float32 (N, D) as `OBSERVATION`, clipped to its bounds.
+    def reset(self, ids: NDArray, velocity: NDArray) -> None:
+        """Begin an episode of bodies `ids` (K,), whose joints move at `velocity` (N, side, joint) [rad/s]."""
+        self.rows["steps"][ids] = 0
+        self.rows["force"][ids] = 0.0
+        self.rows["mean_speed"][ids] = self._subjects.speed[ids]
+        self.rows["velocity"][ids] = velocity[ids]
+
+    def observe(self, bodies: NDArray, entries: int | None = None) -> NDArray:
+        """Return the observation, float32 (N, D), clipped to its bounds: the settings' entries, or the first `entries`
+        of `PERSON_OBSERVATION`.
 
         `bodies` (N,) of `BODY_ROW`.
         """
-        observation = np.empty((len(self.rows), len(OBSERVATION)), np.float32)
+        observation = np.empty((len(self.rows), entries or len(self.names)), np.float32)
         observe(self.rows, self._subjects.rows, bodies, self.table, observation)
         return observation
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from ..physics.contact import CONTACTS
-from ..physics.model import SIDES
+from ..physics.model import JOINTS, SIDES
 from .observation_entries import OBSERVATION, UNITS
 from .scales import SCALES
+from .worn import WORN
 
 PUSH = np.dtype([("begin", float), ("force", float), ("ends", float)])
 """Next or present push of a body: its beginning [s], its force at the mass of the settings [N], and the end of its
@@ -23,6 +24,9 @@ TASK_ROW = np.dtype(
         ("height_ratio", float),  # height over 1.70 m
         ("steps", np.int64),  # since the episode began
         ("force", float, (len(SIDES), len(CONTACTS), 2)),  # (forward, up) on each contact, mean over the last step [N]
+        ("worn", float, WORN),  # of the observation: what the person knows of body and feet
+        ("mean_speed", float),  # of the CoM, over `HELD_SECONDS` before the last step [m/s]
+        ("velocity", float, (len(SIDES), len(JOINTS))),  # of the joints at the last step's end [rad/s]
         ("push", PUSH),
         ("ground", GROUND_STATE),
         ("noise", float, len(OBSERVATION)),  # on the observation, in its own units

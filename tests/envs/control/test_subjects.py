@@ -236,7 +236,7 @@ def test_nothing_jumps_as_the_speed_changes():
     biped.reset(np.arange(1), [0], start=0.3)
     table, incline = list(rows_of(biped.walks)), slope_table(slope_constants()).table
     subjects, simulation = Subjects(settings, tabulated_speeds(settings), 1), Simulation(biped.body, 1)
-    legs, task = LegController(table, subjects), Task(settings, table, subjects)
+    legs, task = LegController(table, subjects), Task(settings, table, subjects, [settings.feet])
     legs.reset(np.arange(1), biped.leg_phase[:, 0])
     rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
     springs = FootSprings(settings, biped.body, rest, stiffness, subjects)

@@ -1,0 +1,90 @@
+"""Let a person act: offsets to the rest angles of hips, knees and ankles; and say who then sets the stiffness.
+
+The offsets are added to the rest angles that the leg constants give, every 20 ms. They are 0 while the body stands, and
+do nothing at an ankle with a rest angle or a device of its own.
+"""
+
+from collections.abc import Sequence
+from math import radians
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+
+from ..physics.model import MOVED, SIDES
+from ..settings.settings import BipedSettings
+
+SOFTEST_CONSTANT = -0.5
+"""Action of the softest stiffness that is drawn as a constant [-]; chosen: 50 and 12.6 N m/rad with the default ranges,
+below which no walk was found."""
+DRAWN_SOURCES = ("scaled", "constant", "random")
+"""Sources of the stiffness that `stiffness_by` "drawn" takes where the action does not set it."""
+
+
+def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[int, int, int, NDArray]:
+    """Return the fields of `SOURCE` for one episode: who sets the stiffness, drawn if the setting says so.
+
+    Draws nothing for the sources "action" and "schedule".
+    """
+    source = settings.stiffness_by
+    if source == "drawn":
+        source = "action" if random.random() < 0.5 else DRAWN_SOURCES[random.integers(len(DRAWN_SOURCES))]
+    drawn = np.zeros(4)
+    if source == "scaled":
+        drawn = np.tile(random.uniform(-1.0, 1.0, 2), 2)  # ankle and toe, alike on both legs
+    elif source == "constant":
+        drawn = np.tile(random.uniform(SOFTEST_CONSTANT, 1.0, 2), 2)
+    elif source == "random":
+        drawn = random.uniform(-1.0, 1.0, 4)
+    return int(source != "action"), int(source in ("schedule", "scaled")), int(source == "random"), drawn
+
+
+class PersonActions:
+    """The persons of N bodies, as actions set them, and the sources of their stiffness.
+
+    Args:
+        settings: range of the offsets, source of the stiffness.
+        rows: (N,) of `CONTROL_ROW`; `person` and `source` are changed.
+    """
+
+    def __init__(self, settings: BipedSettings, rows: NDArray) -> None:
+        self._settings = settings
+        self._range = radians(settings.person_range_deg)
+        self._source = rows["source"]
+        self._offset = rows["person"]["offset"]
+        self._last_offset = rows["person"]["last_offset"]
+        self._may_draw = settings.stiffness_by != "action"
+
+    def reset(self, ids: NDArray, randoms: Sequence[np.random.Generator]) -> None:
+        """Begin an episode of bodies `ids` (K,), each drawing with its generator in `randoms` (K,)."""
+        self._offset[ids] = 0.0
+        self._last_offset[ids] = 0.0
+        if self._may_draw:
+            for index, random in zip(ids.tolist(), randoms, strict=True):
+                self._source[index] = draw_source(self._settings, random)
+
+    def move(self, actions: NDArray, walking: NDArray, running: NDArray) -> None:
+        """Move the rest angles of the bodies `walking` (N,) by actions (N, 6), clipped to [-1, 1], in the order of
+        `PERSON_ACTIONS`; those of other `running` (N,) bodies go back."""
+        offset = self._range * np.clip(actions, -1.0, 1.0).reshape(-1, len(SIDES), len(MOVED))
+        self._offset[walking] = offset[walking]
+        self._offset[running & ~walking] = 0.0
+
+    def replace(self, factor: NDArray, ranges: NDArray, running: NDArray, randoms: Sequence) -> None:
+        """Replace the factors (N, 4) of the actions on the stiffness where the action does not set it.
+
+        Args:
+            factor: changed in place.
+            ranges: (4,) factor at action 1 where no schedule sets the stiffness.
+            running: (N,) bodies that take the step; a stiffness drawn anew is drawn for them.
+            randoms: (N,) their generators.
+        """
+        if not self._may_draw:
+            return
+        source = self._source
+        for index in np.flatnonzero(running & (source["anew"] > 0)).tolist():
+            source["drawn"][index] = randoms[index].uniform(-1.0, 1.0, 4)
+        others = source["others"] > 0
+        drawn = source["drawn"][others]
+        scheduled = source["scheduled"][others, None] > 0
+        factor[others] = np.where(scheduled, np.exp(drawn), ranges**drawn)
