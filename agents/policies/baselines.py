@@ -185,7 +185,7 @@ def has_feedback(name: str) -> bool:
 
 
 def is_schedule_file(name: str) -> bool:
-    """Return True if the name is that of a schedule file (`springfoot.agents.policies.schedules`)."""
+    """Return True if the name is that of a schedule file (`springfoot.agents.policies.schedule_files`)."""
     return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
 
 

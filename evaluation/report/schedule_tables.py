@@ -1,6 +1,6 @@
 """Write a walk's springs as tables for a controller: K and theta_eq over the stride, and as a few finite states.
 
-Both are read back as policies (`springfoot.agents.policies.schedules`).
+Both are read back as policies (`springfoot.agents.policies.schedule_files`).
 """
 
 import json
