@@ -46,7 +46,7 @@ def read_tensors(
         key: of the header's JSON text.
         kind: name of such a file, in messages.
         entries: allowed entries of the JSON.
-        finite: refuse infinite numbers and NaN.
+        finite: refuse all numbers but finite float32 and float64.
         needs_digest: refuse a file without a digest; files of earlier versions have none.
 
     Raises `SpringfootError` for any other file.
@@ -67,7 +67,7 @@ def read_tensors(
                 raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {kind}")
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         header = json.loads(text)
-    except (SafetensorError, OSError, TypeError, AttributeError) as error:
+    except (SafetensorError, OSError, TypeError, AttributeError) as error:  # the last two: types NumPy lacks (bfloat16)
         raise SpringfootError(f"{path} is not a .safetensors file: {error}") from None
     except (ValueError, RecursionError) as error:
         raise SpringfootError(f"{path}: the springfoot entry of its header is not JSON: {error}") from None

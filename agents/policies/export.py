@@ -57,7 +57,10 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
 
 
 def planned_files(out: str | Path) -> list[Path]:
-    """Return the files of an export, policy and contract; raise `SpringfootError` if one exists already."""
+    """Return the files of an export, policy and contract.
+
+    Raises `SpringfootError` if `out` does not end in `SUFFIX`, or one of them exists already.
+    """
     out = Path(out)
     if out.suffix != SUFFIX:
         raise SpringfootError(f"out must end in {SUFFIX}, got {out}")

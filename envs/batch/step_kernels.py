@@ -63,6 +63,7 @@ def begin_window(rows, bodies, tables, springs, walking) -> None:
     `begin_step`."""
     rows = EnvironmentRows(*rows)
     tables = Tables(*tables)
+    # Ankles and toes, then hips and knees.
     move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
     drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
 

@@ -27,9 +27,10 @@ MOST_DRAWS = 1000
 
 @kernel
 def _approach(most, running, subjects):
-    """Change the commanded speeds of `running` (N,) environments by at most `most` [m/s] towards their targets.
+    """Change the commanded speeds of environments `running` (N,) by at most `most` [m/s] towards their target speeds.
 
-    `subjects` is (N,) of `SUBJECT`. Returns True if any speed has not reached its target.
+    `subjects` is (N,) of `SUBJECT`. Returns True if any speed has not reached its target, also of an environment that
+    does not run now: it changes once that runs again.
     """
     under_way = False
     for i in range(len(subjects)):
