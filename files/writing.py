@@ -64,7 +64,7 @@ def is_taken(path: Path) -> bool:
     """Tell whether a name is in use: by a file, a folder or a link, also by a link to nothing."""
     try:
         path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
+    except (FileNotFoundError, NotADirectoryError):  # the latter: a file stands where its folder should
         return False
     return True
 
@@ -134,7 +134,7 @@ def _hidden_folder(out: Path) -> Iterator[Path]:
                 _empty(part)
                 raise
     finally:
-        with suppress(OSError):
+        with suppress(OSError):  # it has become `out`, or it is not ours and has something in it
             part.rmdir()
 
 

@@ -100,6 +100,7 @@ def scale_of(settings: BipedSettings) -> Scale:
     """Return the `Scale` by which a policy's actions become stiffnesses in an environment of these settings."""
     joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
+        # An action a multiplies the schedule by e^a.
         return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
     # K of the four actions' joints, ankle and toe of each leg, where all actions are 0, and where all are 1
     middle, stiffest = (
@@ -145,7 +146,7 @@ def contract_of(policy: Policy) -> dict[str, Any]:
         scale.name: {
             "shape": ["N", len(scale.joints)],
             "unit": scale.unit,
-            "entries": [
+            "entries": [  # rounded: without the last bits' noise
                 {"name": ACTIONS[joint], "low": round(float(low), 9), "high": round(float(high), 9)}
                 for joint, low, high in bounds
             ],
@@ -183,7 +184,7 @@ def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str
     for constants, walk in rows(walks):
         _, stiffness = foot_curves(settings, constants, walk)
         curves.append(stiffness[::SCHEDULE_STEP] / scale)
-    table = np.round(np.stack(curves), 6)  # (speed, percent, joint)
+    table = np.round(np.stack(curves), 6)  # (speed, percent, joint), without the last bits' noise
     return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}
 
 

@@ -183,7 +183,7 @@ def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
         entries = [
             [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
         ]
-    except (LookupError, TypeError, AttributeError):
+    except (LookupError, TypeError, AttributeError):  # an entry is missing, or a list or a number in place of an object
         raise SpringfootError(
             f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
             f"toe, and these {', '.join(SPRING_KEYS)}"
