@@ -103,7 +103,7 @@ def _switch(rows, bodies, running, time, stop_at):
             held.mode = WALKING
         elif before in (WALKING, STARTING) and time[i] >= stop_at:
             held.mode = STOPPING
-        elif before == STOPPING and subject.speed <= slow * (1.0 + 1e-9):
+        elif before == STOPPING and subject.speed <= slow * (1.0 + 1e-9):  # equal but for rounding
             for side in range(2):
                 if LANDED[0] <= phase[side] <= LANDED[1]:
                     held.mode = STOPPED

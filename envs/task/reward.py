@@ -150,6 +150,7 @@ def _charged_stiffness(scale, controls, body, tendon, side, joint):
         return stiffness
     angle = body.measured.angle[side]
     unit = scale.stiffness_scale
+    # Calf and tendon alone: K may be below the tissue's, and the angles have moved on since it was bounded.
     together = stiffness - unit * tissue_stiffness(angle[KNEE], angle[ANKLE])
     together = min(max(together, 0.0), TENDON_SHARE * unit * tendon)
     torque = abs(body.muscles.moment[0, side, ANKLE])
