@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from springfoot.arrays import NDArray
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_rows import controlled_joints
-from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.phase_table import SAMPLES
 from springfoot.envs.control.reference_walk import ReferenceWalk, rows, walks_of_legs
+from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.envs.task.observation import OBSERVATION

@@ -12,8 +12,8 @@ from typing import Any, get_args
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import BipedSettings, Equilibrium, body_of
 from springfoot.errors import SpringfootError, as_float, require_number, require_within

@@ -17,10 +17,10 @@ from springfoot.errors import SpringfootError
 from ..control.constants import LegConstants, SlopeConstants, slope_constants
 from ..control.decision_times import DecisionTimes
 from ..control.equilibrium import foot_tables
-from ..control.foot_springs import FootSprings, draw_delay
 from ..control.legs import LegController, slope_table
 from ..control.reference_walk import rows, walks_of_legs
 from ..control.standing import WALKING, Standing, off_phase
+from ..control.stiffness_control import FootSprings, draw_delay
 from ..control.subjects import Subjects
 from ..physics.contact import CONTACTS
 from ..physics.foot import Feet

@@ -16,8 +16,8 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..control.foot_springs import move, stiffen
 from ..control.legs import advance, drive
+from ..control.stiffness_control import move, stiffen
 from ..physics.kernel import kernel, part
 from ..physics.measurement import measure_bodies
 from ..physics.simulation import Physics

@@ -1,4 +1,8 @@
-"""Tabulate the feet for the control's kernels: muscles or a device at each ankle and toe."""
+"""Tabulate the feet of a batch for the control's kernels: muscles or a device at each ankle and toe.
+
+The springs of devices, as of passive prosthetic feet, get their K here (`device`); muscles get theirs in
+`stiffness_control`.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -19,9 +19,9 @@ from springfoot.gait.body.tissue import (
 from springfoot.gait.plan.effort import ACTIVATION_TIME
 
 from ..control.constants import LegConstants
-from ..control.foot_springs import muscle_stiffness
 from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
+from ..control.stiffness_control import muscle_stiffness
 from ..control.subjects import Subjects
 from ..physics.kernel import part
 from ..physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT
